@@ -41,26 +41,7 @@ class EngineFailed(TrackbedError):
 
 
 class DumpError(NotCredible):
-    """A dump file is malformed; the text names file, line, time step and lost grains.
-
-    ``complete_frames`` frames before the fault are whole; ``incomplete_end`` is True when the
-    file just ends inside the next one (an engine that was stopped, or still writes);
-    ``lost_ids`` are the grains known to be lost.
-    """
-
-    def __init__(
-        self,
-        what: str,
-        *,
-        where: str = "",
-        remedy: str = "",
-        complete_frames: int = 0,
-        incomplete_end: bool = False,
-        lost_ids: tuple[int, ...] = (),
-    ) -> None:
-        self.complete_frames, self.incomplete_end = complete_frames, incomplete_end
-        self.lost_ids = lost_ids
-        super().__init__(what, where=where, remedy=remedy)
+    """A dump file is malformed; the text names file, line, time step and lost grains."""
 
 
 class JumpRefused(NotCredible):

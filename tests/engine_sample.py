@@ -11,8 +11,10 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from adapters.bed.state import FloatArray, State
 from adapters.engines.contract import (
     Engine,
     EngineRun,
@@ -61,6 +63,31 @@ Damage = Callable[[Path], None]
 """Does something to the files of a stage, when the engine's process is through."""
 
 
+def window_of(run: Path, stage: str) -> Window:
+    """A window of a run."""
+    return load_window(run / stage / "states.npz")
+
+
+def start_of(run: Path, stage: str) -> EngineStart:
+    """The start of a window that goes on from a finished one."""
+    outcome = RunFolder(run).outcome(stage)
+    assert outcome is not None
+    notes = outcome.notes
+    return EngineStart(
+        run / stage / "end.restart",
+        notes["time_step"],
+        notes["piston_mesh"],
+        notes["piston_height"],
+    )
+
+
+def at_rest(state: State, position: FloatArray | None = None) -> State:
+    """The bed without velocities, put to other places [m] where they are given."""
+    still = np.zeros_like(state.position)
+    place = state.position if position is None else position
+    return state.moved(place, velocity=still, spin=still)
+
+
 class Sample:
     """A finished run of the tiny scene on one engine, in ``folder``/run; made when not there."""
 
@@ -98,19 +125,11 @@ class Sample:
         return folder
 
     def window(self, stage: str) -> Window:
-        return load_window(self.run / stage / "states.npz")
+        return window_of(self.run, stage)
 
     def start(self, stage: str) -> EngineStart:
         """That of a window that goes on from a finished one."""
-        outcome = RunFolder(self.run).outcome(stage)
-        assert outcome is not None
-        notes = outcome.notes
-        return EngineStart(
-            self.run / stage / "end.restart",
-            notes["time_step"],
-            notes["piston_mesh"],
-            notes["piston_height"],
-        )
+        return start_of(self.run, stage)
 
     def computed(self, start: EngineStart, cycles: int, folder: Path) -> Window:
         """A window computed outside any run folder."""

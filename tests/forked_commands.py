@@ -100,7 +100,7 @@ def serve(request: dict[str, Any]) -> None:
         from adapters.engines import fake as engine_fake
         from tests.jump_curves import CURVES, Curve
 
-        engine_fake.BED = Curve(CURVES[request["bed"]], bursts=0.2).bed
+        engine_fake.BED = Curve(CURVES[request["bed"]], bursts=0.2)
     if "slow" in request:
         slow_down(request["slow"])
     if "root" in request:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
+from functools import cache
 from typing import Any
 
 import numpy as np
+from scipy.signal import lfilter
 
 from adapters.bed.state import FloatArray
 from adapters.engines.fake import FakeBed
 from adapters.jumps.check import accept, judge, reject
-from adapters.jumps.control import Decision, Settings, begin, decide, observe
+from adapters.jumps.control import Control, Decision, Settings, decide, observe
 from adapters.jumps.rates import Stretch
 from adapters.jumps.slopes import Landing, unmoved
 
@@ -49,53 +51,54 @@ CURVES: dict[str, Law] = {
 """u(N) [m] of the mean of many beds."""
 
 
+BURST_CHANCE, BURST_CYCLES = 0.2, 2.0
+"""Chance of a burst in a cycle, and cycles in which it dies away by e."""
+
+
+@cache
+def draw_bursts(seed: int, count: int) -> FloatArray:
+    """Gains of ``count`` cycles over their mean: bursts of exponential size that die away slowly.
+
+    Mean 1, standard deviation 1.5, correlation exp(-1/2) from one cycle to the next.  The first
+    cycles of a longer series are those of a shorter one.
+    """
+    came = np.random.default_rng([seed, 0]).random(count) < BURST_CHANCE
+    size = np.random.default_rng([seed, 1]).exponential(size=count) * came / BURST_CHANCE
+    kept = np.exp(-1 / BURST_CYCLES)
+    return np.asarray(lfilter([1 - kept], [1, -kept], size))
+
+
 @dataclass(frozen=True)
-class Curve:
+class Curve(FakeBed):
     """A law with the noise of one run."""
 
-    law: Law
     bursts: float = 0.0
-    """Share of the settlement that comes in bursts (`engine_fake.bursts`)."""
+    """Share of the settlement that comes in bursts; a cycle's is the same in every run."""
     seed: int = 1
     jitter: float = 0.0
-    """Deviation of each reading [m]."""
+    """Deviation of each reading [m], independent from cycle to cycle."""
     first_cycle: float = 0.0
     """What the bed settles more in the first cycle behind a jump, over what it was moved by."""
     kappa: float = 0.0
     """The same in the n-th, times n (`jump_slopes`)."""
 
-    @property
-    def bed(self) -> FakeBed:
-        """The fake engine's bed of that curve."""
-        return FakeBed(self.law, self.bursts, self.seed, self.jitter)
+    def settlement(self, first: int, cycles: int) -> FloatArray:
+        """u [m] at the ends of ``cycles`` cycles from ``first`` on, less u before them."""
+        count = np.arange(first, first + cycles + 1)
+        gain = np.diff(self.law(count.astype(float)))
+        drawn = 1 << max(first + cycles + 1, 2).bit_length()  # so that few series are made
+        if self.bursts:
+            share = draw_bursts(self.seed, drawn)[first : first + cycles]
+            gain = gain * (1 - self.bursts + self.bursts * share)
+        path = np.concatenate([[0.0], np.cumsum(gain)])
+        if self.jitter:
+            reading = np.random.default_rng([self.seed, 2]).standard_normal(drawn)
+            path += self.jitter * (reading[count] - reading[first])
+        return path
 
     def mean(self, first: int, last: int) -> float:
         """What many beds gain on the mean [m]."""
         return float(np.diff(self.law(np.array([first, last], float)))[0])
-
-
-@dataclass(frozen=True, eq=False)
-class Measured:
-    """The mean curve of a full run; what it gained is the truth, its own noise included."""
-
-    path: FloatArray
-    """Settlement after 0, 1, 2, ... cycles [m]."""
-    first_cycle: float = 0.0
-    kappa: float = 0.0
-    """As `Curve` has them."""
-
-    @property
-    def bed(self) -> Measured:
-        """Itself."""
-        return self
-
-    def settlement(self, first: int, cycles: int) -> FloatArray:
-        """u [m] at the ends of ``cycles`` cycles from ``first`` on, less u before them."""
-        return np.asarray(self.path[first : first + cycles + 1] - self.path[first])
-
-    def mean(self, first: int, last: int) -> float:
-        """What the run gained [m]."""
-        return float(self.path[last] - self.path[first])
 
 
 @dataclass
@@ -121,13 +124,13 @@ class Play:
         return np.abs(self.true_errors)
 
 
-def make_stretch(bed: FakeBed | Measured, first: int, cycles: int) -> Stretch:
+def make_stretch(curve: FakeBed, first: int, cycles: int) -> Stretch:
     """Cycles of a bed as the controller sees them."""
     unknown = np.full(cycles, np.nan)
-    return Stretch(first, np.diff(bed.settlement(first, cycles)), unknown, unknown)
+    return Stretch(first, np.diff(curve.settlement(first, cycles)), unknown, unknown)
 
 
-def moved_more(curve: Curve | Measured, stretch: Stretch, landings: Sequence[Landing]) -> Stretch:
+def moved_more(curve: Curve, stretch: Stretch, landings: Sequence[Landing]) -> Stretch:
     """A stretch as it is behind jumps: the bed settles more."""
     more = unmoved(stretch, landings, -curve.kappa)
     if landings and landings[-1].cycle == stretch.first_cycle:
@@ -135,11 +138,11 @@ def moved_more(curve: Curve | Measured, stretch: Stretch, landings: Sequence[Lan
     return more
 
 
-def play(curve: Curve | Measured, k_i: int, settings: Settings) -> Play:
+def play(curve: Curve, k_i: int, settings: Settings) -> Play:
     """Let the controller run on a curve from the state after ``k_i`` cycles."""
-    out, bed = Play(), curve.bed
-    start = float(bed.settlement(0, k_i)[-1])
-    control = begin(k_i, start)
+    out = Play()
+    start = float(curve.settlement(0, k_i)[-1])
+    control = Control(k_i, start)
     out.computed = k_i
 
     while True:
@@ -149,13 +152,13 @@ def play(curve: Curve | Measured, k_i: int, settings: Settings) -> Play:
             out.refused = decision.action == "refuse"
             break
         if decision.action == "compute":
-            window = make_stretch(bed, control.cycle, decision.window)
+            window = make_stretch(curve, control.cycle, decision.window)
             window = moved_more(curve, window, control.landings)
             out.computed += decision.window
             control = observe(control, window, control.settlement + float(window.gain.sum()))
             continue
         landed = control.cycle + decision.jump
-        window = make_stretch(bed, landed, settings.healing + decision.window)
+        window = make_stretch(curve, landed, settings.healing + decision.window)
         window = moved_more(curve, window, (*control.landings, Landing(landed, decision.moved)))
         out.computed += settings.healing + decision.window
         settlement = control.settlement + decision.moved + float(window.gain.sum())

@@ -7,13 +7,16 @@ in the mean).
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from adapters.bed.contact_law import hertz_stiffness
 from adapters.bed.container import Container, Walls
-from adapters.bed.overlaps import Neighbours, find_behind_discs, measure_rows, neighbours
+from adapters.bed.overlaps import Neighbours, find_behind_discs, neighbours
 from adapters.bed.state import FloatArray, State
-from adapters.relaxation.methods import relax_bare
+from adapters.relaxation.measured import Surroundings
+from adapters.relaxation.methods import relax
 from adapters.relaxation.smallest import find_smallest_move
 
 STIFFNESS = hertz_stiffness(46.9e9, 0.25, 210e9, 0.3)
@@ -31,6 +34,17 @@ def state_at_rest(position: FloatArray, radius: FloatArray) -> State:
     return State(np.arange(n), position, radius, mass, np.zeros((n, 3)), np.zeros((n, 3)))
 
 
+def parted(position: FloatArray, radius: FloatArray, walls: Walls) -> FloatArray:
+    """The nearest places [m] without overlaps, as after a jump of a bed without any contact."""
+    far = 1000.0
+    wide = replace(
+        walls, plane_point=far * walls.plane_point, cylinder_radius=far * walls.cylinder_radius
+    )
+    before = state_at_rest(np.abs(far * position) + radius[:, None], radius)
+    found = relax(position, before, wide, STIFFNESS, walls_after=walls, keep_height=False)
+    return found.position
+
+
 def bed_made(count: int, seed: int = 0) -> tuple[State, Walls]:
     """A bed of ``count`` grains (Karrech's radii) in a square box, two contacts closed a grain."""
     generator = np.random.default_rng(seed)
@@ -42,32 +56,28 @@ def bed_made(count: int, seed: int = 0) -> tuple[State, Walls]:
     place = (cell[:, None] + corner).reshape(-1, 3)[:count]
     position = edge * place + 3e-4 * generator.standard_normal((count, 3))
     walls = Container("box", size_x=side * edge, size_y=side * edge).walls()
-    position = relax_bare(state_at_rest(position, radius), walls, STIFFNESS).position
-    behind = find_behind_discs(position, walls)
+    position = parted(position, radius, walls)
     near = neighbours(position, radius, walls, 1e-3)
     closed = np.argsort(-near.overlap)[: 2 * count]
-    none = Neighbours(near.first[:0], near.second[:0], near.normal[:0], near.overlap[:0])
     network = Neighbours(
         near.first[closed],
         near.second[closed],
         near.normal[closed],
         OVERLAP * generator.exponential(size=len(closed)),
     )
-    made = find_smallest_move(
+    scene = Surroundings(radius, walls, find_behind_discs(position, walls), STIFFNESS)
+    made, _, _ = find_smallest_move(
         position,
         position,
-        radius,
+        scene,
         network,
-        none,
         5 * OVERLAP,
-        lambda x, first, second: measure_rows(x, radius, first, second, walls, behind),
-        lambda x, gap: neighbours(x, radius, walls, gap, behind),
         keep_height=False,
         tolerance=0.01 * OVERLAP,
         accepted=10 * OVERLAP,
         evaluations_max=40_000,
     )
-    return state_at_rest(made.position, radius), walls
+    return state_at_rest(made, radius), walls
 
 
 def jump(state: State, seed: int = 1) -> FloatArray:

@@ -8,7 +8,7 @@ from adapters.bed.container import Container
 from adapters.bed.state import FloatArray
 from adapters.laws import get_law
 from adapters.laws.form.contract import Law
-from adapters.moves.contract import Move
+from adapters.moves.contract import Jump, Move
 from adapters.procedure.progress import Progress
 
 LOG = get_law("log")
@@ -29,7 +29,12 @@ def bed(seed: int = 0, count: int = 120, noise: float = 1e-6) -> tuple[FloatArra
 
 
 def moved(
-    way: Move, position: FloatArray, radius: FloatArray, h: float = 30, law: Law = LOG
+    way: Move,
+    position: FloatArray,
+    radius: FloatArray,
+    h: float = 30,
+    law: Law = LOG,
+    container: Container = QUARTER,
 ) -> FloatArray:
     """Displacement of the bed in a quarter cylinder [m], shape (n, 3)."""
-    return way.displacement(CYCLE, position, radius, law, h, QUARTER)
+    return way.displacement(Jump(CYCLE, position, radius, law, h, container))

@@ -10,8 +10,6 @@ and Berryman).
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 from scipy.integrate import trapezoid
 
@@ -26,16 +24,6 @@ LOOPS = {
 
 The second is the first run backwards.
 """
-
-
-def path(corners: FloatArray, steps: int) -> FloatArray:
-    """Points along straight legs of ``steps`` steps each, shape ((c - 1) steps + 1, 2).
-
-    ``corners`` (delta_n, delta_t), shape (c, 2).
-    """
-    share = np.arange(steps)[:, None] / steps
-    legs = [a + share * (b - a) for a, b in pairwise(corners)]
-    return np.concatenate([*legs, corners[-1:]])
 
 
 def force_secant(stiffness: FloatArray, displacement: FloatArray) -> FloatArray:
@@ -65,38 +53,6 @@ def force_rescaled(stiffness: FloatArray, displacement: FloatArray) -> FloatArra
         kept = force[i - 1] * min(1.0, stiffness[i] / stiffness[i - 1])
         mean = (stiffness[i] + stiffness[i - 1]) / 2
         force[i] = kept + mean * (displacement[i] - displacement[i - 1])
-    return force
-
-
-def force_mindlin_deresiewicz(
-    overlap: FloatArray,
-    displacement: FloatArray,
-    modulus: float,
-    shear: float,
-    radius: float,
-    friction: float,
-    springs: int = 2000,
-) -> FloatArray:
-    """The contact with micro-slip [N], shape (s,), along any path: what the rules approximate.
-
-    Springs side by side, each with its own overlap delta_n - x^2/R* and Coulomb's limit, are the
-    half-space of Cattaneo, Mindlin and Deresiewicz (method of dimensionality reduction; Popov and
-    Hess 2015).  ``overlap`` and ``displacement`` [m], shape (s,); ``modulus`` E* and
-    ``shear`` G* [Pa]; ``radius`` R* [m]; ``friction`` may be inf.  The first state has no force.
-    """
-    edge = np.sqrt(radius * overlap.max())
-    x = (np.arange(springs) + 0.5) / springs * edge
-    width = 2 * edge / springs  # both halves
-    stretch = np.zeros(springs)
-    force = np.zeros_like(displacement)
-    for i in range(1, len(force)):
-        depth = overlap[i] - x**2 / radius
-        stretch = stretch + displacement[i] - displacement[i - 1]
-        if np.isfinite(friction):
-            limit = friction * modulus / (4 * shear) * np.maximum(depth, 0.0)
-            stretch = np.clip(stretch, -limit, limit)
-        stretch = np.where(depth > 0, stretch, 0.0)
-        force[i] = 4 * shear * width * stretch.sum()
     return force
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from adapters.bed.state import FloatArray
 from adapters.engines.yade import PARAMETERS, YadeEngine
-from adapters.files.dump import read_frames
+from adapters.files.dump_reader import read_frames
 from adapters.files.window import read_contacts
 from adapters.scene.tables import Scene
 from validation.bench.few_grains import RADIUS, Track

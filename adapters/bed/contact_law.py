@@ -97,16 +97,6 @@ def hertz_stiffness(
     )
 
 
-def equivalent_radius(radius_i: float, radius_j: float = inf) -> float:
-    """R* [m]: 1/R* = 1/R_i + 1/R_j; a plane wall has ``radius_j`` = inf."""
-    return 1 / (1 / radius_i + 1 / radius_j)
-
-
-def effective_mass(mass_i: float, mass_j: float = inf) -> float:
-    """m* [kg]: 1/m* = 1/m_i + 1/m_j; a wall has ``mass_j`` = inf.  m/2 for two equal grains."""
-    return 1 / (1 / mass_i + 1 / mass_j)
-
-
 def normal_force(
     overlap: float | FloatArray, modulus: float, radius: float | FloatArray
 ) -> FloatArray:

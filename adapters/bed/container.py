@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from math import ceil, pi, sqrt
 
@@ -31,6 +32,20 @@ class Walls:
     """Distance from the z axis beyond which a plane ends [m], shape (p,); inf for whole planes."""
     cylinder_radius: float = np.inf
     """Inner radius of the cylinder [m]; inf without one."""
+
+    @property
+    def geometry(self) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+        """Points, normals and reaches of the planes, and the cylinder's radius."""
+        return self.plane_point, self.plane_normal, self.plane_reach, self.cylinder_radius
+
+    def planes(self) -> Iterator[tuple[str, bool, int, float, int]]:
+        """Of each plane across an axis name, whether frictionless, axis, place on it [m], sense."""
+        for name, frictionless, point, normal in zip(
+            self.plane_name, self.plane_frictionless, self.plane_point, self.plane_normal,
+            strict=True,
+        ):  # fmt: skip
+            axis = int(np.argmax(np.abs(normal)))
+            yield name, frictionless, axis, float(point[axis]), int(np.sign(normal[axis]))
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from adapters.bed.container import Container
+from adapters.bed.overlaps import find_pairs_within
 from adapters.bed.radii import find_radius_that_fits
 from adapters.bed.state import Contacts, FloatArray, IntArray, State
 from adapters.errors import NotConverged, SceneError
@@ -61,7 +61,7 @@ def draw_sample_start(
     position = draw_places(radius, container, height, generator)
     drawn_in = np.zeros(len(radius), np.int64)
     for round_ in range(1, START_ROUNDS):
-        first, second = pairs_in_contact(position, radius).T
+        first, second = find_pairs_within(position, radius, 0.0).T
         overlapping = np.unique(np.where(drawn_in[first] > drawn_in[second], first, second))
         if not len(overlapping):
             return position, height
@@ -72,17 +72,6 @@ def draw_sample_start(
         where="sample.relative_density_start",
         remedy="start looser, such as 0.05",
     )
-
-
-def pairs_in_contact(position: FloatArray, radius: FloatArray) -> IntArray:
-    """Index pairs i < j of grains whose spheres overlap or touch, shape (m, 2).
-
-    ``position`` [m], shape (n, 3); ``radius`` [m], shape (n,).  The tree searches twice the largest
-    radius: for radii alike within a decade.
-    """
-    pair = cKDTree(position).query_pairs(2 * float(radius.max()), output_type="ndarray")
-    distance = np.linalg.norm(position[pair[:, 0]] - position[pair[:, 1]], axis=1)
-    return np.asarray(pair[distance <= radius[pair].sum(axis=1)], np.int64)
 
 
 def draw_places(

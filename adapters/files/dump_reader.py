@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gzip
 import re
-from collections.abc import Iterable
+import zlib
+from collections.abc import Iterator
 from gzip import GzipFile
 from io import FileIO
 from pathlib import Path
@@ -12,24 +14,51 @@ from typing import NamedTuple, NoReturn
 import numpy as np
 
 from adapters.bed import FloatArray, IntArray
-from adapters.files.dump_frame import Frame, Kind
-from adapters.files.dump_text import WRITE_TEXT, DumpText, list_grains
+from adapters.errors import DumpError, UsageError
+from adapters.files.dump import Frame, Kind
 
+TEXT_BLOCK = 1 << 20
+"""Bytes read at once; also the longest line that is taken for text."""
 _VALUES_AT_FIRST = 1 << 24
 """Values to take memory for before a row is seen: a header may lie about its rows."""
 _WHOLE_LARGEST = 2**53
 """Whole numbers below it are exact in float64."""
-
 _TOKEN = re.compile(rb"[^ \t\r\n]+")
 _WHOLE = re.compile(r"[+-]?\d{1,19}", re.ASCII)
 _NUMBER = re.compile(rb"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
-_NAN = re.compile(rb"[+-]?nan(\(\w*\))?", re.IGNORECASE)
-_INFINITE = re.compile(rb"[+-]?inf(inity)?", re.IGNORECASE)
+_NOT_FINITE = re.compile(rb"[+-]?(nan(\(\w*\))?|inf(inity)?)", re.IGNORECASE)
+WRITE_TEXT = "write text with 'dump ID all custom N FILE id x y z ...' or 'dump ID all local ...'"
+DAMAGED = "the header is damaged: run again, or cut this frame out"
 _OTHER_FORMATS = {
     b"\x1f\x8b": "gzip data: give the file a name that ends in .gz",
     b"PK\x03\x04": "a zip or npz archive: give the text dump",
     b"\x89PNG": "a PNG image: give the text dump",
 }
+
+
+def read_frames(path: str | Path) -> Iterator[Frame]:
+    """Frames of a text dump (``.gz`` too), in order; memory for one frame and a block of text.
+
+    Every number is the float64 nearest to its decimal text.  A grain that was in a frame must be in
+    all later ones.  Raises `DumpError` at the first fault, after the whole frames before it;
+    `UsageError` when the file cannot be opened.
+    Not for ``.bin``, VTK or image dumps, nor for text columns such as ``element``.
+    """
+    path = Path(path)
+    try:
+        stream = (
+            gzip.open(path) if path.suffix == ".gz" else path.open("rb", buffering=0)  # noqa: SIM115
+        )
+    except OSError as error:
+        raise UsageError(
+            f"the dump cannot be opened ({error.strerror})",
+            where=str(path),
+            remedy="check the name, and that the engine's dump command came to its first step",
+        ) from error
+    with stream:
+        reader = Reader(path, stream)
+        while (frame := reader.read_frame()) is not None:
+            yield frame
 
 
 class Header(NamedTuple):
@@ -42,21 +71,79 @@ class Header(NamedTuple):
     boundary: str
 
 
-class Reader(DumpText):
+class Reader:
     """A dump on its way: a block of its text, and what the frames so far allow of the next."""
 
-    def __init__(
-        self, path: Path, stream: FileIO | GzipFile, expected: Iterable[int] | None, allow_nan: bool
-    ) -> None:
-        super().__init__(path, stream)
-        self.allow_nan = allow_nan
+    def __init__(self, path: Path, stream: FileIO | GzipFile) -> None:
+        self.path, self.stream = path, stream
+        self.block = bytearray(TEXT_BLOCK)
+        self.text = np.frombuffer(self.block, np.uint8)
+        self.begin = self.end = 0  # block[begin:end] is read from the file, but not yet used
+        self.line = 0  # lines used so far
+        self.cut = False  # compressed data stopped before their end mark
+        self.step: int | None = None
+        self.step_before: int | None = None
         self.header_before: Header | None = None
-        self.known: IntArray | None = None
-        if expected is not None:
-            self.known = np.unique(np.fromiter(expected, np.int64))
+        self.known: IntArray | None = None  # identifiers of the grains of the frame before
+        self.complete = 0
+
+    # --- text and faults --------------------------------------------------------------------
+    def more(self) -> bool:
+        """Read on behind what is not yet used; False at the end of the file."""
+        unused = self.end - self.begin
+        if unused == TEXT_BLOCK:
+            what = f"a line is longer than {TEXT_BLOCK} bytes: this is no text dump"
+            self.fault(what, WRITE_TEXT, line=self.line + 1)
+        self.block[:unused] = self.block[self.begin : self.end]
+        self.begin, self.end = 0, unused
+        try:
+            count = self.stream.readinto(memoryview(self.block)[unused:])
+        except EOFError:
+            self.cut, count = True, 0
+        except (OSError, zlib.error) as error:
+            what = f"the file cannot be read further ({error})"
+            self.fault(what, "copy or write the file again", line=self.line + 1)
+        self.end += count
+        return bool(count)
+
+    def read_line(self) -> str | None:
+        """The next line; None when the file ends first."""
+        while (stop := self.block.find(b"\n", self.begin, self.end)) < 0:
+            if not self.more():
+                return None
+        line = self.block[self.begin : stop].decode(errors="backslashreplace")
+        self.begin, self.line = stop + 1, self.line + 1
+        return line.strip()
+
+    def read_header_line(self) -> str:
+        """The next line, which belongs to a header."""
+        line = self.read_line()
+        return self.refuse_cut_header() if line is None else line
+
+    def fault(self, what: str, remedy: str, *, line: int | None = None) -> NoReturn:
+        """Raise the error of a fault at a line, else at the last one used."""
+        step = f"time step {self.step}"
+        if self.step is None:
+            before = self.step_before
+            step = "before the first time step" if before is None else f"after time step {before}"
+        where = f"{self.path}, line {self.line if line is None else line}, {step}"
+        raise DumpError(what, where=where, remedy=remedy)
+
+    def refuse_incomplete(self, what: str) -> NoReturn:
+        """Raise the error of a file that ends inside a frame."""
+        remedy = (
+            f"the engine was stopped or is still writing: keep the {self.complete} whole frames"
+            " before, or run again; a whole file ends with a line end"
+        )
+        self.fault(what, remedy, line=self.line + 1)
+
+    def refuse_cut_header(self) -> NoReturn:
+        """Raise the error of a file that ends inside a header."""
+        what = "compressed data end" if self.cut else "the file ends"
+        self.refuse_incomplete(f"{what} inside the header of a frame")
 
     # --- header -----------------------------------------------------------------------------
-    def opening(self) -> None:
+    def check_opening(self) -> None:
         """Refuse what is no text dump, by its first bytes."""
         self.more()
         if self.block.startswith(b"\xef\xbb\xbf"):  # a mark that Windows editors leave
@@ -77,22 +164,12 @@ class Reader(DumpText):
             remedy = known[0] if known else WRITE_TEXT
             self.fault(f"this is no text dump: {text}", remedy, line=1)
 
-    def whole(self, item: str) -> int:
+    def read_whole(self, item: str) -> int:
         """The whole number on the line after an item of the header."""
-        line = self.read_line()
-        if line is None:
-            self.refuse_cut_header()
+        line = self.read_header_line()
         if not _WHOLE.fullmatch(line):
-            self.fault(
-                f"a whole number should follow 'ITEM: {item}', not {line[:40]!r}",
-                "the header is damaged: run again, or cut this frame out",
-            )
+            self.fault(f"a whole number should follow 'ITEM: {item}', not {line[:40]!r}", DAMAGED)
         return int(line)
-
-    def refuse_cut_header(self) -> NoReturn:
-        """Raise the error of a file that ends inside a header."""
-        what = "compressed data end" if self.cut else "the file ends"
-        self.refuse_incomplete(f"{what} inside the header of a frame")
 
     def read_header(self) -> Header | None:
         """The items up to the column names; None at the end of the file."""
@@ -102,19 +179,18 @@ class Reader(DumpText):
         while (line := self.read_line()) is not None:
             if not line and not begun:
                 continue
-            item = line.removeprefix("ITEM:").strip()
             if not line.startswith("ITEM:"):
                 self.refuse_rows_above(line)
+            item = line.removeprefix("ITEM:").strip()
             begun = True
             if item == "TIMESTEP":
                 self.read_step()
             elif item.startswith("NUMBER OF "):
-                label, rows = item.removeprefix("NUMBER OF "), self.whole(item)
+                label, rows = item.removeprefix("NUMBER OF "), self.read_whole(item)
             elif item.startswith("BOX BOUNDS"):
                 boundary, bounds = item.removeprefix("BOX BOUNDS").strip(), self.read_bounds()
             elif item in ("UNITS", "TIME"):
-                if self.read_line() is None:
-                    self.refuse_cut_header()
+                self.read_header_line()
             elif label and self.step is not None and (item + " ").startswith(label + " "):
                 columns = tuple(item.removeprefix(label).split())
                 return self.check_header(Header(label, rows, columns, bounds, boundary))
@@ -145,7 +221,7 @@ class Reader(DumpText):
                 "the next frame begins inside the header of this one",
                 "the engine was stopped here: cut this frame out",
             )
-        self.step = self.whole("TIMESTEP")
+        self.step = self.read_whole("TIMESTEP")
         if self.step_before is not None and self.step <= self.step_before:
             self.fault(
                 f"time steps must increase, but {self.step} follows {self.step_before}",
@@ -153,30 +229,23 @@ class Reader(DumpText):
             )
 
     def read_bounds(self) -> FloatArray:
-        """Three rows of box bounds."""
-        table = []
+        """Three rows of box bounds, two to four numbers each."""
+        table: list[list[float]] = []
         for _ in range(3):
-            line = self.read_line()
-            if line is None:
-                self.refuse_cut_header()
+            line = self.read_header_line()
             words = line.encode().split()
-            if not all(_NUMBER.fullmatch(word) for word in words) or len(words) not in (2, 3, 4):
-                self.fault(
-                    f"box bounds should be two to four numbers, not {line[:60]!r}",
-                    "the header or the run is damaged: run again, or cut this frame out",
-                )
+            numbers = all(_NUMBER.fullmatch(word) for word in words) and len(words) in (2, 3, 4)
+            if not numbers or (table and len(words) != len(table[0])):
+                what = "box bounds should be two to four numbers, as many in each line"
+                self.fault(f"{what}, not {line[:60]!r}", DAMAGED)
             table.append([float(word) for word in words])
-        if len({len(row) for row in table}) > 1:
-            self.fault("box bounds differ in length", "cut this frame out")
         return np.array(table)
 
     def check_header(self, header: Header) -> Header:
         """The header, when its columns can be those of this dump."""
         if header.rows < 0 or not header.columns:
-            self.fault(
-                f"the header announces {header.rows} rows of {len(header.columns)} columns",
-                "the header is damaged: run again, or cut this frame out",
-            )
+            what = f"the header announces {header.rows} rows of {len(header.columns)} columns"
+            self.fault(what, DAMAGED)
         before = self.header_before
         if before is not None and (before.label, before.columns) != (header.label, header.columns):
             missing = [name for name in before.columns if name not in header.columns]
@@ -187,18 +256,13 @@ class Reader(DumpText):
                 f" (missing: {' '.join(missing) or 'none'}; new: {' '.join(new) or 'none'})",
                 "give each dump command a file of its own",
             )
-        if header.label == "ATOMS" and self.known is not None and "id" not in header.columns:
-            self.fault(
-                f"grains cannot be distinguished: no column id in {' '.join(header.columns)}",
-                "add id to the engine's dump command",
-            )
         return header
 
     # --- rows -------------------------------------------------------------------------------
     def read_frame(self) -> Frame | None:
         """The next frame, checked; None at the end of the file."""
         if not self.complete:
-            self.opening()
+            self.check_opening()
         header = self.read_header()
         if header is None:
             return None
@@ -224,25 +288,20 @@ class Reader(DumpText):
             stop = self.block.rfind(b"\n", self.begin, self.end) + 1
             if stop <= self.begin:
                 if not self.more():
-                    self.refuse_incomplete(
-                        f"the file ends inside the frame: {row} of {header.rows} rows are whole",
-                        self.lost(header, values[:row]),
-                    )
+                    what = f"{row} of {header.rows} rows are whole"
+                    self.refuse_incomplete(f"the file ends inside the frame: {what}")
                 continue
             status, row, column, self.begin = kernel.read_rows(
                 self.text, self.begin, stop, values, row, column
             )
             self.line = first + row
             if status == kernel.TOKEN_UNUSUAL:
-                values[row, column] = self.unusual(header, values, row, column)
+                values[row, column] = self.read_unusual(header, values, row, column)
                 column += 1
             elif status != kernel.BLOCK_READ:
-                found = len(self.row_words())
-                self.fault(
-                    f"row {row + 1} has {found} values for {columns} columns",
-                    "the row is damaged: run again, or cut this frame out",
-                    line=self.line + 1,
-                )
+                what = f"row {row + 1} has {len(self.row_words())} values for {columns} columns"
+                remedy = "the row is damaged: run again, or cut this frame out"
+                self.fault(what, remedy, line=self.line + 1)
         return values
 
     def row_words(self) -> list[bytes]:
@@ -250,24 +309,21 @@ class Reader(DumpText):
         start = self.block.rfind(b"\n", 0, self.begin) + 1
         return bytes(self.block[start : self.block.find(b"\n", self.begin, self.end)]).split()
 
-    def unusual(self, header: Header, values: FloatArray, row: int, column: int) -> float:
-        """The token at `begin`, which the compiled loop left: a number, nan or a fault."""
+    def read_unusual(self, header: Header, values: FloatArray, row: int, column: int) -> float:
+        """The token at `begin`, which the compiled loop left: a number or a fault."""
         line, name = self.line + 1, header.columns[column]
         match = _TOKEN.match(self.block, self.begin)
         assert match is not None
         token = bytes(match.group())
         if column == 0 and token.startswith(b"ITEM:"):
+            lost = self.list_lost(header, values[:row])
             self.fault(
-                f"the frame is short: its header says {header.rows} rows, {row} are there",
+                f"the frame is short: its header says {header.rows} rows, {row} are there{lost}",
                 "the engine lost grains or was stopped here: run again, or cut this frame out",
                 line=line,
-                lost=self.lost(header, values[:row]),
             )
-        if _NUMBER.fullmatch(token) or _INFINITE.fullmatch(token):
-            value = float(token)
-        elif _NAN.fullmatch(token):
-            value = np.nan
-        else:
+        value = float(token) if _NUMBER.fullmatch(token) else np.nan
+        if np.isnan(value) and not _NOT_FINITE.fullmatch(token):
             binary = any(byte < 32 or byte > 126 for byte in token)
             self.fault(
                 f"column {name} holds {'binary data' if binary else 'no number'}:"
@@ -275,7 +331,7 @@ class Reader(DumpText):
                 "cut this frame out; dump columns of numbers only (no element, no mol names)",
                 line=line,
             )
-        if not np.isfinite(value) and not self.allow_nan:
+        if not np.isfinite(value):
             words, grain = self.row_words(), ""
             if header.label == "ATOMS" and "id" in header.columns[: len(words)]:
                 grain = f" of grain {words[header.columns.index('id')].decode('latin-1')}"
@@ -289,24 +345,23 @@ class Reader(DumpText):
         return value
 
     # --- grains -----------------------------------------------------------------------------
-    def lost(self, header: Header, values: FloatArray) -> IntArray | None:
-        """Known grains that are not among rows; None when grains have no identifier."""
+    def list_lost(self, header: Header, values: FloatArray) -> str:
+        """Known grains that are not among rows, in words; empty where none is missed."""
         if self.known is None or header.label != "ATOMS":
-            return None
-        found = values[:, header.columns.index("id")]
-        return self.known[~np.isin(self.known, found[np.isfinite(found)].astype(np.int64))]
+            return ""
+        found = values[:, header.columns.index("id")].astype(np.int64)
+        lost = self.known[~np.isin(self.known, found)]
+        return f"; lost grains: {list_grains(lost)}" if len(lost) else ""
 
     def check_grains(self, header: Header, values: FloatArray) -> FloatArray:
         """Rows of grains, sorted by identifier, when none is lost or there twice."""
+        above = self.line - header.rows
         if "id" not in header.columns:
             before = self.header_before
             if before is not None and header.rows < before.rows:
-                self.fault(
-                    f"grains are lost: {before.rows} before, {header.rows} here; no column id"
-                    " says which",
-                    "add id to the dump command; use a smaller time step",
-                    line=self.line - header.rows,
-                )
+                what = f"grains are lost: {before.rows} before, {header.rows} here"
+                remedy = "add id to the dump command; use a smaller time step"
+                self.fault(f"{what}; no column id says which", remedy, line=above)
             return values
         number = values[:, header.columns.index("id")]
         odd = np.flatnonzero(~(np.abs(number) < _WHOLE_LARGEST) | (number != np.floor(number)))
@@ -314,7 +369,7 @@ class Reader(DumpText):
             self.fault(
                 f"{number[odd[0]]!r} is no identifier of a grain: not whole, or 2^53 and more",
                 "write id as %d in dump_modify format",
-                line=self.line - header.rows + 1 + int(odd[0]),
+                line=above + 1 + int(odd[0]),
             )
         identifier = number.astype(np.int64)
         if not np.all(identifier[1:] > identifier[:-1]):
@@ -325,17 +380,21 @@ class Reader(DumpText):
                 self.fault(
                     f"grains are there twice: {list_grains(np.unique(identifier[twice]))}",
                     "the dump is damaged, or two runs wrote to it: give each a file of its own",
-                    line=self.line - header.rows + 1 + int(max(order[twice[0] : twice[0] + 2])),
+                    line=above + 1 + int(max(order[twice[0] : twice[0] + 2])),
                 )
-        lost = self.lost(header, values)
-        if lost is not None and len(lost):
+        if lost := self.list_lost(header, values):
             what = "grains are lost" if header.rows else "the frame holds no grains"
             self.fault(
-                f"{what}: {len(lost)} that should be there are not",
+                what + lost,
                 "grains left the box or the step was too long: use a smaller time step, wider"
                 " bounds, and 'thermo_modify lost error'",
-                line=self.line - header.rows,
-                lost=lost,
+                line=above,
             )
         self.known = identifier
         return values
+
+
+def list_grains(identifiers: IntArray) -> str:
+    """At most ten identifiers as text, and how many there are."""
+    text = ", ".join(map(str, identifiers[:10].tolist()))
+    return text if len(identifiers) <= 10 else f"{text}, ... ({len(identifiers)} in all)"

@@ -115,18 +115,16 @@ class RunFolder:
 
     def event(self, what: str, **details: object) -> None:
         """Append one line to ``events.jsonl``."""
-        line = {
-            "time": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
-            "event": what,
-            **details,
-        }
-        append_line(self.path / "events.jsonl", json.dumps(line))
+        now = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
+        line = json.dumps({"time": now, "event": what, **details})
+        append_line(self.path / "events.jsonl", line)
 
     def asked_on(self, now: bool) -> bool:
         """Whether this run was asked to compute where it may not jump, ``now`` or ever before."""
-        if now and not any(event["event"] == ASKED_ON for event in self.events()):
+        before = any(event["event"] == ASKED_ON for event in self.events())
+        if now and not before:
             self.event(ASKED_ON)
-        return now or any(event["event"] == ASKED_ON for event in self.events())
+        return now or before
 
     def events(self) -> list[dict[str, Any]]:
         """All events; a last line cut short by a crash is left out."""
@@ -193,21 +191,15 @@ class RunFolder:
 
     def failure(self, name: str) -> str:
         """Why a jump was given up, or an empty text."""
-        path = self.path / name / "failed.json"
-        if not path.exists():
+        if not (self.path / name / "failed.json").exists():
             return ""
-        try:
-            return str(json.loads(path.read_text(encoding="utf-8"))["why"])
-        except (ValueError, TypeError, KeyError):
-            return "the record of its failure is damaged"
+        why = read_object(self.path / name / "failed.json") or {}
+        return str(why.get("why", "the record of its failure is damaged"))
 
     def failure_details(self, name: str) -> dict[str, Any]:
         """What `give_up` noted of a failed jump besides the reason; empty when that is all."""
-        try:
-            text = (self.path / name / "failed.json").read_text(encoding="utf-8")
-            return {key: value for key, value in json.loads(text).items() if key != "why"}
-        except (OSError, ValueError, AttributeError):
-            return {}
+        details = read_object(self.path / name / "failed.json") or {}
+        return {key: value for key, value in details.items() if key != "why"}
 
     def give_up(self, name: str, why: str, **details: object) -> None:
         """Mark a jump as failed, for good: its attempt is not made again on resume.

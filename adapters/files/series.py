@@ -12,8 +12,7 @@ import numpy as np
 
 from adapters.bed import FloatArray
 from adapters.errors import UsageError
-from adapters.files.settlement import Series
-from adapters.files.settlement_table import SUFFIXES, read_table_series
+from adapters.files.settlement_table import SUFFIXES, Series, read_table_series
 
 
 def too_few(
@@ -75,7 +74,7 @@ def read_series(
 
 def read_dump_series(paths: Sequence[Path], steps_per_cycle: float | None = None) -> Series:
     """Settlement of the same grains in every frame of dumps; see `read_series`."""
-    from adapters.files.dump import read_frames
+    from adapters.files.dump_reader import read_frames
 
     if steps_per_cycle is not None and not (steps_per_cycle > 0 and isfinite(steps_per_cycle)):
         raise UsageError(f"steps per cycle must be positive, not {steps_per_cycle:g}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, fields
 from itertools import pairwise
 from pathlib import Path
@@ -10,7 +11,8 @@ import numpy as np
 
 from adapters.bed import Contacts, FloatArray, IntArray, State
 from adapters.errors import EngineFailed
-from adapters.files.dump import Frame, read_frames
+from adapters.files.dump import Frame
+from adapters.files.dump_reader import read_frames
 
 ARRAYS = ("time_step", "identifier", "radius", "mass", "position", "velocity", "spin")
 """Fields of a `Window` that are plain arrays."""
@@ -144,24 +146,6 @@ def read_contacts(frame: Frame) -> Contacts:
     )
 
 
-def read_state(folder: Path, wall_names: tuple[str, ...]) -> State:
-    """The settled bed that a preparation left in ``folder``; raises as `read_window`."""
-    _check_files(folder, "states.dump", "contacts.dump")
-    frame = list(read_frames(folder / "states.dump"))[-1]
-    contact_frame = list(read_frames(folder / "contacts.dump"))[-1]
-    return State(
-        frame.column("id").astype(np.int64),
-        frame.block("x", "y", "z"),
-        frame.column("radius"),
-        frame.column("mass"),
-        frame.block("vx", "vy", "vz"),
-        frame.block("omegax", "omegay", "omegaz"),
-        read_contacts(contact_frame),
-        {name: _wall_force(frame, name) for name in wall_names},
-        time_step=frame.time_step,
-    )
-
-
 def _check_files(folder: Path, *names: str) -> None:
     for name in names:
         if not (folder / name).exists():
@@ -170,10 +154,6 @@ def _check_files(folder: Path, *names: str) -> None:
                 where=str(folder),
                 remedy="look at screen.txt there for the engine's own words",
             )
-
-
-def _wall_force(frame: Frame, name: str) -> FloatArray:
-    return frame.block(*(f"f_force_{name}[{axis}]" for axis in (1, 2, 3)))
 
 
 def read_window(
@@ -192,24 +172,49 @@ def read_window(
             where=str(folder),
             remedy="the engine did not end properly; look at screen.txt there",
         )
-
-    def block(*columns: str) -> FloatArray:
-        return np.array([frame.block(*columns) for frame in frames])
-
-    first = frames[0]
+    states = [_read_grains(*pair, wall_names) for pair in zip(frames, contact_frames, strict=True)]
+    first = states[0]
     return Window(
         first_cycle,
-        np.array([frame.time_step for frame in frames], np.int64),
-        first.column("id").astype(np.int64),
-        first.column("radius"),
-        first.column("mass"),
-        block("x", "y", "z"),
-        block("vx", "vy", "vz"),
-        block("omegax", "omegay", "omegaz"),
-        {name: np.array([_wall_force(f, name) for f in frames]) for name in wall_names},
-        tuple(read_contacts(frame) for frame in contact_frames),
+        np.array([state.time_step for state in states], np.int64),
+        first.identifier,
+        first.radius,
+        first.mass,
+        np.array([state.position for state in states]),
+        np.array([state.velocity for state in states]),
+        np.array([state.spin for state in states]),
+        {name: np.array([state.wall_force[name] for state in states]) for name in wall_names},
+        tuple(state.contacts for state in states),
         read_piston_track(folder / "piston.txt"),
         piston_start,
+    )
+
+
+def read_state(folder: Path, wall_names: tuple[str, ...]) -> State:
+    """The settled bed that a preparation left in ``folder``; raises as `read_window`."""
+    _check_files(folder, "states.dump", "contacts.dump")
+    grains, contacts = (
+        deque(read_frames(folder / f"{name}.dump"), 1).pop() for name in ("states", "contacts")
+    )
+    return _read_grains(grains, contacts, wall_names)
+
+
+def _read_grains(grains: Frame, contacts: Frame, wall_names: tuple[str, ...]) -> State:
+    """State of one instant, from the frames of its grains and contacts."""
+    forces = {
+        name: grains.block(*(f"f_force_{name}[{axis}]" for axis in (1, 2, 3)))
+        for name in wall_names
+    }
+    return State(
+        grains.column("id").astype(np.int64),
+        grains.block("x", "y", "z"),
+        grains.column("radius"),
+        grains.column("mass"),
+        grains.block("vx", "vy", "vz"),
+        grains.block("omegax", "omegay", "omegaz"),
+        read_contacts(contacts),
+        forces,
+        time_step=grains.time_step,
     )
 
 

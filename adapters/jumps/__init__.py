@@ -2,16 +2,15 @@
 
 from adapters.jumps.band import BAND_PROBABILITY, Band, estimate_band
 from adapters.jumps.check import accept, judge, reject
-from adapters.jumps.control import Control, Decision, Settings, begin, decide, joined, observe
+from adapters.jumps.control import Control, Decision, Settings, decide, joined, observe
 from adapters.jumps.forecast import fit_forecast
-from adapters.jumps.history import Jumped, find_asked_gain
 from adapters.jumps.rates import Stretch, measure_rates
 from adapters.jumps.schedule import schedule_jumps
-from adapters.jumps.slopes import Landing, estimate_slopes, unmoved
+from adapters.jumps.slopes import Jumped, Landing, estimate_slopes, find_asked_gain, unmoved
 
 __all__ = [
     "BAND_PROBABILITY", "Band", "Control", "Decision", "Jumped", "Landing", "Settings", "Stretch",
-    "accept", "begin", "decide", "estimate_band", "estimate_slopes", "find_asked_gain",
+    "accept", "decide", "estimate_band", "estimate_slopes", "find_asked_gain",
     "fit_forecast", "joined", "judge", "measure_rates", "observe", "reject", "schedule_jumps",
     "unmoved",
 ]  # fmt: skip

@@ -14,7 +14,6 @@ from adapters.jumps.control import (
     GROWTH,
     JUMP_PROBABILITY,
     SAFETY,
-    STATES,
     Control,
     Decision,
     Settings,
@@ -26,7 +25,6 @@ from adapters.jumps.rates import (
     Stretch,
     count_blocks,
     estimate_noise,
-    fit_state_trend,
     measure_rates,
 )
 from adapters.jumps.slopes import Landing, estimate_slopes, reseating, unmoved
@@ -61,11 +59,8 @@ class Check:
     """What the bed settled more behind the jump because it was moved."""
     kappa: float
     """Of `adapters.jumps.slopes`, by all jumps up to this one."""
-    rate_expected: float
-    """Rate forecast for the window [m a cycle]."""
-    rate_observed: float
     deviation: float
-    """Their difference in standard errors."""
+    """Of the window's rate from its forecast, in standard errors."""
     drift: tuple[float, float]
     """Deviations summed, upwards and downwards, see `sum_drift`; standard errors."""
     changed: bool
@@ -73,9 +68,6 @@ class Check:
     sources: tuple[tuple[int, int, float, float], ...] = ()
     """Of each stretch that ``expected`` rests on, the new one last: cycles done before it, its
     cycles, their long-run variance [m^2 a cycle], derivative of ``expected`` by its gain."""
-    state_misses: tuple[tuple[str, float, float], ...] = ()
-    """Coordination number and elastic deflection: relative change against the forecast, and its
-    standard error."""
 
 
 def judge(
@@ -93,7 +85,7 @@ def judge(
     window, noises = every[-1], estimate_noise(every).variance
     before, both = fit_forecast(measure_rates(every[:-1])), fit_forecast(measure_rates(every))
     start, end = float(control.cycle), float(window.first_cycle)
-    rate_expected, deviation = compare_rate(before, every[:-1], window)
+    deviation = compare_rate(before, every[:-1], window)
     drift = sum_drift(control.drift, deviation)
     changed = max(drift) > CHANGED - ALLOWANCE
     if changed:
@@ -117,15 +109,12 @@ def judge(
         noise=expected.noise,
         form=hypot(expected.form, kappa_error * by_kappa),
         error=relative,
-        rate_expected=rate_expected,
-        rate_observed=window.rate,
         deviation=deviation,
         drift=drift,
         changed=changed,
         reseated=gained - decision.moved - healed,
         kappa=kappa,
         sources=sources,
-        state_misses=tuple(compare_state(control, window, name) for name in STATES),
     )
 
 
@@ -142,9 +131,9 @@ class Expected:
     """Derivative by the gain of each block, shape (b,)."""
 
 
-def compare_rate(before: Forecast, past: Sequence[Stretch], window: Stretch) -> tuple[float, float]:
-    """Rate forecast for a window [m a cycle], and what the window's exceeds it by in standard
-    errors: of the window's own noise and of the forecast ``before`` it, made from ``past``."""
+def compare_rate(before: Forecast, past: Sequence[Stretch], window: Stretch) -> float:
+    """What the rate of a window exceeds its forecast by, in standard errors: of the window's own
+    noise and of the forecast ``before`` it, made from ``past``."""
     start, end, k = float(window.first_cycle), float(window.last_cycle), len(window.gain)
     expected = float(before.gain(start, end)) / k
     known = np.array(before.half_widths(start, end, JUMP_PROBABILITY)) / k
@@ -152,7 +141,7 @@ def compare_rate(before: Forecast, past: Sequence[Stretch], window: Stretch) -> 
     noise = float(estimate_noise(past).variance[-1]) / k
     error = sqrt(noise + float((known / student) @ (known / student)))
     difference = window.rate - expected
-    return expected, difference / error if error > 0 else (inf if difference else 0.0)
+    return difference / error if error > 0 else (inf if difference else 0.0)
 
 
 def sum_drift(drift: tuple[float, float], deviation: float) -> tuple[float, float]:
@@ -217,18 +206,6 @@ def list_sources(
         (one.first_cycle, len(one.gain), float(noise), float(part.mean()))
         for one, noise, part in zip(stretches, noises, parts, strict=True)
     )
-
-
-def compare_state(control: Control, stretch: Stretch, name: str) -> tuple[str, float, float]:
-    mean, slope, error = fit_state_trend(control.stretches, name)
-    values = getattr(stretch, name)
-    if mean == 0 or not np.isfinite(values).all():
-        return name, 0.0, 0.0
-    cycles = [one.first_cycle + 1 + np.arange(len(one.gain)) for one in control.stretches]
-    centre = float(np.log(np.concatenate(cycles)).mean())
-    ahead = log(stretch.first_cycle + len(values) / 2) - centre
-    expected = mean + slope * ahead
-    return name, (float(values.mean()) - expected) / abs(mean), error * abs(ahead) / abs(mean)
 
 
 def accept(

@@ -30,7 +30,6 @@ from adapters.bed import FloatArray
 from adapters.jumps.forecast import Forecast, bound_gain_by_laws, fit_forecast
 from adapters.jumps.rates import (
     Stretch,
-    bound_cycles,
     estimate_noise,
     fit_slope_trend,
     fit_state_trend,
@@ -156,17 +155,10 @@ class Decision:
     before the first cycles to be fitted."""
     exponent: float = 0.0
     """beta: the rate goes as N^(beta - 1)."""
-    bound: int | None = None
-    """Cycles k of the paper's bound (eq. 15) for the same error; not used."""
     attempt: int = 1
     """Which try of a jump from this cycle it is, from 1."""
     why: str = ""
     """One sentence, or the part of one that follows "up to cycle N" where it refuses."""
-
-
-def begin(cycle: int, settlement: float) -> Control:
-    """The state after the first k_i cycles, which are not fitted."""
-    return Control(cycle, settlement)
 
 
 def observe(control: Control, stretch: Stretch, settlement: float) -> Control:
@@ -260,15 +252,8 @@ def decide(control: Control, settings: Settings, piston: Regime | None = None) -
     gain = float(forecast.gain(control.cycle, control.cycle + float(jump)))
     moved = (gain - control.ahead) / (1 + control.share)
     moved = moved if moved * gain > 0 else 0.0
-    total = abs(control.settlement + gain)
-    known = replace(
-        known,
-        limits=tuple((name, float(value)) for name, value in limits.items()),
-        binding=binding,
-        bound=bound_cycles(
-            control.stretches[-1], settings.tolerance * total / max(jump, 1), JUMP_PROBABILITY
-        ),
-    )
+    every = tuple((name, float(value)) for name, value in limits.items())
+    known = replace(known, limits=every, binding=binding)
     if control.attempts >= ATTEMPTS:
         return replace(known, window=min(window, left), why="jumps from here were taken back")
     if jump < settings.shortest_jump:

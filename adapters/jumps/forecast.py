@@ -73,13 +73,13 @@ class Forecast:
         return find_regime_of_weight(self.weight, not self.rate.any())
 
 
-def fit_forecast(rates: Rates, from_cycle: float | None = None) -> Forecast:
+def fit_forecast(rates: Rates) -> Forecast:
     """Fit every exponent to the blocks and weigh it.
 
     Weights are Student's likelihood times Cauchy's prior of `fit.regime`.  A bed without motion has
-    rate 0 with no error.  ``from_cycle`` is N_k where it is not the end of the last block.
+    rate 0 with no error.
     """
-    last = rates.last_cycle if from_cycle is None else from_cycle
+    last = rates.last_cycle
     span = spans(last, rates.start, rates.end)
     prior = 1 / (1 + (EXPONENTS / PRIOR) ** 2)
     if not rates.gain.any() and not rates.variance.any():

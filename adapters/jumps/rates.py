@@ -7,15 +7,14 @@ increments has the variance S / k.  Lengths in metres, rates in metres a cycle.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import ceil, sqrt
 
 import numpy as np
 
-from adapters.bed import FloatArray, IntArray
-from adapters.errors import UsageError
-from adapters.laws.fit import EXPONENTS, bound_cycles_for_error
+from adapters.bed import FloatArray
+from adapters.laws.fit import EXPONENTS
 
 BLOCKS = 4
 """Parts of a stretch whose mean rates are fitted: enough to see a trend inside of it."""
@@ -113,9 +112,8 @@ def estimate_noise(stretches: Sequence[Stretch]) -> Noise:
     """
     count = np.array([len(one.gain) for one in stretches])
     total, ends = int(count.sum()), np.cumsum(count)
-    smooth = fit_smooth_rate(stretches)
     cycles = np.concatenate([one.first_cycle + 0.5 + np.arange(len(one.gain)) for one in stretches])
-    rate = smooth.at(cycles)
+    rate = fit_smooth_rate(stretches)(cycles)
     residual = np.concatenate([one.gain for one in stretches]) - rate
     if total < 4 or not residual @ residual:
         return Noise(np.zeros(len(stretches)), 1.0)
@@ -152,42 +150,21 @@ def spans(scale: float, start: float | FloatArray, end: float | FloatArray) -> F
     return np.asarray(scale * np.where(flat, high - low, power))
 
 
-@dataclass(frozen=True)
-class SmoothRate:
-    """du/dN = A (N / scale)^(beta - 1)."""
-
-    scale: float
-    rate: float
-    """A [m a cycle]."""
-    exponent: float
-
-    def at(self, cycle: FloatArray) -> FloatArray:
-        """Rate at a cycle [m a cycle]."""
-        return np.asarray(self.rate * (np.asarray(cycle) / self.scale) ** (self.exponent - 1))
-
-
-def fit_smooth_rate(stretches: Sequence[Stretch]) -> SmoothRate:
-    """The power of N next to the gains of all blocks, by least squares.
+def fit_smooth_rate(stretches: Sequence[Stretch]) -> Callable[[FloatArray], FloatArray]:
+    """Rate [m a cycle] at a cycle: the power of N next to the gains of all blocks, least squares.
 
     A gain weighs N^2 / k, as if noise were in proportion to the logarithm's rate, and never by what
     was gained: a fit that believes quiet windows more comes out too slow.
     """
-    edges = [cut_blocks(one) for one in stretches]
-    start = np.concatenate(
-        [one.first_cycle + e[:-1] for one, e in zip(stretches, edges, strict=True)]
-    )
-    count = np.concatenate([np.diff(e) for e in edges])
-    gain = np.concatenate(
-        [np.add.reduceat(one.gain, e[:-1]) for one, e in zip(stretches, edges, strict=True)]
-    )
-    scale = float(start[-1] + count[-1])
-    span = spans(scale, start, start + count)
-    weight = ((start + count / 2) ** 2 / count)[:, None]
+    start, end, gain = cut_blocks(stretches)
+    scale = float(end[-1])
+    span = spans(scale, start, end)
+    weight = ((start + (end - start) / 2) ** 2 / (end - start))[:, None]
     rate = (span * gain[:, None] * weight).sum(axis=0) / (span**2 * weight).sum(axis=0)
     missed = ((gain[:, None] - span * rate) ** 2 * weight).sum(axis=0)
     missed += missed.max() * 1e-9 * EXPONENTS**2  # of one block alone every power is as good
     best = int(missed.argmin())
-    return SmoothRate(scale, float(rate[best]), float(EXPONENTS[best]))
+    return lambda cycle: float(rate[best]) * (cycle / scale) ** (float(EXPONENTS[best]) - 1)
 
 
 def count_blocks(stretch: Stretch) -> int:
@@ -195,34 +172,26 @@ def count_blocks(stretch: Stretch) -> int:
     return min(BLOCKS, max(1, len(stretch.gain) // 2))
 
 
-def cut_blocks(stretch: Stretch) -> IntArray:
-    """Cycles from a stretch's start to the ends of its blocks, 0 first, shape (b + 1,)."""
-    edges = np.linspace(0, len(stretch.gain), count_blocks(stretch) + 1)
-    return np.asarray(np.round(edges), np.int64)
+def cut_blocks(stretches: Sequence[Stretch]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Cycles done before and after each block of all stretches, and its gain [m], (b,) each."""
+    edges = [
+        np.round(np.linspace(0, len(one.gain), count_blocks(one) + 1)).astype(np.int64)
+        for one in stretches
+    ]
+    pairs = list(zip(stretches, edges, strict=True))
+    start = np.concatenate([one.first_cycle + e[:-1].astype(float) for one, e in pairs])
+    end = np.concatenate([one.first_cycle + e[1:].astype(float) for one, e in pairs])
+    return start, end, np.concatenate([np.add.reduceat(one.gain, e[:-1]) for one, e in pairs])
 
 
 def measure_rates(stretches: Sequence[Stretch]) -> Rates:
     """Blocks of all stretches, with the noise of all."""
-    start: list[FloatArray] = []
-    end: list[FloatArray] = []
-    gain: list[FloatArray] = []
-    variance: list[FloatArray] = []
-    noise, trend = estimate_noise(stretches), fit_smooth_rate(stretches)
-    for one, own in zip(stretches, noise.variance, strict=True):
-        edges = cut_blocks(one)
-        count = np.diff(edges)
-        start.append(one.first_cycle + edges[:-1].astype(float))
-        end.append(one.first_cycle + edges[1:].astype(float))
-        gain.append(np.add.reduceat(one.gain, edges[:-1]))
-        smooth = trend.at(0.5 * (start[-1] + end[-1])) * count
-        variance.append(own * count + (LAW_ERROR * smooth) ** 2)
-    return Rates(
-        np.concatenate(start),
-        np.concatenate(end),
-        np.concatenate(gain),
-        np.concatenate(variance),
-        max(noise.freedom, 3.0),
-    )
+    start, end, gain = cut_blocks(stretches)
+    noise, count = estimate_noise(stretches), end - start
+    own = np.repeat(noise.variance, [count_blocks(one) for one in stretches])
+    smooth = fit_smooth_rate(stretches)(0.5 * (start + end)) * count
+    variance = own * count + (LAW_ERROR * smooth) ** 2
+    return Rates(start, end, gain, variance, max(noise.freedom, 3.0))
 
 
 def fit_slope_trend(rates: Rates, blocks: int = 3 * BLOCKS) -> tuple[float, float]:
@@ -261,16 +230,3 @@ def fit_state_trend(stretches: Sequence[Stretch], name: str) -> tuple[float, flo
     slope = float(place @ every) / square
     noise = estimate_long_run_variance(every - slope * place)
     return float(every.mean()), slope, sqrt(noise / square)
-
-
-def bound_cycles(stretch: Stretch, error: float, probability: float) -> int | None:
-    """Cycles k of the paper's bound (eq. 15) that keep the mean increment within ``error`` [m].
-
-    For independent increments in the range seen; None where ``error`` is not positive or the bound
-    gives no number.  The controller does not use it: it is shown beside k.
-    """
-    try:
-        low, high = float(stretch.gain.min()), float(stretch.gain.max())
-        return bound_cycles_for_error(low, high, error, 1 - probability)
-    except UsageError:
-        return None

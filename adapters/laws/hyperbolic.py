@@ -20,9 +20,9 @@ class Hyperbolic(ShapedLaw):
     parameter_units = ("m", "m", "cycle")
     minimum_cycles = 3
 
-    def columns(self, cycle: FloatArray, theta: FloatArray) -> FloatArray:
+    def column(self, cycle: FloatArray, theta: FloatArray) -> FloatArray:
         """N / (tau + N)."""
-        return np.asarray((cycle / (theta[0] + cycle))[None])
+        return np.asarray(cycle / (theta[0] + cycle))
 
     def shapes(self, cycle: FloatArray) -> tuple[Shape, ...]:
         """tau."""

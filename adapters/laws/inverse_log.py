@@ -23,10 +23,10 @@ class InverseLog(ShapedLaw):
     parameter_units = ("m", "m", "cycle", "1")
     minimum_cycles = 4
 
-    def columns(self, cycle: FloatArray, theta: FloatArray) -> FloatArray:
+    def column(self, cycle: FloatArray, theta: FloatArray) -> FloatArray:
         """B ln(1 + N / tau) / (1 + B ln(1 + N / tau))."""
         growth = theta[1] * np.log1p(cycle / theta[0])
-        return np.asarray((growth / (1 + growth))[None])
+        return np.asarray(growth / (1 + growth))
 
     def shapes(self, cycle: FloatArray) -> tuple[Shape, ...]:
         """tau and B."""

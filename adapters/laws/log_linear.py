@@ -6,14 +6,7 @@ import numpy as np
 
 from adapters.bed import FloatArray
 from adapters.errors import UsageError
-from adapters.laws.form import (
-    centred,
-    check_training_data,
-    fit_two_terms,
-    log_ratio,
-    orthonormal,
-    outer,
-)
+from adapters.laws.form import centred, check_training_data, log_ratio, outer, unit_vectors
 
 
 class LogLinear:
@@ -42,15 +35,23 @@ class LogLinear:
         themselves only.  Raises `UsageError` also where they cannot be separated.
         """
         cycle, displacement = check_training_data(self, cycle, displacement)
-        columns = np.stack([(cycle - cycle[0]) / cycle[0], log_ratio(cycle[0], cycle)])
-        _, triangle = orthonormal(centred(columns, 1))
-        if not triangle[2]:
+        linear, slowing = (
+            centred((cycle - cycle[0]) / cycle[0]),
+            centred(log_ratio(cycle[0], cycle)),
+        )
+        unit, norm = unit_vectors(linear)
+        along = float((unit * slowing).sum())
+        rest, left = unit_vectors(slowing - along * unit)
+        if not left > len(cycle) * np.finfo(float).eps * np.sqrt((slowing**2).sum()):
             raise UsageError(
                 f"ln N and N are the same straight line over cycles {cycle[0]:g} to {cycle[-1]:g}",
                 where=f"law {self.name}",
                 remedy="use the law log",
             )
-        b, a = fit_two_terms(columns, displacement)
+        y = np.stack([unit, rest]) @ displacement.reshape(len(cycle), -1)
+        b, a = choose_one_sign(y, float(norm), along, float(left)).reshape(
+            2, *displacement.shape[1:]
+        )
         b = b / cycle[0]
         c = displacement.mean(axis=0) - a * np.log(cycle).mean() - b * cycle.mean()
         return np.stack([c, a, b])
@@ -66,6 +67,27 @@ class LogLinear:
         """a ln(end / start) + b (end - start) [m]; see `Law.increment`."""
         _, a, b = parameters
         return outer(log_ratio(start, end), a) + outer(np.asarray(end) - start, b)
+
+
+def choose_one_sign(y: FloatArray, norm: float, along: float, left: float) -> FloatArray:
+    """Amplitudes of one sign, shape (2, n), of two columns whose QR factors are q and r.
+
+    ``y`` (2, n) are the projections q' u; r has the rows (``norm``, ``along``) and (0, ``left``).
+    Where the best two differ in sign, the constrained minimum has one of them zero: the better
+    single one stays alone.
+    """
+    second = y[1] / left
+    first = (y[0] - along * second) / norm
+    onto = along * y[0] + left * y[1]
+    alone = onto / (along * along + left * left)
+    prefer = y[0] * y[0] >= onto * alone
+    both = first * second >= 0
+    return np.stack(
+        [
+            np.where(both, first, np.where(prefer, y[0] / norm, 0.0)),
+            np.where(both, second, np.where(prefer, 0.0, alone)),
+        ]
+    )
 
 
 LAW = LogLinear()

@@ -23,9 +23,9 @@ class Power(ShapedLaw):
     parameter_units = ("m", "m", "1")
     minimum_cycles = 3
 
-    def columns(self, cycle: FloatArray, theta: FloatArray) -> FloatArray:
+    def column(self, cycle: FloatArray, theta: FloatArray) -> FloatArray:
         """N^b."""
-        return np.asarray((cycle ** theta[0])[None])
+        return np.asarray(cycle ** theta[0])
 
     def shapes(self, cycle: FloatArray) -> tuple[Shape, ...]:
         """b."""

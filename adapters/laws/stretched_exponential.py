@@ -23,9 +23,9 @@ class StretchedExponential(ShapedLaw):
     parameter_units = ("m", "m", "cycle", "1")
     minimum_cycles = 4
 
-    def columns(self, cycle: FloatArray, theta: FloatArray) -> FloatArray:
+    def column(self, cycle: FloatArray, theta: FloatArray) -> FloatArray:
         """1 - exp(-(N / tau)^b)."""
-        return np.asarray(-np.expm1(-((cycle / theta[0]) ** theta[1]))[None])
+        return np.asarray(-np.expm1(-((cycle / theta[0]) ** theta[1])))
 
     def shapes(self, cycle: FloatArray) -> tuple[Shape, ...]:
         """tau and b."""

@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from adapters.moves.contract import Jump, Move
 from trackbed.choices import find_choice, find_choices
 
-if TYPE_CHECKING:  # a scene asks for names only; the ways themselves load scipy
-    from adapters.moves.contract import Move
-
-__all__ = [
-    "DEFAULT", "RETIRED", "get_move", "list_moves",
-]  # fmt: skip
+__all__ = ["DEFAULT", "RETIRED", "Jump", "get_move", "list_moves"]
 
 DEFAULT = "smoothed"
 """The way of a scene that names none."""

@@ -4,25 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from adapters.bed import Container, FloatArray
-from adapters.laws.form import Law
-from adapters.moves.contract import Move, check_jump_arguments
+from adapters.bed import FloatArray
+from adapters.moves.contract import Jump, Move
 
 
-def displacement(
-    cycle: FloatArray,
-    position: FloatArray,
-    radius: FloatArray,
-    law: Law,
-    h: float,
-    container: Container,
-) -> FloatArray:
-    """Zeros [m], shape (n, 3); arguments and errors as `moves.move.Displacement`.
+def displacement(jump: Jump) -> FloatArray:
+    """Zeros [m], shape (n, 3).
 
     The cycles are counted as jumped and the bed has not felt them: not for predictions.
     """
-    check_jump_arguments(position, radius, h)
-    return np.zeros_like(position[-1])
+    return np.zeros_like(jump.place)
 
 
 MOVE = Move("still", displacement, moves_piston=False)

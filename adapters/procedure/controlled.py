@@ -22,7 +22,6 @@ from adapters.jumps import (
     Settings,
     Stretch,
     accept,
-    begin,
     decide,
     estimate_slopes,
     fit_forecast,
@@ -55,11 +54,11 @@ def settle_controlled(run: Run, bed: Bed) -> Bed:
     )
     journal = Journal(run)
     rows = run.outcome(bed.window).rows
-    control = begin(bed.cycle, float(rows[-1]["settlement"]))
+    control = Control(bed.cycle, float(rows[-1]["settlement"]))
     while True:
         if (seated := seat(run, bed, procedure.carried_cycles)).cycle > bed.cycle:
             bed = seated
-            control = begin(bed.cycle, float(run.outcome(bed.window).rows[-1]["settlement"]))
+            control = Control(bed.cycle, float(run.outcome(bed.window).rows[-1]["settlement"]))
         decision = decide(control, settings, find_piston_regime(run, control))
         if decision.action == "end":
             return bed

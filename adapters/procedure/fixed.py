@@ -1,7 +1,7 @@
 """A run whose windows and jumps have given lengths k and h, as in Fig. 10 of Karrech et al. (2007).
 
 What the mean grain settles by is its law's or, where the scene says so, that of all cycles
-computed (`adapters.jumps.history`).  A jump that fails is tried again: shorter, or over the same
+computed (`adapters.jumps.slopes`).  A jump that fails is tried again: shorter, or over the same
 cycles with a share of the move, whose rest the next jump is asked for.
 """
 
@@ -78,8 +78,12 @@ def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
                         share = SHARES[attempt - 1] * (min(1.0, room / gain) if gain else 1.0)
                     new = run.folder.outcome(name) is None
                     moved = stages.jump(run, bed, h, attempt, gain, share)
-                    if new and gain:
-                        report_settled(run, name, gain, share)
+                    if new and gain and share < 1:
+                        run.progress.say(
+                            f"the jump settles the bed by {1e6 * share * gain:.3g} um where it "
+                            f"owes {1e6 * gain:.3g}: no room for more was found, by it or the one "
+                            "before"
+                        )
                     cycles = p.healing_cycles + p.window_cycles
                     return stages.compute(run, moved, cycles, p.healing_cycles)
             except (EngineFailed, NotCredible, NotConverged) as error:
@@ -100,22 +104,6 @@ def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
         remedy="more cycles k before the jump, a shorter h, or windows in its place: "
         "trackbed resume RUN --cycle-by-cycle; the cycles before it are kept",
     )
-
-
-def report_settled(run: Run, name: str, asked: float, share: float) -> None:
-    """Say where a jump settled the bed by other than ``asked`` [m], a ``share`` of which it tried.
-
-    Smallest moves settle by what they try; grains that change places by some more or less.
-    """
-    jump = run.folder.outcome(name)
-    assert jump is not None
-    settled = (
-        f"settles the bed by {1e6 * jump.notes['gain']:.3g} um where it owes {1e6 * asked:.3g}"
-    )
-    if "hops" in jump.notes["relaxation"]:
-        run.progress.say(f"the jump {settled}: grains changed places")
-    elif share < 1:
-        run.progress.say(f"the jump {settled}: no room for more was found, by it or the one before")
 
 
 def compute_on(run: Run, bed: Bed) -> Bed:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from adapters.bed import GRAVITY, FloatArray, State
+from adapters.bed import FloatArray, State
 from adapters.errors import NotConverged
 from adapters.scene import Scene
 
@@ -16,27 +16,21 @@ def find_room(
     before: State,
     target: FloatArray,
     piston_height: float,
-    generator: np.random.Generator | None = None,
+    *,
+    may_wait: bool = False,
 ) -> tuple[FloatArray, dict[str, Any], float]:
     """Relaxed positions (n, 3), the relaxation's record, and the piston's height, in metres.
 
-    By the scene's relaxation, under a piston at ``piston_height``.  With a ``generator``, and a
-    piston that goes down, in a bed without room so: below the piston where it was; without room
-    there, either, and if ``procedure.jammed`` says so, by grains that change places.  Raises
+    By the scene's relaxation, under a piston at ``piston_height``; without room there, and if the
+    piston ``may_wait`` and goes down, below the piston where it was.  Raises
     `RelaxationNotConverged`.
     """
-    assert scene.procedure is not None
     try:
         return *relaxed(scene, before, target, piston_height), piston_height
     except NotConverged:
-        if generator is None or piston_height >= before.piston_height:
+        if not may_wait or piston_height >= before.piston_height:
             raise
-    try:
-        return relax_below(scene, before, target)
-    except NotConverged:
-        if scene.procedure.jammed == "less":
-            raise
-    return relax_by_rearranging(scene, before, target, piston_height, generator)
+    return relax_below(scene, before, target)
 
 
 def relaxed(
@@ -58,7 +52,6 @@ def relaxed(
         scene.container.walls(before.piston_height, scene.piston_reach),
         scene.stiffness,
         method=procedure.relaxation,
-        gravity=GRAVITY,
         walls_after=scene.container.walls(piston_height, scene.piston_reach),
     )
     return relaxation.position, relaxation.record()
@@ -74,31 +67,6 @@ def relax_below(
     position, record = relaxed(scene, before, target, before.piston_height)
     top = find_top_under(position, before.radius, scene.piston_reach)
     return position, record | {"piston": "on the bed"}, min(top, before.piston_height)
-
-
-def relax_by_rearranging(
-    scene: Scene,
-    before: State,
-    target: FloatArray,
-    piston_height: float,
-    generator: np.random.Generator,
-) -> tuple[FloatArray, dict[str, Any], float]:
-    """Of grains that change places under the lowered piston; then its height on top of them [m]."""
-    from adapters.relaxation import rearrange  # loads the compiler
-
-    reach = scene.piston_reach
-    relaxation, hops = rearrange(
-        target,
-        before,
-        scene.container.walls(before.piston_height, reach),
-        scene.stiffness,
-        generator,
-        walls_after=scene.container.walls(piston_height, reach),
-        gravity=GRAVITY,
-    )
-    top = find_top_under(relaxation.position, before.radius, reach)
-    record = relaxation.record() | {"piston": "on the bed", "hops": hops}
-    return relaxation.position, record, min(top, before.piston_height)
 
 
 def find_top_under(position: FloatArray, radius: FloatArray, reach: float) -> float:

@@ -38,7 +38,7 @@ from adapters.files import (
     save_window,
 )
 from adapters.laws import get_law
-from adapters.moves import get_move
+from adapters.moves import Jump, get_move
 from adapters.procedure import checks
 from adapters.procedure.progress import Progress
 from adapters.procedure.room import find_room, find_top_under
@@ -225,11 +225,8 @@ def jump(
             target = before.position + share * (target - before.position)
             piston_height = before.piston_height + share * (piston_height - before.piston_height)
         with run.clock.part("relax"):
-            generator = None
-            if gain is not None:
-                generator = np.random.default_rng([run.scene.sample.seed, bed.cycle, attempt])
             position, record, piston_height = find_room(
-                run.scene, before, target, piston_height, generator
+                run.scene, before, target, piston_height, may_wait=gain is not None
             )
         after = before.moved(
             position,
@@ -242,8 +239,7 @@ def jump(
         save_state(after, folder / "relaxed.npz")
         notes = {"h": h, "attempt": attempt, "relaxation": record}
         if gain is not None:
-            settled = float((before.position - position)[:, 2].mean())
-            notes |= {"gain": settled if "hops" in record else share * gain, "asked": gain}
+            notes |= {"gain": share * gain, "asked": gain}
         rows = [_row(run, after, "jumped")] if h else []
         cost = run.clock.lap()
         folder = _finish(
@@ -271,8 +267,8 @@ def estimate(run: Run, window: Window, healing: int, h: int) -> tuple[State, Flo
     with run.clock.part("fit"):
         law, move = get_law(procedure.law), get_move(procedure.move)
         cycle = window.cycle[healing:].astype(float)
-        position = window.position[healing:]
-        field_ = move.displacement(cycle, position, window.radius, law, h, run.scene.container)
+        position, container = window.position[healing:], run.scene.container
+        field_ = move.displacement(Jump(cycle, position, window.radius, law, h, container))
         heights = window.piston_heights()[healing:]
         parameters = law.fit(cycle[law.first_state :], heights[law.first_state :])
         drop = float(law.increment(parameters, cycle[-1], cycle[-1] + h))

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from adapters.bed import (
+    GRAVITY,
     Bed,
     BoolArray,
     FloatArray,
@@ -27,7 +28,6 @@ from adapters.bed import (
     wall_names,
 )
 from adapters.errors import NotConverged, UsageError
-from adapters.relaxation.printed import Energy
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class Relaxation:
     position: FloatArray
     """Centres [m], (n, 3)."""
     method: str
-    """One of `METHODS`, or ``rearranged``."""
+    """One of `METHODS`."""
     converged: bool
     before: Bed
     """Measures of the state before the jump."""
@@ -86,13 +86,6 @@ class Relaxation:
     """Measures of the estimated positions."""
     relaxed: Bed
     """Measures of the relaxed positions."""
-    energy: float
-    """Hertz energy of all contacts plus that of the weights above z = 0 [J]."""
-    residual_force: float
-    """Root mean square over the grains of the unbalanced force [N]: Hertz contacts, weight, and
-    the tangential forces that surviving contacts carried before (when the state names them)."""
-    residual_force_before: float
-    """The same in the state before the jump [N]: its kinetic rest, and friction if unnamed."""
     evaluations: int
     """Evaluations of all contacts; for ``smallest-move`` products with its matrix count too."""
     cpu_s: float
@@ -134,32 +127,17 @@ class Estimated:
     """The same with the piston where it is now."""
     carried: Neighbours
     """Contacts of ``before``."""
-    gravity: float
-    """Acceleration along -z [m/s^2]."""
 
     @property
     def mean_weight(self) -> float:
         """Mean weight of a grain [N]."""
-        return self.gravity * float(self.before.mass.mean())
+        return GRAVITY * float(self.before.mass.mean())
 
     @property
     def length(self) -> float:
         """Overlap of two mean grains under the mean weight [m]."""
         stiffness, radius = self.scene.stiffness.grain, self.scene.radius.mean()
         return float(overlap_under_force(self.mean_weight, stiffness, radius / 2))
-
-    def weight(self) -> FloatArray:
-        """Weight of each grain [N], (n, 3)."""
-        force = np.zeros_like(self.position)
-        force[:, 2] = -self.gravity * self.before.mass
-        return force
-
-    def energy(self, force: FloatArray) -> Energy:
-        """The functional of eq. 29 with a ``force`` (n, 3) [N] on the grains."""
-        around = self.scene
-        return Energy(
-            around.radius, force, self.position, around.rows, around.search, around.row_stiffness
-        )
 
 
 def estimated(
@@ -168,7 +146,6 @@ def estimated(
     walls: Walls,
     walls_after: Walls | None,
     stiffness: HertzStiffness,
-    gravity: float,
 ) -> Estimated:
     """Arguments of `relax` taken together; raises `UsageError` for what is no bed."""
     position = np.ascontiguousarray(position, float)
@@ -180,13 +157,13 @@ def estimated(
             f"the walls before, {wall_names(walls)}, are not those after, {wall_names(after)}",
             remedy="the same walls belong to both; a piston may only move",
         )
-    if not (len(radius) and gravity > 0):
-        raise UsageError("a relaxation wants grains and gravity above 0")
+    if not len(radius):
+        raise UsageError("a relaxation wants grains")
     behind = find_behind_discs(before.position, walls)
     scene_before = Surroundings(radius, walls, behind, stiffness)
     scene = Surroundings(radius, after, behind, stiffness)
     carried = scene_before.search(before.position, 0.0)
-    return Estimated(position, before, scene_before, scene, carried, gravity)
+    return Estimated(position, before, scene_before, scene, carried)
 
 
 def measure_relaxation(
@@ -198,8 +175,7 @@ def measure_relaxation(
     started: float,
 ) -> Relaxation:
     """What a relaxation to ``relaxed`` (n, 3) [m] changed, ``started`` at a CPU time [s]."""
-    before, scene, gravity = bed.before, bed.scene, bed.gravity
-    touching = scene.search(relaxed, 0.0)
+    before, scene = bed.before, bed.scene
     move = np.linalg.norm(relaxed - bed.position, axis=1)
     return Relaxation(
         position=relaxed,
@@ -207,50 +183,9 @@ def measure_relaxation(
         converged=converged,
         before=bed_measure(before.position, bed.carried),
         estimated=bed_measure(bed.position, scene.search(bed.position, 0.0)),
-        relaxed=bed_measure(relaxed, touching),
-        energy=_energy(scene, relaxed, touching, before, gravity),
-        residual_force=_residual_force(scene, touching, before, gravity),
-        residual_force_before=_residual_force(bed.scene_before, bed.carried, before, gravity),
+        relaxed=bed_measure(relaxed, scene.search(relaxed, 0.0)),
         evaluations=evaluations,
         cpu_s=time.process_time() - started,
-        largest_move=float(move.max(initial=0.0)),
-        median_move=float(np.median(move)) if len(move) else 0.0,
+        largest_move=float(move.max()),
+        median_move=float(np.median(move)),
     )
-
-
-def _energy(
-    scene: Surroundings, position: FloatArray, touching: Neighbours, state: State, gravity: float
-) -> float:
-    """Hertz energy 2/5 lambda delta^(5/2) plus m g z [J]."""
-    hertz = 0.4 * scene.row_stiffness(touching) @ touching.overlap**2.5
-    return float(hertz + gravity * state.mass @ position[:, 2])
-
-
-def _residual_force(
-    scene: Surroundings, touching: Neighbours, state: State, gravity: float
-) -> float:
-    """Root mean square of the unbalanced force over the grains [N]."""
-    force = np.zeros((len(scene.radius), 3))
-    force[:, 2] = -gravity * state.mass
-    pair = touching.second >= 0
-    normal = (scene.row_stiffness(touching) * touching.overlap**1.5)[:, None] * touching.normal
-    np.add.at(force, touching.first, normal)
-    np.add.at(force, touching.second[pair], -normal[pair])
-    held = np.searchsorted(state.identifier, state.contacts.pair)
-    alive = np.isin(_pair_key(held), _pair_key(np.column_stack([touching.first, touching.second])))
-    np.add.at(force, held[alive, 0], state.contacts.tangential_force[alive])
-    np.add.at(force, held[alive, 1], -state.contacts.tangential_force[alive])
-    for wall, name in enumerate(wall_names(scene.walls)):
-        rows = touching.second == -1 - wall
-        # the engine names a mesh wall after its fix: the piston's is piston_wall
-        force_on_grains = state.wall_force.get(name, state.wall_force.get(f"{name}_wall"))
-        if force_on_grains is not None:
-            push = force_on_grains[touching.first[rows]]
-            along = np.einsum("ma,ma->m", push, touching.normal[rows])
-            force[touching.first[rows]] += push - along[:, None] * touching.normal[rows]
-    return float(np.sqrt(np.mean(np.sum(force**2, axis=1)))) if len(force) else 0.0
-
-
-def _pair_key(pair: IntArray) -> IntArray:
-    """One number for each pair of grain indices, (m, 2)."""
-    return np.asarray((pair.min(axis=1) << 32) + pair.max(axis=1))

@@ -1,7 +1,6 @@
 """Relaxation: bring the overlaps of an estimated configuration back to what a bed can carry.
 
 After a jump the estimated positions penetrate by up to millimetres and have lost most contacts.
-(Where a jammed bed has no room for them: `adapters.relaxation.rearranged`.)
 `relax` offers two methods behind one call and one result:
 
 ``smallest-move``   nearest positions in which the force network has its overlaps again, nothing
@@ -12,28 +11,23 @@ After a jump the estimated positions penetrate by up to millimetres and have los
 On Karrech's bed of 1,085 grains, cycle 50 to 100 by the log law of each grain, the smallest move
 keeps 3.34 contacts a grain and 43 um of settlement in 0.06 s; eq. 29 with its frontier fixed keeps
 the overlaps that the fixed grains were estimated with (Fig. 9 ends at 6e-5 m for the same reason),
-and with free grains the bed flows, as nothing replaces friction: docs/relaxation.md.
+and with free grains the bed flows, as nothing replaces friction: docs/jumps.md.
 """
 
 from __future__ import annotations
 
 import time
-from typing import Literal
 
 import numpy as np
 
 from adapters.bed import (
-    CHAIN_FACTOR,
     BoolArray,
     FloatArray,
     HertzStiffness,
     IntArray,
-    Neighbours,
     State,
     Walls,
-    check_bed,
     list_wall_rows,
-    overlap_under_force,
     wall_names,
 )
 from adapters.errors import UsageError
@@ -66,25 +60,20 @@ def relax(
     *,
     walls_after: Walls | None = None,
     method: str = "smallest-move",
-    gravity: float = 9.81,
-    frontier: Literal["fixed", "free"] | BoolArray = "fixed",
-    external_force: FloatArray | None = None,
+    frontier: BoolArray | None = None,
     keep_height: bool = True,
-    overlap_cap: float = np.inf,
     tolerance: float = 0.01,
     evaluations_max: int = 40_000,
 ) -> Relaxation:
     """Relax the estimated ``position`` (n, 3) [m] of the grains of ``before``.
 
     ``walls`` are those that ``before`` touches, ``walls_after`` the same with the piston where it
-    is now.  ``gravity`` [m/s^2] acts along -z.
+    is now.
 
     ``smallest-move``: every pair in contact before the jump gets back its overlap, as far as the
-    network does not turn over; ``overlap_cap`` [m] bounds what counts as carried (a state that
-    was not in equilibrium itself); ``keep_height`` keeps the mean height of ``position``.
-    ``karrech2007``: ``frontier`` fixed holds the grains that touch a wall before the jump where
-    they are estimated, an array (n,) of bool names the grains to hold; ``external_force`` (n, 3)
-    [N] acts at the unloaded instant (a piston's weight, say).
+    network does not turn over; ``keep_height`` keeps the mean height of ``position``.
+    ``karrech2007`` holds the grains of ``frontier`` (n,) where they are estimated: those that touch
+    a wall before the jump where it is not given.
 
     ``tolerance`` is relative: an error of an overlap over the mean carried overlap, or a residual
     force over the mean weight.  Raises `UsageError` for input that is no bed, and
@@ -92,7 +81,7 @@ def relax(
     a bed that friction holds: it flows, or loses its contacts.
     """
     started = time.process_time()
-    bed = estimated(position, before, walls, walls_after, stiffness, gravity)
+    bed = estimated(position, before, walls, walls_after, stiffness)
     if method not in METHODS:
         raise UsageError(
             f"there is no relaxation '{method}'{explain_retired(method, RETIRED)}",
@@ -102,16 +91,15 @@ def relax(
         raise UsageError("a relaxation wants a tolerance above 0")
     if method == "smallest-move":
         relaxed, converged, evaluations = relax_by_move(
-            bed, overlap_cap, keep_height, tolerance, evaluations_max
+            bed, keep_height, tolerance, evaluations_max
         )
     else:
-        force = bed.weight()
-        force += 0.0 if external_force is None else external_force
-        held = _frontier(bed.carried, len(force), frontier)
-        relaxed, converged, evaluations, _ = minimise_energy(
-            bed.energy(force), bed.position, ~held, bed.length, tolerance * bed.mean_weight,
-            evaluations_max,
-        )  # fmt: skip
+        if frontier is None:
+            frontier = np.zeros(len(bed.position), bool)
+            frontier[bed.carried.first[bed.carried.second < 0]] = True
+        relaxed, converged, evaluations = minimise_energy(
+            bed, ~frontier, tolerance * bed.mean_weight, evaluations_max
+        )
     result = measure_relaxation(bed, relaxed, method, converged, evaluations, started)
     if not converged:
         error = RelaxationNotConverged(
@@ -124,109 +112,38 @@ def relax(
     return result
 
 
-def relax_bare(
-    state: State,
-    walls: Walls,
-    stiffness: HertzStiffness,
-    *,
-    method: str = "smallest-move",
-    gravity: float = 9.81,
-    load: float = 0.0,
-    tolerance: float = 0.01,
-) -> Relaxation:
-    """Relax a state of which no earlier one is known; arguments and errors as `relax`.
-
-    Overlaps up to what a bed in equilibrium under its weight and ``load`` [N] can show are taken
-    as carried, so that such a bed stays as it is; larger ones are brought down.
-    """
-    check_bed(state.position, state.radius)
-    return relax(
-        state.position,
-        state,
-        walls,
-        stiffness,
-        method=method,
-        gravity=gravity,
-        keep_height=False,
-        overlap_cap=bound_equilibrium_overlap(state, stiffness, gravity, load),
-        tolerance=tolerance,
-    )
-
-
-def bound_equilibrium_overlap(
-    state: State, stiffness: HertzStiffness, gravity: float, load: float = 0.0
-) -> float:
-    """Greatest Hertz overlap [m] that weight and ``load`` [N] cause in a bed at rest.
-
-    The whole vertical force goes through each layer; a contact carries at most `CHAIN_FACTOR`
-    times its share among the grains of a layer, and never more than all of it.
-    """
-    if len(state.radius) == 0:
-        return 0.0
-    top, bottom = state.position[:, 2] + state.radius, state.position[:, 2] - state.radius
-    layer = len(state.radius) * 2 * state.radius.mean() / float(top.max() - bottom.min())
-    force = (gravity * state.mass.sum() + load) * min(1.0, CHAIN_FACTOR / layer)
-    return float(overlap_under_force(force, stiffness.grain, state.radius.min() / 2))
-
-
 def relax_by_move(
-    bed: Estimated, overlap_cap: float, keep_height: bool, tolerance: float, evaluations_max: int
+    bed: Estimated, keep_height: bool, tolerance: float, evaluations_max: int
 ) -> tuple[FloatArray, bool, int]:
     """`find_smallest_move` of grains sorted in space; centres [m], whether converged,
     evaluations."""
-    scale = find_overlap_scale(bed, overlap_cap)
-    estimate, position_before = bed.position, bed.before.position
+    carried = bed.carried.overlap
+    scale = float(carried.mean()) if len(carried) else bed.length
+    position_before = bed.before.position
     order = sort_in_space(position_before, bed.scene.radius)
     before, after = bed.scene_before.taken(order), bed.scene.taken(order)
     network = before.search(position_before[order], GAP_FACTOR * scale)
-    capped = network.overlap > overlap_cap
-    moved = find_smallest_move(
-        estimate[order],
-        _inside(after, estimate[order]),
-        after.radius,
-        choose_rows(network, ~capped),
-        choose_rows(network, capped, scale),
+    estimate = bed.position[order]
+    moved, converged, evaluations = find_smallest_move(
+        estimate,
+        _inside(after, estimate),
+        after,
+        network,
         GAP_FACTOR * scale,
-        after.rows,
-        after.search,
         keep_height=keep_height,
         tolerance=tolerance * scale,
-        accepted=min(overlap_cap, max(scale, network.overlap.max(initial=0.0))),
+        accepted=max(scale, network.overlap.max(initial=0.0)),
         evaluations_max=evaluations_max,
     )
     position = np.empty_like(estimate)
-    position[order] = moved.position
-    return position, moved.converged, moved.evaluations
-
-
-def _frontier(
-    carried: Neighbours, n: int, frontier: Literal["fixed", "free"] | BoolArray
-) -> BoolArray:
-    """Grains (n,) that eq. 29 holds where they are estimated."""
-    if isinstance(frontier, np.ndarray):
-        return frontier
-    held = np.zeros(n, bool)
-    if frontier == "fixed":
-        held[carried.first[carried.second < 0]] = True
-    return held
-
-
-def find_overlap_scale(bed: Estimated, overlap_cap: float) -> float:
-    """Mean carried overlap [m]; without any, that of one grain's weight on another."""
-    overlap = bed.carried.overlap[bed.carried.overlap <= overlap_cap]
-    return float(overlap.mean()) if len(overlap) else bed.length
+    position[order] = moved
+    return position, converged, evaluations
 
 
 def sort_in_space(position: FloatArray, radius: FloatArray) -> IntArray:
     """Order in which neighbours in space are neighbours in memory: half the time at 1e5 grains."""
     cell = np.floor(position / (4 * np.median(radius)))
     return np.lexsort((position[:, 0], cell[:, 0], cell[:, 1], cell[:, 2]))
-
-
-def choose_rows(rows: Neighbours, which: BoolArray, overlap: float | None = None) -> Neighbours:
-    """Some of the rows, with another overlap [m] when given."""
-    kept = rows.overlap[which] if overlap is None else np.full(int(which.sum()), overlap)
-    return Neighbours(rows.first[which], rows.second[which], rows.normal[which], kept)
 
 
 def _inside(scene: Surroundings, position: FloatArray) -> FloatArray:

@@ -10,82 +10,59 @@ twice).  Friction is absent: with gravity a bed that friction holds flows, witho
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.optimize import minimize
 
-from adapters.bed import BoolArray, FloatArray, Neighbours
+from adapters.bed import GRAVITY, BoolArray, FloatArray
 from adapters.relaxation.kernel import add_hertz_energy
-from adapters.relaxation.smallest import Geometry, Search
-
-Stiffness = Callable[[Neighbours], FloatArray]
-"""lambda of each row [N/m^1.5]."""
+from adapters.relaxation.measured import Estimated
+from adapters.relaxation.smallest import SKIN
 
 
-@dataclass(frozen=True)
 class Energy:
-    """The functional of a bed: what it adds to the Hertz potential, and its rows nearby."""
+    """F and its gradient, with a neighbour list that is renewed before it can miss a contact."""
 
-    radius: FloatArray
-    """Radii [m], (n,)."""
-    force: FloatArray
-    """Weight and external force of each grain [N], (n, 3)."""
-    anchor: FloatArray
-    """Estimated centres [m], (n, 3): the zero of work."""
-    geometry: Geometry
-    search: Search
-    stiffness: Stiffness
-
-
-class EnergyRows:
-    """Energy and gradient with a neighbour list that is renewed before it can miss a contact."""
-
-    def __init__(self, energy: Energy, position: FloatArray) -> None:
-        self.energy, self.evaluations = energy, 0
-        self.skin = 0.2 * float(np.median(energy.radius))
-        self._list(position)
+    def __init__(self, bed: Estimated) -> None:
+        self.bed, self.evaluations = bed, 0
+        self.weight = np.zeros_like(bed.position)
+        self.weight[:, 2] = -GRAVITY * bed.before.mass
+        self.skin = SKIN * float(np.median(bed.scene.radius))
+        self._list(bed.position)
 
     def _list(self, position: FloatArray) -> None:
         self.listed_at = position.copy()
-        self.rows = self.energy.search(position, self.skin)
-        self.stiffness = self.energy.stiffness(self.rows)
+        self.rows = self.bed.scene.search(position, self.skin)
+        self.stiffness = self.bed.scene.row_stiffness(self.rows)
 
     def __call__(self, position: FloatArray) -> tuple[float, FloatArray]:
         """Energy [J] and its gradient [N], (n, 3), at ``position`` (n, 3) [m]."""
-        if np.linalg.norm(position - self.listed_at, axis=1).max(initial=0.0) > self.skin / 2:
+        if np.linalg.norm(position - self.listed_at, axis=1).max() > self.skin / 2:
             self._list(position)
         self.evaluations += 1
-        energy, rows = self.energy, self.rows
-        near = energy.geometry(position, rows.first, rows.second)
-        gradient = -energy.force
+        near = self.bed.scene.rows(position, self.rows.first, self.rows.second)
+        gradient = -self.weight
         value = add_hertz_energy(
             near.first, near.second, near.normal, near.overlap, self.stiffness, gradient
         )
-        work = np.sum(energy.force * (position - energy.anchor))
+        work = np.sum(self.weight * (position - self.bed.position))
         return value - float(work), gradient
 
 
 def minimise_energy(
-    energy: Energy,
-    start: FloatArray,
-    free: BoolArray,
-    length: float,
-    force: float,
-    evaluations_max: int,
-) -> tuple[FloatArray, bool, int, float]:
-    """Centres [m] (n, 3) of least energy, whether converged, the evaluations, the energy [J].
+    bed: Estimated, free: BoolArray, force: float, evaluations_max: int
+) -> tuple[FloatArray, bool, int]:
+    """Centres [m] (n, 3) of least energy, whether converged, the evaluations.
 
-    Limited-memory BFGS from ``start`` over the ``free`` grains (n,), in units of ``length`` [m]
-    and ``force`` [N]; converged when no component of force on a free grain exceeds ``force``.
+    Limited-memory BFGS from the estimate over the ``free`` grains (n,), in units of the bed's
+    `Estimated.length` and of ``force`` [N]; converged when no component of force on a free grain
+    exceeds ``force``.
     """
-    rows = EnergyRows(energy, start)
+    energy, start, length = Energy(bed), bed.position, bed.length
     position = start.copy()
 
     def value(moves: FloatArray) -> tuple[float, FloatArray]:
         position[free] = start[free] + length * moves.reshape(-1, 3)
-        total, gradient = rows(position)
+        total, gradient = energy(position)
         return total / (force * length), gradient[free].ravel() / force
 
     found = minimize(
@@ -101,5 +78,5 @@ def minimise_energy(
             "gtol": 1.0,
         },
     )
-    least = value(found.x)[0] * force * length
-    return position, bool(np.abs(found.jac).max(initial=0.0) <= 1.0), rows.evaluations, least
+    value(found.x)
+    return position, bool(np.abs(found.jac).max(initial=0.0) <= 1.0), energy.evaluations

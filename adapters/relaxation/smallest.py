@@ -18,13 +18,13 @@ So the number of contacts and the distribution of overlaps are those of before.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from adapters.bed import BoolArray, FloatArray, IntArray, Neighbours
 from adapters.relaxation.kernel import estimate_norm, fill_changes, fill_moves, solve_multipliers
+from adapters.relaxation.measured import Surroundings
 
 SLACK = 1e-5
 """Weight of the multipliers in their own equations: keeps redundant contacts solvable."""
@@ -46,9 +46,6 @@ PRODUCTS_NEAREST, PRODUCTS_FIT = 100, 1000
 """Most products with J J^T in one linearised problem: of the first iterations, whose normals
 still turn, and of the later ones."""
 
-Geometry = Callable[[FloatArray, IntArray, IntArray], Neighbours]
-Search = Callable[[FloatArray, float], Neighbours]
-
 
 @dataclass
 class _Rows:
@@ -65,59 +62,43 @@ class _Rows:
     """mu of each row, and that of the mean height last."""
 
 
-@dataclass(frozen=True)
-class SmallestMove:
-    """Outcome of `find_smallest_move`."""
-
-    position: FloatArray
-    """Centres [m], (n, 3)."""
-    converged: bool
-    violation: float
-    """Greatest error of an overlap [m]."""
-    evaluations: int
-    """Evaluations of all overlaps, the products with J J^T counted in."""
-    swaps: int
-    """Contacts of the network that changed places."""
-
-
 def find_smallest_move(
     estimate: FloatArray,
     start: FloatArray,
-    radius: FloatArray,
+    scene: Surroundings,
     network: Neighbours,
-    bounded: Neighbours,
     gap: float,
-    geometry: Geometry,
-    search: Search,
     *,
     keep_height: bool,
     tolerance: float,
     accepted: float,
     evaluations_max: int,
-) -> SmallestMove:
+) -> tuple[FloatArray, bool, int]:
     """Move grains from ``estimate`` (n, 3) [m] as little as the network allows.
 
+    Returns their centres (n, 3) [m], whether all demands are met, and the evaluations of all
+    overlaps, the products with J J^T counted in.
+
     ``start`` (n, 3) is where the iteration begins.  The overlaps of ``network`` are those to get
-    back, those of ``bounded`` are upper bounds of these pairs [m]; all others stay ``gap`` [m]
-    apart.  ``tolerance`` [m] is the greatest error of an overlap.  Where the demands contradict
-    each other, late iterations end as soon as no overlap is above ``accepted`` [m].  Gives up
-    after about ``evaluations_max`` evaluations.
+    back; all other pairs stay ``gap`` [m] apart.  ``tolerance`` [m] is the greatest error of an
+    overlap.  Where the demands contradict each other, late iterations end as soon as no overlap is
+    above ``accepted`` [m].  Gives up after about ``evaluations_max`` evaluations.
     """
-    n = len(radius)
+    radius, n = scene.radius, len(scene.radius)
     height_share = 1 / np.sqrt(n) if keep_height else 0.0
     skin = SKIN * float(np.median(radius))
     x, anchor = start.copy(), estimate
-    rows = start_rows(network, bounded, n)
+    rows = start_rows(network, n)
     listed_at = None
-    violation, norm, evaluations, swaps = np.inf, 1.0, 0, 0
+    norm, evaluations = 1.0, 0
     for iteration in range(ITERATIONS_MAX):
         if evaluations > evaluations_max:
             break
         if listed_at is None or np.linalg.norm(x - listed_at, axis=1).max() > skin / 2:
-            rows, listed_at = renew_rows(rows, search(x, skin), gap, n), x
-            near = geometry(x, rows.first, rows.second)
+            rows, listed_at = renew_rows(rows, scene.search(x, skin), gap, n), x
+            near = scene.rows(x, rows.first, rows.second)
             norm = estimate_norm(rows.first, rows.second, near.normal, height_share, n, 20)
-        near = geometry(x, rows.first, rows.second)
+        near = scene.rows(x, rows.first, rows.second)
         evaluations += 1
         excess = near.overlap - rows.target
         error = np.where(rows.member, np.abs(excess), np.maximum(excess, 0.0))
@@ -126,12 +107,11 @@ def find_smallest_move(
         swapped = 0
         if 0 < iteration < NEAREST_ITERATIONS and violation < skin / 10:
             swapped = _swap(rows, gap)
-            swaps += swapped
         done = violation <= tolerance or (
             iteration >= ACCEPT_ITERATIONS and near.overlap.max() <= accepted + tolerance
         )
         if iteration and not swapped and done and abs(lift) <= tolerance:
-            return SmallestMove(x, True, violation, evaluations, swaps)
+            return x, True, evaluations
         products_max = PRODUCTS_NEAREST
         if iteration >= NEAREST_ITERATIONS:
             anchor, products_max = x, PRODUCTS_FIT
@@ -164,7 +144,7 @@ def find_smallest_move(
         step = anchor + move - x
         length, limit = np.linalg.norm(step, axis=1), STEP_MAX * radius
         x = x + step * np.minimum(1.0, limit / np.maximum(length, limit))[:, None]
-    return SmallestMove(x, False, violation, evaluations, swaps)
+    return x, False, evaluations
 
 
 def _key(first: IntArray, second: IntArray, n: int) -> IntArray:
@@ -172,18 +152,16 @@ def _key(first: IntArray, second: IntArray, n: int) -> IntArray:
     return (first << 32) + np.where(second >= 0, second, n - 1 - second)
 
 
-def start_rows(network: Neighbours, bounded: Neighbours, n: int) -> _Rows:
-    """Members of the network and rows with a bound of their own."""
-    first = np.concatenate([network.first, bounded.first])
-    second = np.concatenate([network.second, bounded.second])
-    key = _key(first, second, n)
+def start_rows(network: Neighbours, n: int) -> _Rows:
+    """Members of the network."""
+    key = _key(network.first, network.second, n)
     order = np.argsort(key)
     return _Rows(
         key[order],
-        first[order],
-        second[order],
-        (np.arange(len(key)) < len(network))[order],
-        np.concatenate([network.overlap, bounded.overlap])[order],
+        network.first[order],
+        network.second[order],
+        np.ones(len(key), bool),
+        network.overlap[order],
         np.zeros(len(key) + 1),
     )
 

@@ -146,28 +146,6 @@ def _seating(scene: Values) -> Iterator[Problem]:
         yield Problem(key, "with no fewer than total_cycles a run that waits never jumps")
 
 
-def _jammed(scene: Values) -> Iterator[Problem]:
-    key = "procedure.jammed"
-    if scene.get(key) in (None, "less"):
-        return
-    if scene.has(TOLERANCE_KEY):
-        yield Problem(key, "jumps with a tolerance move by what has room: leave this out")
-    elif scene.get("procedure.settlement") in (None, "law"):
-        yield Problem(
-            key,
-            "grains that change places settle by more or less than asked, which only the next jump "
-            'by history makes up for: settlement = "history", or leave this out',
-        )
-    if scene.get("procedure.relaxation") == "none":
-        yield Problem(key, "without a relaxation no jump ever finds no room: leave this out")
-    if scene.get("loading.area_share") not in (None, 1):
-        yield Problem(
-            key,
-            "grains that change places flow without friction, up beside a piston on a part of the "
-            "section: leave this out",
-        )
-
-
 def _launcher(scene: Values) -> Iterator[Problem]:
     words = [Path(word).name for word in scene.get("engine.launcher") or ()]
     if scene.need("engine.name") == "yade" and set(words) & MPI_STARTERS:
@@ -183,11 +161,12 @@ def _engine(scene: Values) -> Iterator[Problem]:
 
 
 def _law(scene: Values) -> Iterator[Problem]:
-    from adapters.laws import list_laws
+    from adapters.laws import RETIRED, list_laws
 
     law, known = scene.need("procedure.law"), list_laws()
     if law not in known:
-        yield Problem("procedure.law", f"unknown law {law!r}{suggest_word(law, known)}")
+        hint = explain_retired(law, RETIRED) or suggest_word(law, known)
+        yield Problem("procedure.law", f"unknown law {law!r}{hint}")
 
 
 def _move(scene: Values) -> Iterator[Problem]:
@@ -211,7 +190,7 @@ def _relaxation(scene: Values) -> Iterator[Problem]:
 
 CHECKS: tuple[Check, ...] = (
     _alternatives, *(partial(_owned, *row) for row in OWNED), _symmetry, _grain_radius, _series,
-    _partial_piston, _procedure, _jumps, _settlement, _seating, _jammed, _launcher, _engine, _law,
+    _partial_piston, _procedure, _jumps, _settlement, _seating, _launcher, _engine, _law,
     _move, _relaxation, *mechanics.CHECKS,
 )  # fmt: skip
 

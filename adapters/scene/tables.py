@@ -211,8 +211,8 @@ class Procedure(Table):
     """Whether the k_i first cycles count from where the bed carries the piston."""
     seating_cycles: Annotated[int, Field(ge=1)] | None = None
     """Where they do and a piston hung: cycles that count in place of k_i; k_i where not given."""
-    jammed: Literal["less", "rearranged"] = "less"
-    """Where a jump by history finds no room: it moves the bed by less, or grains change places."""
+    jammed: Literal["less"] = "less"
+    """Where a jump by history finds no room, it moves the bed by less: older scenes say so."""
     relaxation: str = "smallest-move"
     """How a moved bed gets rid of its overlaps: of `adapters.relaxation.methods.METHODS`, or
     "none"."""

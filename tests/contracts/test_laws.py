@@ -47,6 +47,21 @@ def test_bed_at_rest_stays(name: str) -> None:
     still = law.fit(CYCLE, np.zeros((40, 2, 3)))
     assert still.shape == (len(law.parameter_names), 2, 3)
     assert not law.increment(still, 40.0, 80.0).any()
+    if not as_printed(law):
+        lasting = law.fit(CYCLE, np.full(40, 3.0))
+        assert law.increment(lasting, 40.0, 1e9) == pytest.approx(0.0, abs=1e-9)
+
+
+@every_law
+def test_origin_and_direction_do_not_matter(name: str) -> None:
+    """Counted from anywhere, downwards or upwards (heave): the same increment."""
+    law = get_law(name)
+    here = law.increment(law.fit(CYCLE, SETTLING), 40.0, 80.0)
+    there = law.increment(law.fit(CYCLE, -SETTLING), 40.0, 80.0)
+    np.testing.assert_array_equal(there, -here)
+    if not as_printed(law):
+        there = law.increment(law.fit(CYCLE, SETTLING + 1e-3), 40.0, 80.0)
+        np.testing.assert_allclose(there, here, rtol=0, atol=SEARCHED * np.abs(here).max())
 
 
 @every_law

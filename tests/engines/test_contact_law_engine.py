@@ -1,4 +1,7 @@
-"""LIGGGHTS under the project's decks against eqs 5 to 7: one contact at a time."""
+"""The engines under the project's decks against eqs 5 to 7: one contact at a time.
+
+What YADE alone does, as no contact of it pulls, is in tests/engines/test_yade.py.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +11,20 @@ import numpy as np
 import pytest
 
 from adapters.bed import contact_law as law
-from tests.tangential_rules import LOOPS, force_secant, work
+from tests import yade_few_grains
+from tests.tangential_rules import (
+    LOOPS,
+    force_incremental,
+    force_rescaled,
+    force_secant,
+    work,
+)
+from validation.bench import few_grains, few_grains_lammps
 from validation.bench.few_grains import (
+    PLACE,
     RADIUS,
+    Track,
+    TrackRun,
     driven_contact,
     grain_mass,
     head_on,
@@ -21,23 +35,34 @@ from validation.bench.few_grains import (
     table_1,
 )
 
-pytestmark = pytest.mark.engine("liggghts")
+LIGGGHTS = pytest.param(few_grains.track_run, marks=pytest.mark.engine("liggghts"), id="liggghts")
+LAMMPS = pytest.param(few_grains_lammps.track_run, marks=pytest.mark.engine("lammps"), id="lammps")
+YADE = pytest.param(
+    yade_few_grains.track_run, marks=[pytest.mark.engine("yade"), pytest.mark.long], id="yade"
+)
+every_engine = pytest.mark.parametrize("run", [LIGGGHTS, LAMMPS, YADE])
+with_pull = pytest.mark.parametrize("run", [LIGGGHTS, LAMMPS])
+only_liggghts = pytest.mark.engine("liggghts")
+only_lammps = pytest.mark.engine("lammps")
 
 ALPHA = 0.44
+VISCOUS = f"material.grain.viscous_alpha={ALPHA}"
+ELASTIC = "material.grain.restitution=1.0"
 PAIR_MASS = grain_mass(table_1()) / 2
 """Effective mass of two grains of Table 1 [kg]."""
 
 
+@with_pull
 @pytest.mark.parametrize("speed", [0.01, 1.0])
 @pytest.mark.long
-def test_rebound_has_the_papers_restitution(speed: float) -> None:
+def test_rebound_has_the_papers_restitution(run: TrackRun, speed: float) -> None:
     """alpha = 0.44 rebounds with e = exp(-pi alpha/sqrt(1 - alpha^2)) = 0.2145 at any speed.
 
     Overlap and contact time too are those of m* delta'' = -F_n - c delta', c = 2 (5/6)^(1/2) alpha
     (m* S_n)^(1/2).  With 1,000 steps in the contact the first-order error is 8e-4: bar 2e-3.
     """
-    scene = table_1(f"material.grain.viscous_alpha={ALPHA}")
-    hit, _ = head_on(scene, speed)
+    scene = table_1(VISCOUS)
+    hit, _ = head_on(scene, speed, run=run)
     expected = law.collision(
         speed, scene.stiffness.grain, RADIUS / 2, PAIR_MASS, law.DAMPING_FACTOR * ALPHA
     )
@@ -46,16 +71,18 @@ def test_rebound_has_the_papers_restitution(speed: float) -> None:
     assert hit.contact_time == pytest.approx(expected.contact_time, rel=2e-3)
 
 
-def test_elastic_rebound_is_hertz() -> None:
+@every_engine
+def test_elastic_rebound_is_hertz(run: TrackRun) -> None:
     """e = 1: overlap (15 m* v^2/(16 E* sqrt(R*)))^(2/5), contact time 2.943 overlap/v, e = 1."""
-    scene = table_1("material.grain.restitution=1.0")
-    hit, _ = head_on(scene, 0.1)
+    scene = table_1(ELASTIC)
+    hit, _ = head_on(scene, 0.1, run=run)
     expected = law.hertz_collision(0.1, scene.stiffness.grain, RADIUS / 2, PAIR_MASS)
     assert hit.restitution == pytest.approx(1, abs=1e-6)
     assert hit.overlap_max == pytest.approx(expected.overlap_max, rel=1e-5)
     assert hit.contact_time == pytest.approx(expected.contact_time, rel=1e-4)
 
 
+@only_liggghts
 def test_literal_eq_7_needs_another_restitution() -> None:
     """e = 0.1776 handed over damps with c = 2 alpha sqrt(m* S_n), alpha = 0.44: eq. 7 as printed.
 
@@ -67,104 +94,206 @@ def test_literal_eq_7_needs_another_restitution() -> None:
     assert hit.restitution == pytest.approx(literal.restitution, rel=2e-3)
 
 
+@only_liggghts
 def test_contacts_may_pull() -> None:
     """limitForce on ends a contact at the first tension, e = 0.335; the decks leave it off."""
-    scene = table_1(f"material.grain.viscous_alpha={ALPHA}")
+    scene, ratio = table_1(VISCOUS), law.DAMPING_FACTOR * ALPHA
     hit, _ = head_on(scene, 0.1, materials=limit_force)
-    ended = law.collision(
-        0.1,
-        scene.stiffness.grain,
-        RADIUS / 2,
-        PAIR_MASS,
-        law.DAMPING_FACTOR * ALPHA,
-        may_pull=False,
-    )
+    ended = law.collision(0.1, scene.stiffness.grain, RADIUS / 2, PAIR_MASS, ratio, may_pull=False)
     assert ended.restitution == pytest.approx(0.335, abs=5e-4)
     assert hit.restitution == pytest.approx(ended.restitution, rel=2e-3)
 
 
+@every_engine
 @pytest.mark.long
-def test_rebound_converges_at_first_order() -> None:
+def test_rebound_converges_at_first_order(run: TrackRun) -> None:
     """Half the time step, half the error of the restitution: damping lags by half a step."""
-    scene = table_1(f"material.grain.viscous_alpha={ALPHA}")
-    exact = law.restitution_of_alpha(ALPHA)
-    errors = [head_on(scene, 0.1, steps=n)[0].restitution / exact - 1 for n in (200, 400, 800)]
+    setting, exact = VISCOUS, law.restitution_of_alpha(ALPHA)
+    if run is yade_few_grains.track_run:
+        setting, exact = "material.grain.restitution=0.5", 0.5
+    errors = [
+        head_on(table_1(setting), 0.1, steps=n, run=run)[0].restitution / exact - 1
+        for n in (200, 400, 800)
+    ]
     assert np.divide(errors[1:], errors[:-1]) == pytest.approx([0.5, 0.5], abs=0.1)
 
 
-@pytest.mark.parametrize(("loop", "sign"), [*zip(LOOPS, (1, -1, 0), strict=True)])
-@pytest.mark.long
-def test_tangential_force_is_eq_6_on_closed_loops(loop: str, sign: int) -> None:
-    """F_t = k_t delta_t loses (k_t1 - k_t0) delta_t^2/2 around a loop, or creates it the other way.
+@pytest.mark.parametrize(
+    ("run", "rule", "lost"),
+    [
+        pytest.param(*LIGGGHTS.values, force_secant, (1, -1, 0), marks=LIGGGHTS.marks),
+        pytest.param(*LAMMPS.values, force_rescaled, (1, 1, 0.436), marks=LAMMPS.marks),
+        pytest.param(*YADE.values, force_incremental, (-1, 1, 0), marks=YADE.marks),
+    ],
+    ids=["liggghts", "lammps", "yade"],
+)
+@pytest.mark.parametrize("number", range(3))
+def test_tangential_force_follows_its_rule_on_closed_loops(
+    run: TrackRun, rule: object, lost: tuple[float, ...], number: int
+) -> None:
+    """The force at every point is that of the rule, and the loop loses or creates what the rule
+    does, in the unit (k_t1 - k_t0) delta_t^2/2: LAMMPS has the paper's rule, which creates none.
 
-    Elastic, between 0.25 N and 1 N, below sliding.  The normal turns by delta_t/(2 R) = 1e-5.
+    Elastic, between 0.25 N and 1 N, below sliding.  100 points a loop: the rule's own quadrature is
+    off by 2e-3 where both forces change at once.
     """
-    scene = table_1("material.grain.restitution=1.0")
+    scene = table_1(ELASTIC)
     shear, radius = shear_modulus(scene), RADIUS / 2
     forces = np.array([0.25, 1.0])
     low, high = law.overlap_under_force(forces, scene.stiffness.grain, radius)
     k0, k1 = law.tangential_stiffness(np.array([low, high]), shear, radius)
     displacement = 0.5 * scene.material.grain.friction * forces[0] / k0
     unit = (k1 - k0) * displacement**2 / 2
-    corners = [low, 0.0] + LOOPS[loop] * [high - low, displacement]
-    track, overlap, moved = driven_contact(scene, *corners.T)
-    expected = force_secant(law.tangential_stiffness(overlap, shear, radius), moved)
-    tangential = np.array([c.tangential_force[0] for c in track.contacts])
-    assert -tangential[:, 1] == pytest.approx(expected, abs=1e-3 * expected.max())
+    corners = [low, 0.0] + list(LOOPS.values())[number] * [high - low, displacement]
+    track, overlap, moved = driven_contact(scene, *corners.T, run=run)
+    expected = rule(law.tangential_stiffness(overlap, shear, radius), moved)  # type: ignore[operator]
+    tangential = -np.array([c.tangential_force[0] for c in track.contacts])[:, 1]
+    assert tangential == pytest.approx(expected, abs=3e-3 * expected.max())
+    if run is yade_few_grains.track_run:  # its dump's spring is the force over the stiffness
+        spring = np.array([c.tangential_spring[0] for c in track.contacts])[:, 1]
+        stiffness = law.tangential_stiffness(overlap, shear, radius)
+        assert spring * stiffness == pytest.approx(expected, abs=1e-3 * expected.max())
     moves = np.diff(track.position[:, 0], axis=0)
     mean_force = (track.force[1:, 0] + track.force[:-1, 0]) / 2
-    assert -np.sum(mean_force * moves) == pytest.approx(sign * unit, abs=0.01 * unit)
-    assert work(expected, moved) == pytest.approx(sign * unit, abs=0.01 * unit)
+    assert -np.sum(mean_force * moves) / unit == pytest.approx(lost[number], abs=0.01)
+    assert work(expected, moved) / unit == pytest.approx(lost[number], abs=0.01)
 
 
-def test_tangential_damping_ends_where_sliding_begins() -> None:
+@with_pull
+def test_sliding_carries_mu_fn_and_sticking_is_damped(run: TrackRun) -> None:
     """A contact that sticks has F_t = k_t delta_t + c_t v, one that slides mu F_n and no more.
 
-    c_t = 2 (5/6)^(1/2) alpha (m* k_t)^(1/2), as along the normal.
-    Eq. 7 keeps its viscous term while a contact slides, 27 % more here; LIGGGHTS drops it.
+    c_t = 2 (5/6)^(1/2) alpha (m* k_t)^(1/2), as along the normal.  Eq. 7 keeps its viscous term
+    while a contact slides, 27 % more here; both engines drop it.
     """
-    scene, speed = table_1(f"material.grain.viscous_alpha={ALPHA}"), 0.01
+    scene, speed = table_1(VISCOUS), 0.01
     friction = scene.material.grain.friction
     overlap = float(law.overlap_under_force(1.0, scene.stiffness.grain, RADIUS / 2))
     stiffness = float(law.tangential_stiffness(overlap, shear_modulus(scene), RADIUS / 2))
     damping = 2 * law.DAMPING_FACTOR * ALPHA * sqrt(PAIR_MASS * stiffness)
     slip = friction / stiffness
     track, _, moved = driven_contact(
-        scene, np.array([overlap, overlap]), np.array([0.0, 4 * slip]), speed=speed
+        scene, np.array([overlap, overlap]), np.array([0.0, 4 * slip]), speed=speed, run=run
     )
     force = -track.force[:, 0, 1]
-    sticks = (moved > 0.1 * slip) & (moved < 0.8 * slip)
-    expected = stiffness * moved[sticks] + damping * speed
-    assert force[sticks] == pytest.approx(expected, rel=2e-3)
+    sticks = (moved > 0.1 * slip) & (moved < 0.7 * slip)
+    assert force[sticks] == pytest.approx(stiffness * moved[sticks] + damping * speed, rel=2e-3)
     assert force[moved > 1.5 * slip] == pytest.approx(friction, rel=2e-3)
+    if run is few_grains_lammps.track_run:  # what its dump calls the spring is the elastic part
+        springs = np.array([c.tangential_spring[0] for c in track.contacts])[:, 1]
+        assert springs[sticks] == pytest.approx(moved[sticks], rel=5e-3)
 
 
+@pytest.mark.parametrize(
+    ("run", "bar"),
+    [
+        pytest.param(*LIGGGHTS.values, 1e-3, marks=LIGGGHTS.marks, id="liggghts"),
+        pytest.param(*LAMMPS.values, 1e-8, marks=LAMMPS.marks, id="lammps"),
+        pytest.param(*YADE.values, 1e-3, marks=YADE.marks, id="yade"),
+    ],
+)
 @pytest.mark.long
-def test_mirror_plane_is_a_mirrored_pair() -> None:
-    """A grain that hits the rigid plane x = 0 rebounds as two that mirror each other, within 0.1 %.
+def test_mirror_plane_is_a_mirrored_pair(run: TrackRun, bar: float) -> None:
+    """A grain that hits the mirror plane rebounds as two that mirror each other; what slides along
+    it keeps its speed and gets no spin, exactly.
 
-    Young's modulus 1e15 Pa instead of infinity makes 5e-5 of E*; what slides along the plane keeps
-    its speed and gets no spin, exactly.
+    LIGGGHTS' Young's modulus of 1e15 Pa instead of infinity makes 5e-5 of E*.
     """
-    scene = table_1(f"material.grain.viscous_alpha={ALPHA}")
-    pair, _ = head_on(scene, 0.1)
-    mirrored, track = head_on(scene, 0.1, mirror=True, slide=0.2)
-    assert mirrored.restitution == pytest.approx(pair.restitution, rel=1e-3)
-    assert mirrored.contact_time == pytest.approx(pair.contact_time, rel=1e-3)
-    assert mirrored.overlap_max == pytest.approx(pair.overlap_max, rel=1e-3)
+    scene = table_1(VISCOUS)
+    pair, _ = head_on(scene, 0.1, run=run)
+    mirrored, track = head_on(scene, 0.1, mirror=True, slide=0.2, run=run)
+    assert mirrored.restitution == pytest.approx(pair.restitution, rel=bar)
+    assert mirrored.contact_time == pytest.approx(pair.contact_time, rel=bar)
+    assert mirrored.overlap_max == pytest.approx(pair.overlap_max, rel=bar)
     assert np.all(track.velocity[:, 0, 1:] == [0.0, 0.2])
     assert np.all(track.spin == 0)
 
 
-def test_mirror_plane_does_not_brake() -> None:
+@every_engine
+def test_mirror_plane_does_not_brake(run: TrackRun) -> None:
     """A grain pressed on a mirror plane keeps its speed along it exactly, over several runs.
 
-    With the grains' tangential law at friction 0 it would not: the force computed at the start
-    of a run finds a spring of length zero, which counts as sticking, and damps.
+    With the grains' tangential law at friction 0 it would not in LIGGGHTS: the force computed at
+    the start of a run finds a spring of length zero, which counts as sticking, and damps.
     """
-    scene = table_1()
-    kept = mirror_slide(scene, 0.1, runs=3)
+    kept = mirror_slide(table_1(), 0.1, runs=3, run=run)
     assert np.all(kept.velocity[:, 0, 2] == 0.1)
     assert np.all(kept.spin == 0)
-    braked = mirror_slide(scene, 0.1, runs=3, materials=mirror_tangential)
-    assert braked.velocity[-1, 0, 2] < 0.99 * 0.1
+    if run is few_grains.track_run:
+        braked = mirror_slide(table_1(), 0.1, runs=3, materials=mirror_tangential)
+        assert braked.velocity[-1, 0, 2] < 0.99 * 0.1
+
+
+# --- walls of LAMMPS -------------------------------------------------------------------------
+
+
+def placed(scene_overrides: str, position: list[float], velocity: list[float], steps: int) -> Track:
+    """One grain that moves freely from a place, at a step of 1e-7 s."""
+    motion = ["fix motion grains nve/sphere", f"run {steps}"]
+    return few_grains_lammps.track_run(
+        table_1(scene_overrides), np.array([position]), np.array([velocity]), motion, time_step=1e-7
+    )
+
+
+@only_lammps
+def test_wall_force_is_that_of_a_plane_of_steel() -> None:
+    """F = 4/3 E* R^(1/2) delta^(3/2) on the floor; the cylinder is curved, 1/R* = 1/R - 1/(2 R_c).
+
+    LIGGGHTS takes the cylinder for a plane: 1.1 % less force on the paper's bed.
+    """
+    scene, overlap = table_1(ELASTIC), 1e-6
+    floor = placed(ELASTIC, [0.02, 0.02, RADIUS - overlap], [0.0, 0.0, 0.0], 0)
+    modulus = scene.stiffness.wall
+    flat = law.normal_force(overlap, modulus, RADIUS)
+    assert floor.force[0, 0, 2] == pytest.approx(flat, rel=1e-9)
+    cylinder_radius = scene.container.radius
+    away = (cylinder_radius - RADIUS + overlap) / sqrt(2)
+    side = placed(ELASTIC, [away, away, 0.02], [0.0, 0.0, 0.0], 0)
+    curved = law.normal_force(overlap, modulus, 1 / (1 / RADIUS - 1 / (2 * cylinder_radius)))
+    assert np.linalg.norm(side.force[0, 0]) == pytest.approx(curved, rel=1e-9)
+    assert curved / flat == pytest.approx(1.011, abs=1e-3)
+
+
+@only_lammps
+def test_a_grain_slides_along_a_wall_as_coulomb_says() -> None:
+    """A hit at 5 times the normal speed slides throughout: the tangent loses mu (1 + e) v_n.
+
+    Spin gained is 5/2 of that over the radius (Walton; Chung and Ooi 2011, test 4).  With e = 1 the
+    step, 320 in the contact, is all the error.
+    """
+    speed = 0.1
+    friction = table_1(ELASTIC).material.wall.friction
+    track = placed(ELASTIC, [0.02, 0.02, RADIUS + 1e-8], [5 * speed, 0.0, -speed], 800)
+    velocity, spin = track.velocity[-1, 0], track.spin[-1, 0]
+    assert velocity[2] == pytest.approx(speed, rel=1e-4)
+    change = 2 * friction * speed
+    assert 5 * speed - velocity[0] == pytest.approx(change, rel=1e-4)
+    assert spin[1] == pytest.approx(2.5 * change / RADIUS, rel=1e-4)
+
+
+@only_lammps
+def test_wall_rebound_has_the_papers_restitution() -> None:
+    """Against a wall m* is the grain's mass, and e is the same."""
+    speed = 0.1
+    track = placed(VISCOUS, [0.02, 0.02, RADIUS + 1e-8], [0.0, 0.0, -speed], 800)
+    rebound = track.velocity[-1, 0, 2] / speed
+    assert rebound == pytest.approx(law.restitution_of_alpha(ALPHA), rel=1e-2)
+
+
+@only_lammps
+@pytest.mark.parametrize(("grain", "wall"), [(0.0, 0.0), (0.0, 0.5), (0.5, 0.0)])
+def test_no_friction_no_tangential_force(grain: float, wall: float) -> None:
+    """Where the scene names no friction, neither grains nor floor turn or brake what slides."""
+    overrides = (f"material.grain.friction={grain}", f"material.wall.friction={wall}")
+    scene = table_1(*overrides)
+    motion = ["fix motion grains nve/sphere", "run 300"]
+    apart = np.array([[RADIUS + 1e-8, 0, 0], [-RADIUS - 1e-8, 0, 0], [0, 0.01, 0]])
+    position = PLACE + apart
+    position[2, 2] = RADIUS + 1e-8
+    velocity = np.array([[-0.1, 0.1, 0], [0.1, -0.1, 0], [0.2, 0, -0.1]])
+    track = few_grains_lammps.track_run(scene, position, velocity, motion, time_step=1e-7)
+    spins = np.linalg.norm(track.spin[-1], axis=1) > 0
+    assert spins.tolist() == [grain > 0, grain > 0, wall > 0]
+    lines = [bool(c.tangential_force.any()) for c in track.contacts if len(c)]
+    assert lines
+    assert any(lines) == (grain > 0)

@@ -16,12 +16,24 @@ import pytest
 
 from adapters.bed.sample import GRAVITY
 from adapters.bed.state import Contacts, State, load_state
-from adapters.files.dump import read_frames
+from adapters.files.dump_reader import read_frames
 from adapters.files.run_folder import RunFolder
+from adapters.procedure.run import run_scene
 from adapters.scene.file import load_scene
-from tests.engine_sample import AFTER, FIRST, JUMP, SECOND, Sample
+from tests.engine_sample import (
+    AFTER,
+    FIRST,
+    JUMP,
+    QUIET,
+    SECOND,
+    TINY,
+    Sample,
+    at_rest,
+    window_of,
+)
 from tests.forked_commands import Commands, processes_in
 from trackbed import command
+from trackbed.scenes import scene_template
 
 ROOT = Path(__file__).parents[2]
 HISTORY = 7
@@ -32,11 +44,6 @@ def real(sample: Sample) -> None:
     """Go on only with an engine that has mechanics and a process."""
     if sample.name == "fake":
         pytest.skip("the fake engine has no mechanics and no process")
-
-
-def at_rest(state: State) -> State:
-    still = np.zeros_like(state.position)
-    return state.moved(state.position, velocity=still, spin=still)
 
 
 def springs(contacts: Contacts) -> dict[tuple[int, ...], np.ndarray]:
@@ -90,8 +97,9 @@ def test_preparation(sample: Sample) -> None:
     folder = sample.run / "preparation"
     history = np.loadtxt(folder / "history.txt", skiprows=1, ndmin=2)
     assert history.shape[1] == HISTORY
-    for frame in read_frames(folder / "rain.dump", expected_ids=range(1, 41)):
+    for frame in read_frames(folder / "rain.dump"):
         assert {"id", "x", "y", "z", "radius"} <= set(frame.columns)
+        assert np.array_equal(frame.column("id"), np.arange(1, 41))
     state = load_state(folder / "state.npz")
     assert np.array_equal(state.identifier, np.arange(1, 41))
     assert set(state.wall_force) == set(sample.engine.wall_names(sample.scene, piston=False))
@@ -284,6 +292,60 @@ def test_jump_and_report(sample: Sample) -> None:
     relaxed = load_state(sample.run / JUMP / "relaxed.npz")
     assert np.array_equal(sample.window(AFTER).position[0], relaxed.position)
     assert "settlement" in write_report(sample.run).read_text().lower()
+
+
+# --- other scenes ---------------------------------------------------------------------------
+
+SHORT = ("procedure.k_i=1", "procedure.k=3", "procedure.h=1", "procedure.total_cycles=9")
+with_decks = pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.engine(name)) for name in ("liggghts", "lammps")]
+)
+
+
+@with_decks
+@pytest.mark.parametrize("symmetry", ['["y"]', "[]"])
+@pytest.mark.long
+def test_box(name: str, tmp_path: Path, symmetry: str) -> None:
+    """A box, with a mirror plane and without, is prepared, loaded, jumped; grains stay inside."""
+    lines = scene_template("karrech-coarse").replace('"cylinder"', '"box"').splitlines()
+    lines = [line for line in lines if not line.startswith("radius =")]
+    at = lines.index("[sample]") + 1
+    lines[at:at] = ["size_x = 0.02", "size_y = 0.016"]
+    (tmp_path / "scene.toml").write_text("\n".join(lines) + "\n")
+    overrides = (*TINY[1:], *SHORT, f'engine.name="{name}"', f"sample.symmetry={symmetry}")
+    overrides += ("loading.piston_mass=2e-3",)
+    run_scene(tmp_path / "scene.toml", tmp_path / "run", overrides=overrides, progress=QUIET)
+    assert ",jumped," in (tmp_path / "run" / "settlement.csv").read_text()
+    window = window_of(tmp_path / "run", "window_000001")
+    low, high = window.position.min(axis=(0, 1)), window.position.max(axis=(0, 1))
+    assert (low > 0.9 * window.radius.min()).all()
+    assert (high[:2] < np.array([0.02, 0.016]) - 0.9 * window.radius.min()).all()
+
+
+@with_decks
+@pytest.mark.long
+def test_load_series_across_a_jump(name: str, tmp_path: Path) -> None:
+    """Every sample of the series, at the ends of its segments too, to 1e-9, in all windows."""
+    stress = 3000 + 11000 * np.array([0, 0.3, 1.0, 0.5, 0.1, 0])
+    rows = (f"{t:.17g},{s:.17g}" for t, s in zip(np.linspace(0, 0.02, 6), stress, strict=True))
+    (tmp_path / "load.csv").write_text("time,stress\n" + "\n".join(rows) + "\n")
+    head, _, rest = scene_template("karrech-coarse").partition("[loading]")
+    path = tmp_path / "scene.toml"
+    loading = '[loading]\nwaveform = "series"\nseries = "load.csv"\npiston_mass = 0.001\n\n'
+    path.write_text(head + loading + rest[rest.index("[procedure]") :])
+    overrides = (*TINY, *SHORT, f'engine.name="{name}"')
+    run_scene(path, tmp_path / "run", overrides=overrides, progress=QUIET)
+    scene = load_scene(path, overrides)
+    assert scene.samples_per_cycle % 5 == 0  # the mesh of samples holds the segments' ends
+    names = [n for n in RunFolder(tmp_path / "run").stage_names() if n.startswith("window")]
+    assert len(names) >= 3
+    for one in names:
+        window = window_of(tmp_path / "run", one)
+        track = window.piston
+        assert len(track.time_step) == len(window) * scene.samples_per_cycle
+        phase = np.arange(1, len(track.time_step) + 1) / scene.samples_per_cycle
+        target = scene.stress_at(phase) * scene.loaded_area
+        np.testing.assert_allclose(track.target_force, target, rtol=1e-9)
 
 
 # --- dies cleanly ---------------------------------------------------------------------------

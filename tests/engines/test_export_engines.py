@@ -1,14 +1,12 @@
-"""What an engine wrote opens in OVITO and meshio as it is; a run's export in all their tools."""
+"""What an engine wrote opens in OVITO as it is; a run's export in all tools."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-import meshio
 import numpy as np
 import pytest
 
-import adapters.files.meshio_dump  # noqa: F401  registers the format
 from adapters.bed.state import load_state
 from adapters.export.formats import export_run
 from adapters.export.instants import read_exported_run
@@ -16,23 +14,6 @@ from tests.engine_sample import SECOND, Sample
 
 VECTORS = {"Particle Identifier", "Position", "Velocity", "Angular Velocity", "Radius", "Mass"}
 """Properties of OVITO that it makes of the columns of ``states.dump``."""
-
-
-def engine_dump(sample: Sample) -> Path:
-    """``states.dump`` of the settled bed, as the engine left it."""
-    return sample.run / "preparation" / "states.dump"
-
-
-def test_dump_opens_in_meshio(sample: Sample) -> None:
-    """Every digit, and the walls' forces as vectors."""
-    mesh = meshio.read(engine_dump(sample))
-    state = load_state(sample.run / "preparation" / "state.npz")
-    assert np.array_equal(mesh.points, state.position)
-    assert np.array_equal(mesh.point_data["v"], state.velocity)
-    assert np.array_equal(mesh.point_data["omega"], state.spin)
-    assert np.array_equal(mesh.point_data["radius"], state.radius)
-    for name, force in state.wall_force.items():
-        assert np.array_equal(mesh.point_data[f"f_force_{name}"], force)
 
 
 @pytest.mark.peer("ovito")

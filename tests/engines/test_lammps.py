@@ -17,17 +17,17 @@ import pytest
 
 import trackbed
 from adapters.bed.sample import GRAVITY
-from adapters.bed.state import FloatArray, State, load_state
+from adapters.bed.state import FloatArray, State
 from adapters.engines import lammps as engine_lammps
 from adapters.engines.contract import EngineStart, get_engine
 from adapters.engines.lammps import LammpsEngine, find_lammps_program
 from adapters.errors import EngineFailed, EngineMissing, TrackbedError
-from adapters.files.run_folder import RunFolder
-from adapters.files.window import Window, load_window, read_window
+from adapters.files.window import Window, read_window
 from adapters.procedure.progress import Progress
 from adapters.procedure.run import run_scene
 from adapters.scene.file import load_scene
 from adapters.scene.tables import Scene
+from tests.engine_sample import at_rest, start_of, window_of
 from trackbed.scenes import scene_path
 
 pytestmark = pytest.mark.engine("lammps")
@@ -68,18 +68,6 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def window_of(run: Path, name: str) -> Window:
-    return load_window(run / name / "states.npz")
-
-
-def start_of(run: Path, name: str) -> EngineStart:
-    """The start of a window that goes on from a finished one."""
-    notes = RunFolder(run).outcome(name).notes  # type: ignore[union-attr]
-    return EngineStart(
-        run / name / "end.restart", notes["time_step"], notes["piston_mesh"], notes["piston_height"]
-    )
-
-
 def computed(
     scene: Scene,
     start: EngineStart,
@@ -112,11 +100,6 @@ def launched(scene: Scene, *launcher: str) -> Scene:
     return Scene(**table)
 
 
-def at_rest(state: State, position: FloatArray) -> State:
-    still = np.zeros_like(position)
-    return state.moved(position, velocity=still, spin=still)
-
-
 def resubmitted(scene: Scene, run: Path, position: FloatArray, folder: Path) -> State:
     """Bed at the end of the second window put elsewhere, at rest, before the first step."""
     start = start_of(run, SECOND)
@@ -143,31 +126,6 @@ def test_momentum(run: Path, scene: Scene, tmp_path: Path) -> None:
     assert np.abs(change).max() > 1e-3 * GRAVITY * steps.mass.sum()  # something was balanced
 
 
-def test_settled_bed_is_in_balance(run: Path) -> None:
-    """After the rain contacts, walls and weight of every grain add up to nearly nothing."""
-    state = load_state(run / "preparation" / "state.npz")
-    force = np.sum(list(state.wall_force.values()), axis=0)
-    force[:, 2] -= GRAVITY * state.mass
-    on_first = state.contacts.normal_force + state.contacts.tangential_force
-    np.add.at(force, state.contacts.pair[:, 0] - 1, on_first)
-    np.subtract.at(force, state.contacts.pair[:, 1] - 1, on_first)
-    weight = GRAVITY * state.mass.mean()
-    assert np.sqrt(np.mean(force**2)) < 0.2 * weight
-    assert np.abs(state.wall_force["symmetry_x"][:, 1:]).max() == 0
-
-
-def test_contacts_are_those_of_the_positions(run: Path) -> None:
-    """Overlaps are radii minus distance, and no pair that touches is missing."""
-    for state in (window_of(run, SECOND).state(index) for index in (0, -1)):
-        first, second = np.triu_indices(len(state.radius), 1)
-        gap = np.linalg.norm(state.position[first] - state.position[second], axis=1)
-        overlap = state.radius[first] + state.radius[second] - gap
-        touching = overlap > 1e-15
-        pairs = np.column_stack([first, second])[touching] + 1
-        assert np.array_equal(state.contacts.pair, pairs)
-        np.testing.assert_allclose(state.contacts.overlap, overlap[touching], atol=1e-15)
-
-
 def test_piston_is_a_mass_between_two_forces(run: Path, scene: Scene, tmp_path: Path) -> None:
     """m (h2 - 2 h1 + h0)/dt^2 = contact force - target force, step by step."""
     steps = computed(scene, start_of(run, SECOND), 1, tmp_path / "steps", single_steps=50)
@@ -184,27 +142,6 @@ def test_piston_is_a_mass_between_two_forces(run: Path, scene: Scene, tmp_path: 
 
 
 # --- restarts and jumps ---------------------------------------------------------------------
-
-
-def test_window_goes_on_where_the_last_one_ended(run: Path, scene: Scene, tmp_path: Path) -> None:
-    """Two windows of one cycle are one of two up to the seam, and a bed as good behind it."""
-    start = start_of(run, FIRST)
-    whole = computed(scene, start, 2, tmp_path / "whole")
-    half = computed(scene, start, 1, tmp_path / "half")
-    height = float(half.piston.height[-1])
-    seam = EngineStart(tmp_path / "half" / "end.restart", int(half.time_step[-1]), 0, height)
-    rest = computed(scene, seam, 1, tmp_path / "rest")
-    before, after = half.state(-1), rest.state(0)
-    assert np.array_equal(whole.position[:2], half.position)
-    for name in ("position", "velocity", "spin", "time_step", "piston_height"):
-        assert np.array_equal(getattr(before, name), getattr(after, name)), name
-    assert np.array_equal(before.contacts.pair, after.contacts.pair)
-    forces = before.contacts.tangential_force
-    np.testing.assert_allclose(
-        after.contacts.tangential_force, forces, atol=1e-12 * np.abs(forces).max()
-    )
-    apart = np.linalg.norm(rest.position[1] - whole.position[2], axis=1).mean()
-    assert apart < 0.05 * whole.radius.mean()
 
 
 @pytest.mark.parametrize("processes", [1, pytest.param(2, marks=WITH_MPIEXEC)])
@@ -306,24 +243,6 @@ SHORT = ("procedure.k_i=1", "procedure.k=2", "procedure.total_cycles=3")
 
 
 @pytest.mark.long
-def test_box(tmp_path: Path) -> None:
-    """A box with a mirror plane is prepared and loaded; grains stay inside."""
-    text = scene_path("karrech-coarse").read_text().replace('"cylinder"', '"box"')
-    lines = [line for line in text.splitlines() if not line.startswith("radius =")]
-    at = lines.index("[sample]") + 1
-    lines[at:at] = ["size_x = 0.02", "size_y = 0.016"]
-    path = tmp_path / "scene.toml"
-    path.write_text("\n".join(lines) + "\n")
-    tiny = [o for o in TINY if not o.startswith("sample.radius")]
-    overrides = (*tiny, *SHORT, 'sample.symmetry=["y"]', "loading.piston_mass=2e-3")
-    run_scene(path, tmp_path / "run", overrides=overrides, progress=QUIET)
-    window = window_of(tmp_path / "run", "window_000001")
-    low, high = window.position.min(axis=(0, 1)), window.position.max(axis=(0, 1))
-    assert (low > 0.9 * window.radius.min()).all()
-    assert (high[:2] < np.array([0.02, 0.016]) - 0.9 * window.radius.min()).all()
-
-
-@pytest.mark.long
 def test_partial_piston_presses_its_part_only(tmp_path: Path) -> None:
     """A piston on 60 % of the section: no grain beyond its reach and a radius feels it."""
     overrides = (*TINY, *SHORT, "loading.area_share=0.6")
@@ -336,28 +255,6 @@ def test_partial_piston_presses_its_part_only(tmp_path: Path) -> None:
     place = np.hypot(window.position[..., 0], window.position[..., 1])
     pressed = np.abs(window.wall_force["piston_wall"]).max(axis=2) > 0
     assert (place[pressed] < scene.piston_reach + window.radius.max()).all()
-
-
-@pytest.mark.long
-def test_load_series(tmp_path: Path) -> None:
-    """Every sample of the series, at the ends of its segments too, to 1e-9, in all windows."""
-    stress = 3000 + 11000 * np.array([0, 0.3, 1.0, 0.5, 0.1, 0])
-    rows = (f"{t:.17g},{s:.17g}" for t, s in zip(np.linspace(0, 0.02, 6), stress, strict=True))
-    (tmp_path / "load.csv").write_text("time,stress\n" + "\n".join(rows) + "\n")
-    head, _, rest = scene_path("karrech-coarse").read_text().partition("[loading]")
-    path = tmp_path / "scene.toml"
-    loading = '[loading]\nwaveform = "series"\nseries = "load.csv"\npiston_mass = 0.001\n\n'
-    path.write_text(head + loading + rest[rest.index("[procedure]") :])
-    overrides = (*TINY, *SHORT)
-    run_scene(path, tmp_path / "run", overrides=overrides, progress=QUIET)
-    scene = load_scene(path, overrides)
-    for name in ("window_000000", "window_000001"):
-        window = window_of(tmp_path / "run", name)
-        track = window.piston
-        assert len(track.time_step) == len(window) * scene.samples_per_cycle
-        phase = np.arange(1, len(track.time_step) + 1) / scene.samples_per_cycle
-        target = scene.stress_at(phase) * scene.loaded_area
-        np.testing.assert_allclose(track.target_force, target, rtol=1e-9)
 
 
 @pytest.mark.long
@@ -407,14 +304,6 @@ def test_launcher(run: Path, scene: Scene, tmp_path: Path) -> None:
 # --- faults ---------------------------------------------------------------------------------
 
 
-def test_several_runs_at_once_are_refused(run: Path, scene: Scene, tmp_path: Path) -> None:
-    """A launcher of another MPI starts runs that know nothing of one another: refused."""
-    table = scene.model_dump(exclude_none=True)
-    table["engine"]["launcher"] = ("sh", "-c", '"$@"; "$@"', "sh")
-    with pytest.raises(EngineFailed, match=r"2 runs of the engine.*\n.*wheel mpich"):
-        computed(Scene(**table), start_of(run, FIRST), 1, tmp_path / "twice", single_steps=1)
-
-
 def test_its_own_words_are_told(run: Path, scene: Scene, tmp_path: Path) -> None:
     """A deck that LAMMPS does not understand ends with its own sentence."""
     folder = tmp_path / "broken"
@@ -423,14 +312,6 @@ def test_its_own_words_are_told(run: Path, scene: Scene, tmp_path: Path) -> None
     (folder / "load_sine.in").write_text("variable target_force equal nonsense(step)\n")
     with pytest.raises(EngineFailed, match=r"ERROR.*nonsense"):
         ENGINE.run(scene, "in.cycles", folder, lambda: None, digests)
-
-
-def test_full_disk(run: Path, scene: Scene, tmp_path: Path) -> None:
-    """An engine that may write no more is named; a limit on the size of files stands for it."""
-    full = launched(scene, "sh", "-c", 'ulimit -f 8; exec "$@"', "sh")
-    with pytest.raises(EngineFailed) as caught:
-        computed(full, start_of(run, FIRST), 2, tmp_path / "full")
-    assert caught.value.from_outside
 
 
 @pytest.mark.parametrize("number", ["SEGV", "ABRT"])
@@ -446,18 +327,6 @@ def test_a_crash_of_lammps_is_no_crash_of_python(
         computed(crashing, start_of(run, SECOND), 50, tmp_path / "crash")
     assert not caught.value.from_outside
     assert len(computed(scene, start_of(run, SECOND), 1, tmp_path / "after")) == 1
-
-
-@pytest.mark.parametrize("share", [2.0, 50.0])
-def test_absurd_time_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, share: float) -> None:
-    """Beyond the Rayleigh time the result is refused."""
-    plain = load_scene(scene_path("karrech-coarse"), TINY)
-    monkeypatch.setattr(Scene, "time_step", plain.rayleigh_time * share)
-    monkeypatch.setattr(Scene, "steps_per_cycle", 100)
-    with pytest.raises(TrackbedError) as caught:
-        run_scene(scene_path("karrech-coarse"), tmp_path / "r", overrides=TINY, progress=QUIET)
-    assert caught.value.exit_code in (5, 6, 7), caught.value
-    assert RunFolder(tmp_path / "r").outcomes() == []
 
 
 def test_nan_is_not_credible(run: Path, scene: Scene, tmp_path: Path) -> None:
@@ -499,10 +368,6 @@ def test_wheel_without_mpi_says_what_is_missing(monkeypatch: pytest.MonkeyPatch)
 
 
 # --- users without root ---------------------------------------------------------------------
-
-
-def test_version_names_the_release() -> None:
-    assert ENGINE.version().startswith("LAMMPS ")
 
 
 @pytest.mark.long

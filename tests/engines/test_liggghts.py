@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import json
 import os
-import random
 import shutil
 import signal
 import subprocess
-import time
 from collections.abc import Iterator
 from dataclasses import replace
 from importlib.resources import files
@@ -18,18 +16,20 @@ import numpy as np
 import pytest
 
 from adapters.bed.sample import GRAVITY
-from adapters.bed.state import FloatArray, State, load_state
+from adapters.bed.state import FloatArray, State
 from adapters.engines.contract import EngineStart
 from adapters.engines.liggghts import LiggghtsEngine
-from adapters.errors import TrackbedError
 from adapters.files.run_folder import RunFolder
-from adapters.files.window import Window, load_window, read_window
+from adapters.files.window import Window, read_window
+from adapters.moves import Jump
 from adapters.procedure import stages
 from adapters.procedure.progress import Progress
 from adapters.procedure.run import run_scene
 from adapters.scene.file import load_scene
 from adapters.scene.tables import Scene
-from tests.forked_commands import Commands, processes_in
+from tests.engine_sample import at_rest, start_of, window_of
+from tests.engines.test_engine_contract import engine_started, gone
+from tests.forked_commands import Commands
 from trackbed import command
 from trackbed.scenes import scene_template
 
@@ -75,18 +75,6 @@ def scene(scene_file: Path) -> Scene:
     return load_scene(scene_file, TINY)
 
 
-def window_of(run: Path, name: str) -> Window:
-    return load_window(run / name / "states.npz")
-
-
-def start_of(run: Path, name: str) -> EngineStart:
-    """The start of a window that goes on from a finished one."""
-    notes = RunFolder(run).outcome(name).notes  # type: ignore[union-attr]
-    return EngineStart(
-        run / name / "end.restart", notes["time_step"], notes["piston_mesh"], notes["piston_height"]
-    )
-
-
 def written(scene: Scene, start: EngineStart, cycles: int, folder: Path) -> dict[str, str]:
     folder.mkdir()
     return ENGINE.write_cycles(scene, start, cycles, folder)
@@ -107,11 +95,6 @@ def by_hand(folder: Path, deck: str, *words: str) -> str:
     """Plain ``liggghts -in DECK`` in a folder; what it prints."""
     command = ["liggghts", "-in", deck, *words]
     return subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True).stdout
-
-
-def at_rest(state: State) -> State:
-    still = np.zeros_like(state.position)
-    return state.moved(state.position, velocity=still, spin=still)
 
 
 # --- mechanics ------------------------------------------------------------------------------
@@ -184,63 +167,7 @@ def test_contacts_accelerate_their_grains(steps: Window, scene: Scene) -> None:
     assert error.max() < 0.1 * np.linalg.norm(force[0], axis=1)[sticking].max()
 
 
-def test_settled_bed_is_in_balance(run: Path) -> None:
-    """After the rain contacts, walls and weight of every grain add up to nearly nothing."""
-    state = load_state(run / "preparation" / "state.npz")
-    walls = np.sum(list(state.wall_force.values()), axis=0)
-    force = walls + inner_force(state)
-    force[:, 2] -= GRAVITY * state.mass
-    weight = GRAVITY * state.mass
-    assert np.linalg.norm(force, axis=1).max() < 0.05 * weight.mean()
-    assert np.linalg.norm(force.sum(axis=0)) < 0.005 * weight.sum()
-
-
-def test_overlaps_are_those_of_the_positions(run: Path) -> None:
-    """r_i + r_j - distance, for each contact of each cycle end; no overlap without a contact."""
-    window = window_of(run, SECOND)
-    for index in range(len(window) + 1):
-        state = window.state(index)
-        pair = state.contacts.pair - 1
-        distance = np.linalg.norm(state.position[pair[:, 0]] - state.position[pair[:, 1]], axis=1)
-        overlap = state.radius[pair].sum(axis=1) - distance
-        np.testing.assert_allclose(state.contacts.overlap, overlap, atol=1e-15)
-        first, second = np.triu_indices(len(state.radius), 1)
-        gap = np.linalg.norm(state.position[first] - state.position[second], axis=1)
-        touching = (gap < state.radius[first] + state.radius[second] - 1e-15).sum()
-        assert touching == len(pair)
-
-
 # --- restarts -------------------------------------------------------------------------------
-
-
-@pytest.mark.long
-def test_window_goes_on_where_the_last_one_ended(run: Path, scene: Scene, tmp_path: Path) -> None:
-    """Two windows of two cycles are one of four up to the seam, and a bed as good behind it.
-
-    State and springs cross the seam bit for bit, forces of walls but for their viscous part.  The
-    step after it does not: the engine works out its first forces with the velocities of the whole
-    step, not the half, and the bed is chaotic.  So a run is defined by its windows.
-    """
-    start = start_of(run, FIRST)
-    whole = computed(scene, start, 4, tmp_path / "whole")
-    half = computed(scene, start, 2, tmp_path / "half")
-    seam = EngineStart(
-        tmp_path / "half" / "end.restart",
-        int(half.time_step[-1]),
-        start.piston_mesh,
-        float(half.piston.height[-1]),
-    )
-    rest = computed(scene, seam, 2, tmp_path / "rest")
-    before, after = half.state(-1), rest.state(0)
-    assert np.array_equal(whole.position[:3], half.position)
-    assert np.array_equal(whole.velocity[:3], half.velocity)
-    for name in ("position", "velocity", "spin", "time_step", "piston_height"):
-        assert np.array_equal(getattr(before, name), getattr(after, name)), name
-    assert np.array_equal(before.contacts.pair, after.contacts.pair)
-    assert np.array_equal(before.contacts.tangential_spring, after.contacts.tangential_spring)
-    apart = np.linalg.norm(rest.position[1:] - whole.position[3:], axis=2).mean(axis=1)
-    assert apart[0] > 0
-    assert apart.max() < 0.05 * whole.radius.mean()
 
 
 def test_walls_keep_their_springs(run: Path, scene: Scene, tmp_path: Path) -> None:
@@ -278,8 +205,8 @@ def test_a_lifted_loose_grain_does_not_raise_the_piston(
     top = int(loose[np.argmax((before.position[:, 2] + before.radius)[loose])])
     real = stages.get_move("smoothed")
 
-    def thrown(*arguments: object) -> FloatArray:
-        move = real.displacement(*arguments)  # type: ignore[arg-type]
+    def thrown(jump: Jump) -> FloatArray:
+        move = real.displacement(jump)
         above = before.piston_height + lift * before.radius[top]
         move[top, 2] = above - before.radius[top] - before.position[top, 2]
         return move
@@ -298,7 +225,7 @@ def test_a_lifted_loose_grain_does_not_raise_the_piston(
     assert window.piston.height.max() < before.piston_height + unloading
 
 
-# --- kills, signals, faults -----------------------------------------------------------------
+# --- signals -----------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -315,44 +242,6 @@ def words_on(scene_file: Path, run: Path, *more: str) -> tuple[object, ...]:
         return ("resume", run)
     overrides = [word for override in (*TINY, *more) for word in ("--set", override)]
     return ("run", scene_file, "--run-folder", run, *overrides)
-
-
-def engine_started(run: Path, stage: str) -> None:
-    """Wait until an engine works on a stage."""
-    log = run / "partial" / stage / "log.liggghts"
-    deadline = time.monotonic() + 300
-    while not log.exists():
-        assert time.monotonic() < deadline, f"no engine came to {stage}"
-        time.sleep(0.002)
-
-
-def gone(folder: Path) -> bool:
-    """Whether, within a minute, no process works below a folder any more."""
-    deadline = time.monotonic() + 60
-    while processes_in(folder):
-        if time.monotonic() > deadline:
-            return False
-        time.sleep(0.02)
-    return True
-
-
-@pytest.mark.long
-def test_killed_while_the_engine_works(
-    commands: Commands, scene_file: Path, run: Path, tmp_path: Path
-) -> None:
-    """SIGKILLs at random times while LIGGGHTS computes: no engine stays, the table is identical."""
-    folder, times, kills = tmp_path / "run", random.Random(SEED), []
-    for stage in ("preparation", FIRST, SECOND, AFTER, AFTER):
-        commands.start(*words_on(scene_file, folder))
-        engine_started(folder, stage)
-        wait = times.uniform(0, 0.3)
-        time.sleep(wait)
-        kills.append((stage, wait, commands.kill()))
-        assert gone(folder), f"an engine is left after the kills {kills}, seed {SEED}"
-    assert [status for _, _, status in kills] == [-signal.SIGKILL] * 5
-    assert commands.run(*words_on(scene_file, folder)) == 0, commands.output.read_text()
-    table = (folder / "settlement.csv").read_bytes()
-    assert table == (run / "settlement.csv").read_bytes(), f"kills {kills}, seed {SEED}"
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
@@ -373,131 +262,7 @@ def test_interrupted_while_the_engine_works(
     assert (folder / "settlement.csv").read_bytes() == (run / "settlement.csv").read_bytes()
 
 
-@pytest.mark.parametrize(
-    ("number", "named"), [(signal.SIGKILL, "SIGKILL"), (signal.SIGTERM, "SIGTERM")]
-)
-@pytest.mark.long
-def test_engine_killed_alone(
-    commands: Commands, run: Path, tmp_path: Path, number: signal.Signals, named: str
-) -> None:
-    """An engine that someone else ends is named, although LIGGGHTS exits 0 after SIGTERM."""
-    folder = tmp_path / "run"
-    shutil.copytree(run, folder, ignore=shutil.ignore_patterns(AFTER))
-    commands.start("resume", folder)
-    engine_started(folder, AFTER)
-    for pid in processes_in(folder):
-        os.kill(pid, number)
-    assert commands.end() == 5
-    assert f"was ended by {named}" in commands.output.read_text()
-    assert not RunFolder(folder).failure(JUMP)
-
-
-@pytest.mark.long
-def test_full_disk(run: Path, scene_file: Path, tmp_path: Path) -> None:
-    """An engine that may write no more is named, not taken for a failed jump; then it goes on.
-
-    A limit on the size of files stands for the disk; it lies in the launcher.
-    """
-    full = tmp_path / "full"
-    # MPI's own large files go, so that the first to be too large is the engine's.
-    plain = "export PMIX_MCA_gds=hash OMPI_MCA_btl=self; ulimit -f 64"
-    script = f'if test -e {full}; then {plain}; fi; exec "$@"'
-    launcher = f'engine.launcher=["sh", "-c", """{script}""", "sh"]'
-    folder = tmp_path / "run"
-    overrides = [word for override in (*TINY, launcher) for word in ("--set", override)]
-    words = ["run", str(scene_file), "--run-folder", str(folder), *overrides]
-    full.touch()
-    assert command.main(words) == 5
-    assert RunFolder(folder).stage_names() == []
-    full.unlink()
-    assert command.main(words) == 0
-    table = (folder / "settlement.csv").read_bytes()
-    assert table == (run / "settlement.csv").read_bytes()
-    shutil.rmtree(folder / AFTER)
-    full.touch()
-    assert command.main(["resume", str(folder)]) == 5
-    assert RunFolder(folder).stage_names() == ["preparation", FIRST, SECOND, JUMP]
-    assert not RunFolder(folder).failure(JUMP)
-    full.unlink()
-    assert command.main(["resume", str(folder)]) == 0
-    assert (folder / "settlement.csv").read_bytes() == table
-
-
-@pytest.mark.parametrize("share", [2.0, 50.0])
-@pytest.mark.long
-def test_absurd_time_step(
-    scene_file: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    share: float,
-) -> None:
-    """Beyond the Rayleigh time the scene is refused; computed all the same, the result is."""
-    words = ["--set", f"engine.rayleigh_share={share}", "--run-folder", str(tmp_path / "no")]
-    assert command.main(["run", str(scene_file), *words]) == 3
-    assert "rayleigh_share" in capsys.readouterr().err
-    plain = load_scene(scene_file, TINY)
-    step = plain.rayleigh_time * share
-    monkeypatch.setattr(Scene, "time_step", step)
-    monkeypatch.setattr(Scene, "steps_per_cycle", 100)
-    with pytest.raises(TrackbedError) as caught:
-        run_scene(scene_file, tmp_path / "run", overrides=TINY, progress=QUIET)
-    assert caught.value.exit_code in (5, 6, 7), caught.value
-    assert RunFolder(tmp_path / "run").outcomes() == []
-
-
 # --- other scenes, other ways to start ------------------------------------------------------
-
-
-@pytest.mark.parametrize("symmetry", ['["y"]', "[]"])
-@pytest.mark.long
-def test_box(scene_file: Path, tmp_path: Path, symmetry: str) -> None:
-    """A box, with a mirror plane and without, is prepared, loaded, jumped and read."""
-    text = scene_file.read_text().replace('"cylinder"', '"box"')
-    lines = [line for line in text.splitlines() if not line.startswith("radius =")]
-    at = lines.index("[sample]") + 1
-    lines[at:at] = ["size_x = 0.02", "size_y = 0.016"]
-    path = tmp_path / "scene.toml"
-    path.write_text("\n".join(lines) + "\n")
-    shorter = ("procedure.k_i=1", "procedure.k=3", "procedure.h=2", "procedure.total_cycles=10")
-    overrides = (*TINY[1:], *shorter, f"sample.symmetry={symmetry}", "loading.piston_mass=2e-3")
-    run_scene(path, tmp_path / "run", overrides=overrides, progress=QUIET)
-    table = (tmp_path / "run" / "settlement.csv").read_text()
-    assert ",jumped," in table
-    assert table.splitlines()[-1].startswith("10,")
-    window = window_of(tmp_path / "run", "window_000001")
-    low, high = window.position.min(axis=(0, 1)), window.position.max(axis=(0, 1))
-    assert (low > 0.9 * window.radius.min()).all()
-    assert (high[:2] < np.array([0.02, 0.016]) - 0.9 * window.radius.min()).all()
-
-
-@pytest.mark.long
-def test_load_series_across_a_jump(scene_file: Path, tmp_path: Path) -> None:
-    """Every sample of the series, at the ends of its segments too, to 1e-9, in all windows."""
-    series = tmp_path / "load.csv"
-    stress = 3000 + 11000 * np.array([0, 0.3, 1.0, 0.5, 0.1, 0])
-    rows = (f"{t:.17g},{s:.17g}" for t, s in zip(np.linspace(0, 0.02, 6), stress, strict=True))
-    series.write_text("time,stress\n" + "\n".join(rows) + "\n")
-    head, _, rest = scene_file.read_text().partition("[loading]")
-    path = tmp_path / "scene.toml"
-    loading = '[loading]\nwaveform = "series"\nseries = "load.csv"\npiston_mass = 0.001\n\n'
-    path.write_text(head + loading + rest[rest.index("[procedure]") :])
-    shorter = ("procedure.k_i=1", "procedure.k=3", "procedure.h=1", "procedure.total_cycles=9")
-    overrides = (*TINY, *shorter)
-    run_scene(path, tmp_path / "run", overrides=overrides, progress=QUIET)
-    scene = load_scene(path, overrides)
-    per_cycle = scene.samples_per_cycle
-    # The mesh of samples holds the segments' ends.
-    assert per_cycle % 5 == 0
-    names = [n for n in RunFolder(tmp_path / "run").stage_names() if n.startswith("window")]
-    assert len(names) >= 3
-    for name in names:
-        window = window_of(tmp_path / "run", name)
-        track = window.piston
-        assert len(track.time_step) == len(window) * per_cycle
-        sample = np.arange(1, len(track.time_step) + 1)
-        target = scene.stress_at(sample / per_cycle) * scene.loaded_area
-        np.testing.assert_allclose(track.target_force, target, rtol=1e-9)
 
 
 @pytest.mark.skipif(shutil.which("mpirun") is None, reason="mpirun is not installed")

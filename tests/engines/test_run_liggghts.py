@@ -118,5 +118,5 @@ def test_digests_are_those_of_the_shipped_decks(run: Path) -> None:
     """The record of a window names every static deck it used, by content."""
     outcome = RunFolder(run).outcome("window_000006")
     assert outcome is not None
-    copies = decks.copy_deck(run.parent, tuple(outcome.notes["decks"]))
+    copies = decks.copy_deck(run.parent, tuple(outcome.notes["decks"]), "liggghts_inputs")
     assert copies == outcome.notes["decks"]

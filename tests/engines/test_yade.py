@@ -18,17 +18,13 @@ from adapters.engines.yade import YadeEngine, damping_ratio
 from adapters.files.window import Window, read_state, read_window
 from adapters.scene.file import load_scene
 from adapters.scene.tables import Scene
-from tests.tangential_rules import LOOPS, force_incremental, work
 from tests.yade_few_grains import track_run
 from trackbed.scenes import scene_template
 from validation.bench.few_grains import (
     RADIUS,
     Track,
-    driven_contact,
     grain_mass,
     head_on,
-    mirror_slide,
-    shear_modulus,
     table_1,
 )
 
@@ -49,20 +45,6 @@ TINY = (
 
 
 # --- one contact ----------------------------------------------------------------------------
-
-
-@pytest.mark.long
-def test_elastic_rebound_is_hertz() -> None:
-    """e = 1: overlap (15 m* v^2/(16 E* sqrt(R*)))^(2/5), contact time 2.943 overlap/v, e = 1."""
-    scene = table_1("material.grain.restitution=1.0")
-    hit, track = head_on(scene, 0.1, run=track_run)
-    expected = law.hertz_collision(0.1, scene.stiffness.grain, RADIUS / 2, PAIR_MASS)
-    assert hit.restitution == pytest.approx(1, abs=1e-6)
-    assert hit.overlap_max == pytest.approx(expected.overlap_max, rel=1e-5)
-    assert hit.contact_time == pytest.approx(expected.contact_time, rel=1e-4)
-    force = np.abs(track.force[:, 0, 0]).max()
-    peak = law.normal_force(expected.overlap_max, scene.stiffness.grain, RADIUS / 2)
-    assert force == pytest.approx(float(peak), rel=1e-5)
 
 
 @pytest.mark.parametrize("speed", [0.01, 1.0])
@@ -94,61 +76,6 @@ def test_restitution_is_the_rebound(restitution: float) -> None:
     assert hit.restitution == pytest.approx(restitution, rel=2e-3)
     literal = law.DAMPING_FACTOR * law.alpha_of_restitution(restitution)
     assert damping_ratio(scene) > literal
-
-
-@pytest.mark.long
-def test_rebound_converges_at_first_order() -> None:
-    """Half the time step, half the error of the restitution: damping lags by half a step."""
-    scene = table_1("material.grain.restitution=0.5")
-    errors = [
-        head_on(scene, 0.1, steps=n, run=track_run)[0].restitution / 0.5 - 1
-        for n in (200, 400, 800)
-    ]
-    assert np.divide(errors[1:], errors[:-1]) == pytest.approx([0.5, 0.5], abs=0.1)
-
-
-@pytest.mark.parametrize(("loop", "sign"), [*zip(LOOPS, (-1, 1, 0), strict=True)])
-@pytest.mark.long
-def test_tangential_force_is_incremental_on_closed_loops(loop: str, sign: int) -> None:
-    """dF_t = k_t d delta_t: the normal force alone never changes F_t.
-
-    Load n, load t, unload n, unload t gives back (k_t1 - k_t0) delta_t^2/2 more than went in:
-    energy from nothing, which the paper's rule forbids; backwards it is lost.  Elastic, between
-    0.25 N and 1 N, below sliding.
-    """
-    scene = table_1("material.grain.restitution=1.0")
-    shear, radius = shear_modulus(scene), RADIUS / 2
-    forces = np.array([0.25, 1.0])
-    low, high = law.overlap_under_force(forces, scene.stiffness.grain, radius)
-    k0, k1 = law.tangential_stiffness(np.array([low, high]), shear, radius)
-    displacement = 0.5 * scene.material.grain.friction * forces[0] / k0
-    unit = (k1 - k0) * displacement**2 / 2
-    corners = [low, 0.0] + LOOPS[loop] * [high - low, displacement]
-    track, overlap, moved = driven_contact(scene, *corners.T, run=track_run)
-    expected = force_incremental(law.tangential_stiffness(overlap, shear, radius), moved)
-    tangential = np.array([c.tangential_force[0] for c in track.contacts])
-    assert -tangential[:, 1] == pytest.approx(expected, abs=1e-3 * expected.max())
-    spring = np.array([c.tangential_spring[0] for c in track.contacts])
-    stiffness = law.tangential_stiffness(overlap, shear, radius)
-    assert spring[:, 1] * stiffness == pytest.approx(expected, abs=1e-3 * expected.max())
-    moves = np.diff(track.position[:, 0], axis=0)
-    mean_force = (track.force[1:, 0] + track.force[:-1, 0]) / 2
-    assert -np.sum(mean_force * moves) == pytest.approx(sign * unit, abs=0.01 * unit)
-    assert work(expected, moved) == pytest.approx(sign * unit, abs=0.01 * unit)
-
-
-@pytest.mark.long
-def test_mirror_plane_is_a_mirrored_pair() -> None:
-    """A grain rebounds from the rigid plane x = 0 as from its image, and is not braked along it."""
-    scene = table_1(f"material.grain.viscous_alpha={ALPHA}")
-    pair, _ = head_on(scene, 0.1, run=track_run)
-    mirrored, track = head_on(scene, 0.1, mirror=True, slide=0.2, run=track_run)
-    assert mirrored.restitution == pytest.approx(pair.restitution, rel=1e-3)
-    assert mirrored.overlap_max == pytest.approx(pair.overlap_max, rel=1e-3)
-    assert np.all(track.velocity[:, 0, 1:] == [0.0, 0.2])
-    assert np.all(track.spin == 0)
-    kept = mirror_slide(scene, 0.1, runs=3, run=track_run)
-    assert np.all(kept.velocity[:, 0, 2] == 0.1)
 
 
 # --- walls, each hit by one grain -----------------------------------------------------------

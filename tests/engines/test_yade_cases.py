@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import json
 import sys
 from importlib.resources import files
 from pathlib import Path
@@ -16,8 +15,7 @@ from adapters.engines.yade import DISC_CORNERS
 from tests.engines.test_yade import ALPHA, Bed
 from tests.yade_few_grains import track_run
 from tests.yade_piston import piston_forces, scene_partial
-from tests.yade_seams import SEAM_MEAN, seam_force, seam_length
-from validation.bench.few_grains import RADIUS, table_1
+from validation.bench.few_grains import table_1
 
 SCRIPTS = [path for path in files("yade_scripts").iterdir() if path.name.endswith(".py")]
 
@@ -64,39 +62,6 @@ def test_nothing_damps_but_contacts() -> None:
     assert moved == pytest.approx(np.full(300, speed * step), rel=1e-7)
 
 
-def seam_floor(text: str) -> str:
-    """Parameters whose floor is two triangles that share the edge x = 0.02."""
-    content = json.loads(text)
-    far = 0.2
-    corners = [[0.02, -far, 0.0], [0.02, far, 0.0]]
-    place = next(i for i, wall in enumerate(content["walls"]) if wall["name"] == "floor")
-    floor = {"name": "floor", "material": "wall"}
-    sides = [floor | {"vertices": [*corners, [x, 0.0, 0.0]]} for x in (-far, far)]
-    content["walls"] = [sides[0], *content["walls"][:place], *content["walls"][place + 1 :]]
-    content["walls"].append(sides[1] | {"name": "other_half"})
-    return json.dumps(content)
-
-
-@pytest.mark.parametrize("share", [0.0, 0.5, 1.5])
-@pytest.mark.long
-def test_two_triangles_push_as_derived(share: float) -> None:
-    """Within a contact radius of their seam both push: 1 + (1 - s^2/a^2)^(3/2) times a plane.
-
-    A grain held at an overlap of 1e-6 m, ``share`` contact radii a from the seam.  The second
-    triangle pushes along a line a/R = 0.025 off the normal, 3e-4 of the force: bar 1e-3.
-    """
-    scene = table_1("material.grain.restitution=1.0")
-    overlap = 1e-6
-    radius = np.sqrt(2 * RADIUS * overlap)
-    place = np.array([[0.02 + share * radius, 0.02, RADIUS - overlap]])
-    track = track_run(
-        scene, place, np.zeros((1, 3)), ["run 1"], time_step=1e-9, materials=seam_floor
-    )
-    flat = float(law.normal_force(overlap, scene.stiffness.wall, RADIUS))
-    expected = flat * float(seam_force(share * radius, radius))
-    assert track.force[0, 0, 2] == pytest.approx(expected, rel=1e-3)
-
-
 def test_a_partial_piston_pushes_once() -> None:
     """Anywhere under it by eq. 5, and no more when a grain goes from its plane to its rim and back.
 
@@ -124,21 +89,6 @@ def test_a_partial_piston_pushes_once() -> None:
     expected = np.array([[1, 1, 2, 1], [1, 1, 2, 0], [1, 1, 1, 1]])
     assert -force[..., 2] / flat == pytest.approx(expected, abs=1e-6)
     assert list(changed) == [0, 1, 1]
-
-
-def test_mean_of_the_seam_force() -> None:
-    """Over the strip of a contact radius on either side the excess is 3 pi/16 on average."""
-    distance = np.linspace(-1, 1, 200_001)
-    assert np.mean(seam_force(distance, 1.0)) - 1 == pytest.approx(SEAM_MEAN, abs=1e-5)
-
-
-def test_seams_are_the_edges_of_two_triangles() -> None:
-    """A unit square of two triangles has its diagonal; half of it where only x > 0.5 counts."""
-    corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
-    triangles = corners[[[0, 1, 2], [2, 3, 0]]]
-    assert seam_length(triangles, lambda p: p[:, 0] >= 0) == pytest.approx(np.sqrt(2))
-    half = seam_length(triangles, lambda p: p[:, 0] > 0.5)
-    assert half == pytest.approx(np.sqrt(0.5), rel=1e-3)
 
 
 @pytest.mark.long

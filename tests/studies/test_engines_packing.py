@@ -18,7 +18,7 @@ from validation.studies.engines.packing import (
     WAYS,
     Way,
     bed_scene,
-    leave_out_pull,
+    change_law,
     measure_window,
     run_way,
 )
@@ -71,8 +71,8 @@ def test_density_and_coordination_are_those_of_the_positions(tmp_path: Path) -> 
 def test_a_way_without_pull_says_so_to_every_contact(way: Way, tmp_path: Path) -> None:
     scene = way.scene(1)
     start, radius = start_of(way)
-    LammpsEngine(way.rule).write_preparation(scene, start, radius, 0.2, tmp_path)
-    leave_out_pull(way, tmp_path)
+    LammpsEngine().write_preparation(scene, start, radius, 0.2, tmp_path)
+    change_law(way, tmp_path)
     laws = [line for line in (tmp_path / "scene.in").read_text().splitlines() if "hertz" in line]
     assert len(laws) >= 4
     assert all("limit_damping" in line for line in laws)

@@ -12,7 +12,6 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import trackbed
@@ -36,7 +35,7 @@ def test_help_names_every_verb_and_exit_code(capsys: pytest.CaptureFixture[str])
         main(["--help"])
     assert stop.value.code == 0
     text = capsys.readouterr().out
-    shipped = {"doctor", "new", "run", "resume", "status", "report", "export", "fit", "relax"}
+    shipped = {"doctor", "new", "run", "resume", "status", "report", "export", "fit"}
     others = {"sweep", "qdem", "advise", "grains", "train", "rigid", "validate", "cite"}
     assert shipped | others == set(VERBS)
     for verb in VERBS:
@@ -93,7 +92,6 @@ def test_help_loads_nothing_heavy() -> None:
         (["run", "no-such-scene.toml", "--launcher", "mpirun 'x"], "--launcher"),
         *(([verb, "no-such-run"], "no-such-run") for verb in ("status", "resume", "report")),
         (["fit", "no-such-file.csv"], "no-such-file.csv"),
-        (["relax", "no-such-state.npz", "--out", "x.npz"], "no-such-state.npz"),
         (["grains", "--count", "9"], "required: --out"),
         (["grains", "--out", "no-such-folder/x.npz"], "no-such-folder"),
         (["train", "--out", "."], ". is a folder"),
@@ -303,28 +301,6 @@ def test_fit_of_too_few_cycles_names_file_and_flags(
     said = capsys.readouterr().err
     assert f"{short}: 2 cycles are too few" in said
     assert "left out" not in said
-
-
-def test_relax_writes_a_state(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """``relax`` takes 50 % of overlap out of two grains and states what the bed was and is."""
-    from adapters.files.dump import Frame, read_frames, write_dump
-
-    assert main(["new", "karrech-coarse", str(tmp_path)]) == 0
-    radius = 3.2e-3
-    columns = ("id", "x", "y", "z", "radius")
-    deep, there = tmp_path / "deep.dump", tmp_path / "relaxed.dump"
-    values = np.array([[1, 0.01, 0.01, radius, radius], [2, 0.013, 0.01, radius, radius]])
-    write_dump(deep, [Frame(0, columns, values)])
-    words = ["relax", str(deep), "--out", str(there), "--json"]
-    assert main(words) == 2
-    assert "--scene" in capsys.readouterr().err
-    assert main([*words, "--scene", str(tmp_path / "scene.toml")]) == 0
-    record = json.loads(capsys.readouterr().out)
-    assert record["estimated"]["max_penetration"] == pytest.approx(2 * radius - 0.003)
-    assert record["relaxed"]["max_penetration"] < 1e-6
-    (frame,) = read_frames(there)
-    apart = np.linalg.norm(np.diff(frame.block("x", "y", "z"), axis=0))
-    assert apart == pytest.approx(2 * radius, abs=1e-6)
 
 
 def test_cite_is_bibtex(capsys: pytest.CaptureFixture[str]) -> None:

@@ -18,16 +18,13 @@ from adapters.engines.contract import EngineStart
 from adapters.engines.decks import (
     PISTON_MARGIN,
     bound_box,
-    format_dump_states,
     format_grains_data,
     format_parameters,
-    list_wall_primitives,
     place_piston_atom,
-    scene_text,
-    wall_names,
-    write_piston_stl,
 )
 from adapters.engines.liggghts import LiggghtsEngine
+from adapters.engines.liggghts_decks import write_piston_stl
+from adapters.files.dump_reader import read_frames
 from adapters.scene.tables import Scene
 
 BASE: dict[str, Any] = {
@@ -385,8 +382,6 @@ def test_start_of_a_window(tmp_path: Path, start: str) -> None:
 
 def test_moved_dump(tmp_path: Path) -> None:
     """Step of the restart in the header, grains and piston at rest at the heights asked for."""
-    from adapters.files.dump import read_frames
-
     one = scene(tmp_path, "whole")
     commands = cycles(one, tmp_path / "window", "moved")
     (frame,) = read_frames(tmp_path / "window" / "moved.dump")
@@ -522,16 +517,6 @@ def test_piston_atom_is_in_the_box_and_in_no_ones_way(
     assert (place < high).all()
     edge = np.array([size, 2 * size if shape == "box" else size]) + PISTON_MARGIN * radius
     assert (place[:2] >= edge + radius / 2 * (1 - 1e-9)).all()
-
-
-def test_texts_agree_on_names(tmp_path: Path) -> None:
-    """Walls of scene.in, columns of dump_states.in and `wall_names` are one list."""
-    container = Container("cylinder", ("x",), radius=0.1)
-    names = wall_names(container, piston=True)
-    assert names == (*(name for name, _, _ in list_wall_primitives(container)), "piston_wall")
-    text = scene_text(container, (1e9, 0.25), (1e10, 0.3), 0.5, (0.0, 0.0))
-    assert re.findall(r"^fix (\w+) grains wall/gran", text, re.MULTILINE) == list(names[:-1])
-    assert re.findall(r"f_force_(\w+)\[1\]", format_dump_states(names)) == list(names)
 
 
 def test_grains_data_loses_nothing() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gzip
-import io
 import re
 import tracemalloc
 from pathlib import Path
@@ -14,8 +13,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from adapters.errors import DumpError, UsageError
-from adapters.files import dump_kernel, dump_reader, dump_text
-from adapters.files.dump import Frame, read_frames, write_dump
+from adapters.files import dump_kernel, dump_reader
+from adapters.files.dump import Frame, write_dump
+from adapters.files.dump_reader import read_frames
 
 # As LIGGGHTS 3.8.0 writes it: rows in no order, a blank before each line end.
 GRAINS = """\
@@ -89,10 +89,10 @@ def written(folder: Path, content: str | bytes) -> Path:
     return path
 
 
-def frames_and_error(path: Path, **options: object) -> tuple[list[Frame], DumpError | None]:
+def frames_and_error(path: Path) -> tuple[list[Frame], DumpError | None]:
     frames: list[Frame] = []
     try:
-        frames.extend(read_frames(path, **options))
+        frames.extend(read_frames(path))
     except DumpError as error:
         return frames, error
     return frames, None
@@ -178,22 +178,6 @@ def test_kernel_rounds_ties_to_even(mantissa: int, exponent: int) -> None:
     tokens = [text + mark, text[:-1] + str(int(text[-1]) - 1) + mark] if text[-1] != "0" else []
     tokens += [text + "0" * 30 + f"e-{digits_after + 30}", text + "1" + f"e-{digits_after + 1}"]
     assert np.array_equal(bits(tokens_read(tokens)), bits(np.array([float(t) for t in tokens])))
-
-
-def test_power_table_brackets_powers_of_five() -> None:
-    """The 128-bit words are 5^q to their last bit: cut off, but rounded up for -27 <= q < 0."""
-    for q, (high, low) in zip(range(-342, 309), dump_kernel._POWER.tolist(), strict=True):
-        word, power = high << 64 | low, 5 ** abs(q)
-        assert word >> 127 == 1
-        if q >= 0:  # word 2^shift <= 5^q < (word + 1) 2^shift
-            shift = power.bit_length() - 128
-            scaled = (power << -shift if shift < 0 else power >> shift, 0)
-            assert word == scaled[0]
-        else:  # word = 2^k / 5^-q
-            scale = 1 << 127 + power.bit_length()
-            assert (word - 1) * power < scale < word * power or (
-                q < -27 and word * power < scale < (word + 1) * power
-            )
 
 
 @pytest.mark.parametrize(
@@ -287,22 +271,9 @@ def test_blocks_of_text_do_not_matter(tmp_path: Path, frames: list[Frame], block
     write_dump(path, frames)
     whole = list(read_frames(path))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(dump_text, "TEXT_BLOCK", block)
+        patch.setattr(dump_reader, "TEXT_BLOCK", block)
         patch.setattr(dump_reader, "_VALUES_AT_FIRST", 1)
         assert_frames_equal(list(read_frames(path)), whole)
-
-
-def test_write_takes_a_format_for_each_column(tmp_path: Path) -> None:
-    """Formats as in dump_modify: identifiers as %d; a wrong number of formats is refused."""
-    frame = Frame(3, ("id", "x"), np.array([[4.0, 0.1]]), np.array([[0.0, 1.0]] * 3))
-    path = tmp_path / "one.dump"
-    write_dump(path, [frame], "%d %.3f")
-    assert path.read_text() == (
-        "ITEM: TIMESTEP\n3\nITEM: NUMBER OF ATOMS\n1\nITEM: BOX BOUNDS ff ff ff\n"
-        "0 1\n0 1\n0 1\nITEM: ATOMS id x\n4 0.100\n"
-    )
-    with pytest.raises(UsageError, match="3 formats"):
-        write_dump(path, [frame], "%d %g %g")
 
 
 def test_write_is_atomic(tmp_path: Path) -> None:
@@ -372,28 +343,13 @@ def test_tilted_box(tmp_path: Path) -> None:
 
 
 def test_grains_may_come_in(tmp_path: Path) -> None:
-    """An insertion: no grains, then some, then more, is no fault unless they are expected."""
+    """An insertion: no grains, then some, then more, is no fault."""
     empty = Frame(0, ("id", "x"), np.empty((0, 2)))
     some = Frame(1, ("id", "x"), np.array([[4.0, 0.0]]))
     more = Frame(2, ("id", "x"), np.array([[3.0, 0.0], [4.0, 0.0]]))
     path = tmp_path / "rain.dump"
     write_dump(path, [empty, some, more])
     assert [len(frame.values) for frame in read_frames(path)] == [0, 1, 2]
-    frames, error = frames_and_error(path, expected_ids=[4])
-    assert not frames
-    assert "no grains" in str(error)
-
-
-def test_nan_on_demand(tmp_path: Path) -> None:
-    """With allow_nan, nan and infinity of either sign come through."""
-    text = (
-        GRAINS.replace("1e-3", "-nan")
-        .replace("-1.5E+02", "-inf")
-        .replace("7 1 0.03 0", "7 1 inf NaN")
-    )
-    frame = list(read_frames(written(tmp_path, text), allow_nan=True))[1]
-    assert np.array_equal(frame.column("vx"), [-np.inf, np.nan, np.nan], equal_nan=True)
-    assert frame.column("x")[2] == np.inf
 
 
 def test_memory_is_bounded(tmp_path: Path) -> None:
@@ -406,7 +362,7 @@ def test_memory_is_bounded(tmp_path: Path) -> None:
     assert sum(len(frame.values) for frame in read_frames(path)) == 250_000
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert peak < 5 * values.nbytes + 2 * dump_text.TEXT_BLOCK
+    assert peak < 5 * values.nbytes + 2 * dump_reader.TEXT_BLOCK
 
 
 # --- faults -------------------------------------------------------------------------------------
@@ -430,48 +386,48 @@ ROW_END = GRAINS[: GRAINS.index("5 1 -0.009 1e-3")]
 
 
 @pytest.mark.parametrize(
-    ("text", "line", "step", "says", "lost", "whole"),
+    ("text", "line", "step", "says", "whole"),
     [
-        (MID_ROW, line_of(MID_ROW, "5 1 -0.009"), 10, "1 of 3 rows are whole", (2, 5), 1),
-        (ROW_END, line_of(ROW_END, "7 1 0.03 0") + 1, 10, "1 of 3 rows are whole", (2, 5), 1),
-        (GRAINS[:-1].rstrip(), 36, 20, "2 of 3 rows are whole", (7,), 2),
-        (GRAINS[: GRAINS.index("10\n") + 3], 15, 10, "inside the header", (), 1),
-        (GRAINS[: GRAINS.index("10\n") + 1], 14, None, "inside the header", (), 1),
-        (LOST, line_of(LOST, "ITEM: ATOMS", 2), 10, "grains are lost", (2,), 1),
-        (SHORT, line_of(SHORT, "ITEM: TIMESTEP", 3), 10, "says 3 rows, 2 are there", (5,), 1),
-        (EMPTIED, 33, 20, "holds no grains", (2, 5, 7), 2),
-        (GRAINS.replace("1e-3", "-nan"), 23, 10, "column vx of grain 5 is -nan", (), 1),
-        (GRAINS.replace("-0.009 1", "inf 1"), 23, 10, "column x of grain 5 is inf", (), 1),
-        (GRAINS.replace("1e-3", "1e999"), 23, 10, "column vx of grain 5 is 1e999", (), 1),
-        (GRAINS.replace("1e-3", "1.8e308"), 23, 10, "column vx of grain 5 is 1.8e308", (), 1),
-        (GRAINS.replace("1e-3", "-3.5e308"), 23, 10, "column vx of grain 5 is -3.5e308", (), 1),
-        (GRAINS.replace("x vx \n7", "x vy \n7"), 21, 10, "missing: vx; new: vy", (), 1),
-        (GRAINS.replace("x vx \n7", "vx x \n7"), 21, 10, "the columns change", (), 1),
-        (GRAINS + CONTACTS.replace("P\n0", "P\n30"), 45, 30, "to 'ENTRIES c_pl[1]", (), 3),
-        (GRAINS.replace("7 1 0.03", "5 1 0.03"), 23, 10, "there twice: 5", (), 1),
-        (GRAINS.replace("7 1 0.03 0", "7 1 0.03"), 22, 10, "3 values for 4 columns", (), 1),
-        (GRAINS.replace("7 1 0.03 0", "7 1 0.03 0 0"), 22, 10, "5 values for 4 columns", (), 1),
-        (GRAINS.replace("7 1 0.03 0", ""), 22, 10, "0 values for 4 columns", (), 1),
-        (GRAINS.replace("7 1 0.03", "7 Fe 0.03"), 22, 10, "type holds no number: 'Fe'", (), 1),
-        (GRAINS.replace("7 1 0.03", "7 1 0.03.1"), 22, 10, "x holds no number", (), 1),
-        (GRAINS.replace("7 1 0.03", "7 1_0 0.03"), 22, 10, "type holds no number", (), 1),
-        (GRAINS.replace("7 1 0.03", "7 1 0x1p3"), 22, 10, "x holds no number", (), 1),
-        (GRAINS.replace("7 1 0.03", "7 1 \x00\x07\x00"), 22, 10, "x holds binary data", (), 1),
-        (GRAINS.replace("7 1 0.03", "7.5 1 0.03"), 22, 10, "no identifier of a grain", (), 1),
-        (GRAINS.replace("7 1 0.03", "9007199254740993 1 0.03"), 22, 10, "2^53", (), 1),
-        (GRAINS.replace("P\n20", "P\n10"), 26, 10, "10 follows 10", (), 2),
-        (GRAINS.replace("P\n20", "P\n5"), 26, 5, "5 follows 10", (), 2),
-        (GRAINS.replace("P\n20", "P\n2.5"), 26, None, "a whole number should follow", (), 2),
-        (GRAINS.replace("ATOMS\n3", "ATOMS\n-3"), 9, 0, "announces -3 rows", (), 0),
-        (GRAINS.replace("ATOMS\n3", "ATOMS\n2"), 12, 0, "more rows than the 2", (), 1),
-        (GRAINS.replace("ATOMS\n3", "ATOMS\n" + "9" * 15), 13, 0, "says 9999", (), 0),
-        (GRAINS.replace("\n3\n", "\n" + "9" * 30 + "\n"), 4, 0, "a whole number should", (), 0),
-        (GRAINS.replace("-0.1 0.1", "-0.1 nan"), 6, 0, "box bounds should be", (), 0),
-        (GRAINS.replace("ITEM: ATOMS id type x vx", "ITEM: ATOMS"), 9, 0, "of 0 columns", (), 0),
-        (GRAINS.replace("ITEM: TIMESTEP\n10\n", ""), 19, None, "has no place", (), 1),
-        (GRAINS.replace("ITEM: NUMBER OF ATOMS\n3\n", "", 1), 7, 0, "has no place", (), 0),
-        (GRAINS[: GRAINS.index("-0.1")] + GRAINS, 6, 0, "box bounds should be", (), 0),
-        ("ITEM: TIMESTEP\n0\n" + GRAINS, 3, 0, "next frame begins inside the header", (), 0),
+        (MID_ROW, line_of(MID_ROW, "5 1 -0.009"), 10, "1 of 3 rows are whole", 1),
+        (ROW_END, line_of(ROW_END, "7 1 0.03 0") + 1, 10, "1 of 3 rows are whole", 1),
+        (GRAINS[:-1].rstrip(), 36, 20, "2 of 3 rows are whole", 2),
+        (GRAINS[: GRAINS.index("10\n") + 3], 15, 10, "inside the header", 1),
+        (GRAINS[: GRAINS.index("10\n") + 1], 14, None, "inside the header", 1),
+        (LOST, line_of(LOST, "ITEM: ATOMS", 2), 10, "grains are lost; lost grains: 2", 1),
+        (SHORT, line_of(SHORT, "ITEM: TIMESTEP", 3), 10, "2 are there; lost grains: 5", 1),
+        (EMPTIED, 33, 20, "holds no grains; lost grains: 2, 5, 7", 2),
+        (GRAINS.replace("1e-3", "-nan"), 23, 10, "column vx of grain 5 is -nan", 1),
+        (GRAINS.replace("-0.009 1", "inf 1"), 23, 10, "column x of grain 5 is inf", 1),
+        (GRAINS.replace("1e-3", "1e999"), 23, 10, "column vx of grain 5 is 1e999", 1),
+        (GRAINS.replace("1e-3", "1.8e308"), 23, 10, "column vx of grain 5 is 1.8e308", 1),
+        (GRAINS.replace("1e-3", "-3.5e308"), 23, 10, "column vx of grain 5 is -3.5e308", 1),
+        (GRAINS.replace("x vx \n7", "x vy \n7"), 21, 10, "missing: vx; new: vy", 1),
+        (GRAINS.replace("x vx \n7", "vx x \n7"), 21, 10, "the columns change", 1),
+        (GRAINS + CONTACTS.replace("P\n0", "P\n30"), 45, 30, "to 'ENTRIES c_pl[1]", 3),
+        (GRAINS.replace("7 1 0.03", "5 1 0.03"), 23, 10, "there twice: 5", 1),
+        (GRAINS.replace("7 1 0.03 0", "7 1 0.03"), 22, 10, "3 values for 4 columns", 1),
+        (GRAINS.replace("7 1 0.03 0", "7 1 0.03 0 0"), 22, 10, "5 values for 4 columns", 1),
+        (GRAINS.replace("7 1 0.03 0", ""), 22, 10, "0 values for 4 columns", 1),
+        (GRAINS.replace("7 1 0.03", "7 Fe 0.03"), 22, 10, "type holds no number: 'Fe'", 1),
+        (GRAINS.replace("7 1 0.03", "7 1 0.03.1"), 22, 10, "x holds no number", 1),
+        (GRAINS.replace("7 1 0.03", "7 1_0 0.03"), 22, 10, "type holds no number", 1),
+        (GRAINS.replace("7 1 0.03", "7 1 0x1p3"), 22, 10, "x holds no number", 1),
+        (GRAINS.replace("7 1 0.03", "7 1 \x00\x07\x00"), 22, 10, "x holds binary data", 1),
+        (GRAINS.replace("7 1 0.03", "7.5 1 0.03"), 22, 10, "no identifier of a grain", 1),
+        (GRAINS.replace("7 1 0.03", "9007199254740993 1 0.03"), 22, 10, "2^53", 1),
+        (GRAINS.replace("P\n20", "P\n10"), 26, 10, "10 follows 10", 2),
+        (GRAINS.replace("P\n20", "P\n5"), 26, 5, "5 follows 10", 2),
+        (GRAINS.replace("P\n20", "P\n2.5"), 26, None, "a whole number should follow", 2),
+        (GRAINS.replace("ATOMS\n3", "ATOMS\n-3"), 9, 0, "announces -3 rows", 0),
+        (GRAINS.replace("ATOMS\n3", "ATOMS\n2"), 12, 0, "more rows than the 2", 1),
+        (GRAINS.replace("ATOMS\n3", "ATOMS\n" + "9" * 15), 13, 0, "says 9999", 0),
+        (GRAINS.replace("\n3\n", "\n" + "9" * 30 + "\n"), 4, 0, "a whole number should", 0),
+        (GRAINS.replace("-0.1 0.1", "-0.1 nan"), 6, 0, "box bounds should be", 0),
+        (GRAINS.replace("ITEM: ATOMS id type x vx", "ITEM: ATOMS"), 9, 0, "of 0 columns", 0),
+        (GRAINS.replace("ITEM: TIMESTEP\n10\n", ""), 19, None, "has no place", 1),
+        (GRAINS.replace("ITEM: NUMBER OF ATOMS\n3\n", "", 1), 7, 0, "has no place", 0),
+        (GRAINS[: GRAINS.index("-0.1")] + GRAINS, 6, 0, "box bounds should be", 0),
+        ("ITEM: TIMESTEP\n0\n" + GRAINS, 3, 0, "next frame begins inside the header", 0),
     ],
 )  # fmt: skip
 def test_fault_is_named(
@@ -480,10 +436,9 @@ def test_fault_is_named(
     line: int,
     step: int | None,
     says: str,
-    lost: tuple[int, ...],
     whole: int,
 ) -> None:
-    """Each fault: file, line, time step, lost grains, a remedy; whole frames before it are kept."""
+    """Each fault: file, line, time step, lost grains, a remedy; frames before it are kept."""
     path = written(tmp_path, text)
     frames, error = frames_and_error(path)
     assert error is not None
@@ -491,10 +446,7 @@ def test_fault_is_named(
     assert error.where.startswith(f"{path}, line {line},")
     assert step is None or error.where.endswith(f"time step {step}")
     assert error.remedy
-    assert error.lost_ids == lost
-    assert all(str(grain) in error.what for grain in lost)
-    assert len(frames) == error.complete_frames == whole
-    assert error.incomplete_end == error.what.startswith("the file ends")
+    assert len(frames) == whole
 
 
 @pytest.mark.parametrize(
@@ -505,6 +457,7 @@ def test_fault_is_named(
         (b"\x00\x00\x00\x00\x01\x00", "no text dump"),
         (b"\x89PNG\r\n\x1a\n", "PNG image"),
         (gzip.compress(GRAINS.encode()), "ends in .gz"),
+        (b"PK\x03\x04\x14\x00", "npz archive"),
         (b"LIGGGHTS (Version 3.8.0)\n", "no text dump"),
         (b"ITEM: TIMESTEP\n" + b"\xff" * 3_000_000, "longer than"),
     ],
@@ -516,14 +469,6 @@ def test_other_files_are_refused(tmp_path: Path, content: bytes, says: str) -> N
     assert "line" in str(error)
 
 
-def test_archive_of_arrays_is_refused(tmp_path: Path) -> None:
-    """A numpy archive is named as such."""
-    archive = io.BytesIO()
-    np.savez(archive, x=np.zeros(3))
-    _, error = frames_and_error(written(tmp_path, archive.getvalue()))
-    assert "npz archive" in str(error)
-
-
 def test_missing_file_is_a_usage_error(tmp_path: Path) -> None:
     """A file that is not there, or a folder, is the user's mistake, told with its name."""
     for path in (tmp_path / "none.dump", tmp_path):
@@ -531,29 +476,11 @@ def test_missing_file_is_a_usage_error(tmp_path: Path) -> None:
             list(read_frames(path))
 
 
-def test_expected_grains(tmp_path: Path) -> None:
-    """A grain the caller expects is missed in the first frame already, and so is an id column."""
-    path = written(tmp_path, GRAINS)
-    assert len(list(read_frames(path, expected_ids=range(5, 6)))) == 3
-    _, error = frames_and_error(path, expected_ids=[*range(1, 100)])
-    assert error is not None
-    assert error.lost_ids == tuple(i for i in range(1, 100) if i not in (2, 5, 7))
-    assert "(96 in all)" in error.what
-    _, error = frames_and_error(written(tmp_path, GRAINS.replace("id", "mol")), expected_ids=[2])
-    assert "no column id" in str(error)
-
-
 def test_lost_grains_without_identifiers(tmp_path: Path) -> None:
     """Without an id column the loss is still seen, by number."""
     path = written(tmp_path, LOST.replace(" id ", " mol "))
     _, error = frames_and_error(path)
     assert "3 before, 2 here" in str(error)
-
-
-def test_nan_in_identifier(tmp_path: Path) -> None:
-    """An identifier is never nan, even where nan is allowed."""
-    path = written(tmp_path, GRAINS.replace("7 1 0.03", "nan 1 0.03"))
-    assert "no identifier" in str(frames_and_error(path, allow_nan=True)[1])
 
 
 def test_every_cut_is_seen(tmp_path: Path) -> None:
@@ -567,8 +494,7 @@ def test_every_cut_is_seen(tmp_path: Path) -> None:
             assert error is None
         else:
             assert error is not None
-            assert error.incomplete_end
-            assert error.complete_frames == len(frames)
+            assert "ends inside" in error.what or not frames
 
 
 def test_cut_compressed_dump(tmp_path: Path) -> None:
@@ -578,8 +504,7 @@ def test_cut_compressed_dump(tmp_path: Path) -> None:
     for cut in (*range(2, len(data), 7), len(data) - 1):
         path.write_bytes(data[:cut])
         _, error = frames_and_error(path)
-        assert error is not None
-        assert error.incomplete_end
+        assert "ends inside" in str(error) or "data end inside" in str(error)
     for content in (b"ITEM: TIMESTEP\n", data[:40] + b"damage" + data[46:]):
         path.write_bytes(content)
         assert "cannot be read" in str(frames_and_error(path)[1])
@@ -601,6 +526,6 @@ def test_any_damage_is_refused_or_read(tmp_path: Path, data: st.DataObject) -> N
     end = begin + data.draw(st.integers(0, 30))
     other = data.draw(st.one_of(st.binary(max_size=8), st.sampled_from([b"1e5", b" ", b"\n"])))
     path = written(tmp_path, good[:begin] + other + good[end:])
-    _, error = frames_and_error(path, allow_nan=data.draw(st.booleans()))
+    _, error = frames_and_error(path)
     if error is not None:
         assert re.match(re.escape(str(path)) + r", line \d+, (time step|after|before)", str(error))

@@ -11,16 +11,17 @@ from hypothesis import strategies as st
 
 from adapters.bed.state import FloatArray
 from adapters.jumps import slopes as jump_slopes
-from adapters.jumps.history import Jumped, find_asked_gain
 from adapters.jumps.rates import Stretch
 from adapters.jumps.slopes import (
     LONGEST_BLOCK,
     LONGEST_RESEATING,
+    Jumped,
     Landing,
     Slopes,
     assemble_kriging,
     cut_slope_blocks,
     estimate_slopes,
+    find_asked_gain,
     unmoved,
 )
 

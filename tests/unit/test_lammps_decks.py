@@ -12,20 +12,18 @@ from adapters.bed.state import State
 from adapters.engines.contract import EngineStart
 from adapters.engines.lammps import LammpsEngine
 from adapters.engines.lammps_decks import (
+    TANGENTIAL,
     convert_contacts,
     format_contact,
     format_dump_states,
     format_piston_wall,
     scene_text,
-    wall_names,
     write_moved,
 )
 from adapters.files.dump import Frame
 from adapters.scene.file import load_scene
 from adapters.scene.tables import Scene
 from trackbed.scenes import scene_path
-
-RULE = LammpsEngine().tangential
 
 
 def scene_of(*overrides: str) -> Scene:
@@ -43,10 +41,16 @@ def bed(count: int) -> State:
 
 def test_contact_words_hold_the_equations() -> None:
     """4/3 E*, e, 8 G*, sqrt(4 G*/E*), mu in LAMMPS' order; without friction no stiffness."""
-    words = format_contact(3e9, 1e9, 0.2, 0.5, RULE).split()
-    assert words[0::2] == ["hertz", "0.20000000000000001", RULE, "1.1547005383792515", "damping"]
+    words = format_contact(3e9, 1e9, 0.2, 0.5).split()
+    assert words[0::2] == [
+        "hertz",
+        "0.20000000000000001",
+        TANGENTIAL,
+        "1.1547005383792515",
+        "damping",
+    ]
     assert [float(w) for w in (words[1], words[5], words[7])] == [4e9, 8e9, 0.5]
-    assert "mindlin" not in format_contact(3e9, 1e9, 0.2, 0.0, RULE)
+    assert "mindlin" not in format_contact(3e9, 1e9, 0.2, 0.0)
 
 
 def test_scene_names_its_walls_only() -> None:
@@ -56,17 +60,17 @@ def test_scene_names_its_walls_only() -> None:
     E* twice that of two grains.
     """
     scene = scene_of()
-    text = scene_text(scene, RULE)
+    text = scene_text(scene)
     fixes = {line.split()[1]: line for line in text.splitlines() if line.startswith("fix")}
-    assert tuple(fixes) == wall_names(scene.container, piston=False)
-    assert RULE in fixes["floor"]
-    assert RULE in fixes["cylinder"]
-    assert RULE not in fixes["symmetry_x"]
+    assert tuple(fixes) == LammpsEngine().wall_names(scene, piston=False)
+    assert TANGENTIAL in fixes["floor"]
+    assert TANGENTIAL in fixes["cylinder"]
+    assert TANGENTIAL not in fixes["symmetry_x"]
     between = next(line for line in text.splitlines() if line.startswith("pair_coeff"))
     mirror = fixes["symmetry_x"].split()
     stiffness = float(mirror[mirror.index("hertz") + 1])
     assert stiffness == pytest.approx(2 * float(between.split()[4]))
-    none = scene_text(scene_of("material.grain.friction=0.0", "material.wall.friction=0.0"), RULE)
+    none = scene_text(scene_of("material.grain.friction=0.0", "material.wall.friction=0.0"))
     assert "mindlin" not in none
 
 
@@ -81,7 +85,7 @@ def test_walls_of_a_box_face_inwards(tmp_path: Path) -> None:
     scene = load_scene(path, ('engine.name="lammps"', "sample.symmetry=[]"))
     words = {
         line.split()[1]: line.split()[-4:-1]
-        for line in scene_text(scene, RULE).splitlines()
+        for line in scene_text(scene).splitlines()
         if line.startswith("fix")
     }
     assert words["wall_x_low"] == ["xplane", "0", "NULL"]
@@ -91,11 +95,9 @@ def test_walls_of_a_box_face_inwards(tmp_path: Path) -> None:
 
 def test_piston_is_a_plane_or_the_end_of_a_cylinder() -> None:
     """Full area: a plane that faces down; partial: a cylinder of the reach, from outside."""
-    assert "region piston plane 0.0 0.0 0.0 0.0 0.0 -1.0 move" in format_piston_wall(
-        scene_of(), RULE
-    )
+    assert "region piston plane 0.0 0.0 0.0 0.0 0.0 -1.0 move" in format_piston_wall(scene_of())
     scene = scene_of("loading.area_share=0.25")
-    text = format_piston_wall(scene, RULE)
+    text = format_piston_wall(scene)
     assert "cylinder z 0.0 0.0 0.014999999999999999 0.0 INF side out move" in text
 
 

@@ -55,21 +55,6 @@ def test_chernoff_bound_is_eq_15() -> None:
     assert chance(cycles) <= probability < chance(cycles - 1)
 
 
-def test_chernoff_bound_holds_for_independent_terms() -> None:
-    """2,000 samples of k fair coins: the mean leaves [-eps, eps] no oftener than p."""
-    k = residual.bound_cycles_for_error(-1.0, 1.0, 0.25, 0.2)
-    means = np.random.default_rng(1).choice([-1.0, 1.0], (2000, k)).mean(axis=1)
-    assert np.mean(np.abs(means) >= 0.25) <= 0.2
-
-
-def test_chernoff_bound_fails_for_correlated_terms() -> None:
-    """What the docstring warns of: terms that repeat 20 times break the bound."""
-    k = residual.bound_cycles_for_error(-1.0, 1.0, 0.25, 0.2)
-    blocks = np.random.default_rng(1).choice([-1.0, 1.0], (2000, -(-k // 20)))
-    means = np.repeat(blocks, 20, axis=1)[:, :k].mean(axis=1)
-    assert np.mean(np.abs(means) >= 0.25) > 0.4
-
-
 @pytest.mark.parametrize(
     "arguments",
     [(0.0, 1.0, 0.0, 0.1), (0.0, 1.0, -1.0, 0.1), (0.0, 1.0, np.nan, 0.1), (0.0, 1.0, 1e-200, 0.1),

@@ -13,7 +13,7 @@ from adapters.bed.state import FloatArray
 from adapters.errors import JumpRefused, NotConverged, UsageError
 from adapters.laws import Law, get_law
 from adapters.laws.fit import band as fit_band
-from adapters.laws.fit.band import draw_autoregression, estimate_fit_noise, estimate_prediction_band
+from adapters.laws.fit.band import estimate_fit_noise, estimate_prediction_band
 from adapters.laws.fit.prediction import Series, count_cycles_needed, fit_series
 from adapters.laws.fit.residual import fit_error_term
 
@@ -31,13 +31,6 @@ def correlated_noise(seed: int, count: int, correlation: float, many: int) -> Fl
     for row in range(1, count):
         noise[row] = correlation * noise[row - 1] + (1 - correlation**2) ** 0.5 * noise[row]
     return noise
-
-
-@pytest.mark.parametrize("correlation", [0.0, 0.5, 0.95])
-def test_autoregression_is_its_recursion(correlation: float) -> None:
-    """The filter gives the same series as a loop: of variance 1 from its first value on."""
-    filtered = draw_autoregression(np.random.default_rng(5), correlation, (30, 4))
-    np.testing.assert_allclose(filtered, correlated_noise(5, 30, correlation, 4), atol=1e-13)
 
 
 @pytest.mark.parametrize(
@@ -210,7 +203,7 @@ def test_last_cycle_itself_is_known() -> None:
     assert max(below, above) < 1e-3 * np.ptp(settlement)
 
 
-@pytest.mark.parametrize("name", ["hyperbolic", "shenton", "sato"])
+@pytest.mark.parametrize("name", ["hyperbolic", "power"])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_band_does_not_rise(name: str, sign: float) -> None:
     """A law that fits badly has a wide band, but on one side: a bed that settles does not rise.
@@ -233,14 +226,6 @@ def test_heave_turns_the_band_around() -> None:
     up = fit_series(Series(cycle, -settlement), LOG, 90)
     assert up.prediction == pytest.approx(-down.prediction)
     assert up.band == pytest.approx((-down.band[1], -down.band[0]))
-
-
-def test_a_settled_bed_stays_where_it_is() -> None:
-    """A constant series predicts itself, with no band, for every law with a constant."""
-    series = Series(np.arange(1.0, 11.0), np.full(10, 3.0))
-    for name in ("linear", "log", "log-linear"):
-        found = fit_series(series, get_law(name), 1e6)
-        assert [found.prediction, *found.band] == pytest.approx([3.0] * 3, abs=1e-6)
 
 
 def test_cycle_zero_is_no_obstacle() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,7 +25,7 @@ from adapters.laws.fit.candidates import (
 from adapters.laws.fit.outlook import AGREE, compare_laws, outlook
 from adapters.laws.fit.prediction import Prediction, Series, find_regime, fit_auto, fit_series
 from adapters.laws.fit.refusal import UNCERTAIN, refusals
-from adapters.laws.fit.regime import SHAKEDOWN, find_regimes, independent, select_tail
+from adapters.laws.fit.regime import SHAKEDOWN, find_regimes, independent
 from trackbed.command import main
 
 READ = np.unique(np.geomspace(1, 1000, 22).round())
@@ -115,19 +116,19 @@ def test_a_law_of_the_bank_is_continued(name: str) -> None:
     assert found.parameters[name] == pytest.approx(truth[-1], rel=0.05)
 
 
-@pytest.mark.parametrize(
-    ("name", "parameters"),
-    [("log-linear", [1.0, 1.0, 3e-4]), ("hca", [0.0, 1.0, 3e-4, 5.0])],
-)
-def test_band_holds_a_constant_rate_that_the_tail_shows(name: str, parameters: list[float]) -> None:
+@pytest.mark.parametrize("slowing", [np.log, lambda n: np.log1p(n / 5)])
+def test_band_holds_a_constant_rate_that_the_tail_shows(
+    slowing: Callable[[FloatArray], FloatArray],
+) -> None:
     """A quarter of the rate at cycle 1000 goes on for ever: 7 of 10 bands hold it at 1e4.
 
     Of 10 that hold with 90 %, fewer than 7 do with a chance of 1 %.  Without
     `fit_constant_rate_gains`
     none does.
     """
-    cycle, law, inside = np.unique(np.geomspace(1, 1000, 60).round()), get_law(name), 0
-    truth = law.value(np.array(parameters), np.append(cycle, 1e4))
+    cycle, inside = np.unique(np.geomspace(1, 1000, 60).round()), 0
+    ahead = np.append(cycle, 1e4)
+    truth = 1 + slowing(ahead) + 3e-4 * ahead
     for seed in range(10):
         noise = 0.001 * np.random.default_rng(seed).standard_normal(len(cycle))
         found = outlook(cycle, (truth[:-1] + np.ptp(truth[:-1]) * noise)[:, None], 1e4)
@@ -328,16 +329,6 @@ def test_outlook_has_no_units_and_no_direction(seed: int, unit: float, period: f
         assert other / unit == pytest.approx(one, rel=1e-3)
 
 
-def test_many_series_at_once_are_each_alone() -> None:
-    """Four series in one call: as four calls."""
-    series = np.stack([s[0] for s in SERIES.values()], axis=1)
-    together = outlook(READ, series, 3e3)
-    for column in range(4):
-        alone = outlook(READ, series[:, [column]], 3e3)
-        assert alone.regime[0].name == together.regime[column].name
-        assert alone.prediction[0] == pytest.approx(together.prediction[column], rel=1e-3)
-
-
 def test_band_grows_with_probability_and_holds_the_prediction() -> None:
     """A more certain band holds a less certain one; it starts from nothing at the last cycle."""
     read = noisy(np.log(READ), 5)[:, None]
@@ -405,11 +396,13 @@ def test_short_windows_are_no_obstacle(cycle: FloatArray) -> None:
     assert len(thinned(cycle, cycle[:, None])[0]) >= 4
 
 
-@pytest.mark.parametrize("level", [0.0, -2.0])
-def test_a_bed_at_rest_stays(level: float) -> None:
-    """All zeros, or any constant: shakedown, and a band that is closed."""
-    found = fit_auto(Series(READ, np.full(len(READ), level)), 1e9)
-    assert found.regime == "shakedown"
+@pytest.mark.parametrize("level", [0.0, -2.0, 0.003, 0.1, 100 / 3])
+@pytest.mark.parametrize("cycle", [READ, np.arange(1.0, 1001.0)], ids=["few", "every"])
+def test_a_bed_at_rest_stays(cycle: FloatArray, level: float) -> None:
+    """All zeros, or any constant, though means of it differ by round-off: shakedown, and a band
+    that is closed."""
+    found = fit_auto(Series(cycle, np.full(len(cycle), level)), 1e9)
+    assert found.regime == SHAKEDOWN
     assert [found.prediction, *found.band] == pytest.approx([level] * 3, abs=1e-9)
 
 
@@ -428,13 +421,6 @@ def test_hard_series() -> None:
     long = np.geomspace(1, 1e9, 90)
     assert fit_auto(Series(long, np.log(long)), 1e12).prediction == pytest.approx(27.6, rel=0.05)
     assert fit_auto(Series(READ, -np.log(READ)), 1e4).prediction < -7
-
-
-def test_tail_is_the_last_decade() -> None:
-    """Cycles from N_k / 10 on, six at least."""
-    assert READ[select_tail(READ)][0] >= 100 > READ[select_tail(READ).start - 1]
-    sparse = np.array([1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 1000.0])
-    assert len(sparse[select_tail(sparse)]) == 6
 
 
 def test_command_refuses_and_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -511,11 +497,3 @@ def test_a_series_that_has_failed_is_no_series_to_predict_from(law: str) -> None
         with pytest.raises(JumpRefused, match="was reached at cycle 54"):
             predicted(4e-3, to_cycle)
     assert predicted(5e-3, 100.0) == pytest.approx(1e-3 * np.log(101))
-
-
-@pytest.mark.parametrize("level", [0.0, 0.003, 0.1, 100 / 3])
-def test_equal_readings_shake_down(level: float) -> None:
-    """Whatever their level: means of equal readings differ by round-off."""
-    assert (
-        fit_auto(Series(np.arange(1.0, 1001.0), np.full(1000, level)), 1000.0).regime == SHAKEDOWN
-    )

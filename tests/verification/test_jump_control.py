@@ -18,14 +18,12 @@ from adapters.jumps.control import (
     Control,
     Decision,
     Settings,
-    begin,
     decide,
     observe,
 )
 from adapters.jumps.forecast import bound_gain_by_laws, fit_forecast, integrate_gain
 from adapters.jumps.rates import (
     Stretch,
-    bound_cycles,
     estimate_long_run_variance,
     estimate_noise,
     fit_slope_trend,
@@ -157,19 +155,12 @@ def test_slow_laws_of_a_curve() -> None:
     assert (low[0], high[0]) == (-inf, inf)
 
 
-def test_paper_bound_is_told() -> None:
-    """(b - a)^2 / (2 eps^2) ln(2 / p): range 2, eps 1, p 0.1 is 5.99, so 6; none for eps 0."""
-    gains = stretch(100, np.array([1.0, -1.0, 1.0, -1.0]))
-    assert bound_cycles(gains, 1.0, 0.9) == 6
-    assert bound_cycles(gains, 0.0, 0.9) is None
-
-
 # --- decisions ------------------------------------------------------------------------------
 
 
 def known(*stretches: Stretch, settlement: float = 4e-4) -> Control:
     """A state with these stretches computed."""
-    control = begin(stretches[0].first_cycle, settlement)
+    control = Control(stretches[0].first_cycle, settlement)
     for one in stretches:
         control = observe(replace(control, cycle=one.first_cycle), one, settlement)
     return control

@@ -16,8 +16,8 @@ from adapters.engines import fake as engine_fake
 from adapters.engines.fake import SETTLEMENT, FakeBed
 from adapters.errors import SceneError
 from adapters.files.run_folder import Outcome, RunFolder
-from adapters.jumps.history import Jumped
 from adapters.jumps.rates import Stretch
+from adapters.jumps.slopes import Jumped
 from adapters.procedure import fixed as jump_fixed
 from adapters.procedure import run as procedure
 from adapters.procedure import seating as jump_seating

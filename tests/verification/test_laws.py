@@ -31,46 +31,12 @@ def windows(fewest: int = 4) -> st.SearchStrategy[FloatArray]:
     )
 
 
-lengths = st.integers(-1000, 1000).map(lambda micrometres: 1e-6 * micrometres)
 seeds = st.integers(0, 2**32 - 1)
 
 
 def paths(seed: int, shape: tuple[int, ...]) -> FloatArray:
     """Random paths [m] of the size of a settlement."""
     return 1e-4 * np.random.default_rng(seed).standard_normal(shape).cumsum(axis=0)
-
-
-def round_off(law: Law, cycle: FloatArray, displacement: FloatArray, end: float) -> FloatArray:
-    """Bound of the round-off in the increment from the last cycle to ``end`` [m], shape (...).
-
-    The increment is sum_p w_p u_p with weights w of the law itself: summing it errs by
-    eps sum |w u|.  Cycles in another unit are rounded too, by eps each, which the columns of the
-    fit pass on amplified by their condition number and by 1 / (relative length of the window).
-    """
-    ahead = max(end, 2 * cycle[-1])  # rounding the two cycles errs by eps times the slope
-    weight = law.increment(law.fit(cycle, np.eye(len(cycle))), cycle[-1], ahead)
-    columns = np.stack([np.ones_like(cycle), np.log(cycle), cycle], axis=1)
-    columns = columns[:, : max(2, len(law.parameter_names))]
-    columns[:, 1:] -= columns[:, 1:].mean(axis=0)
-    columns /= np.linalg.norm(columns, axis=0)
-    amplified = np.linalg.cond(columns) * cycle[-1] / (cycle[-1] - cycle[0])
-    return 100 * EPS * amplified * np.tensordot(np.abs(weight), np.abs(displacement), 1)
-
-
-@every_default_law
-@given(cycle=windows(), seed=seeds, reach=st.floats(1.0, 100.0))
-@settings(max_examples=40, deadline=None)
-def test_increment_is_the_same_in_s_ms_and_cycles(
-    law: Law, cycle: FloatArray, seed: int, reach: float
-) -> None:
-    """The estimate of a jump does not depend on the unit in which cycles are counted."""
-    displacement, end = paths(seed, (len(cycle), 2)), reach * cycle[-1]
-    reference = law.increment(law.fit(cycle, displacement), cycle[-1], end)
-    bound = round_off(law, cycle, displacement, end)
-    for duration in (0.02, 20.0, 1 / 3):
-        moved = law.fit(cycle * duration, displacement)
-        estimate = law.increment(moved, cycle[-1] * duration, end * duration)
-        assert (np.abs(estimate - reference) <= bound).all()
 
 
 def test_karrech2007_depends_on_the_unit_of_time() -> None:
@@ -128,46 +94,6 @@ def test_fit_is_the_textbook_least_squares(law: Law, cycle: FloatArray, seed: in
 
 
 @every_law
-@given(cycle=windows(), parameters=st.tuples(lengths, lengths, lengths), reach=st.floats(2, 10))
-@settings(max_examples=40, deadline=None)
-def test_data_that_follow_a_law_are_recovered(
-    law: Law, cycle: FloatArray, parameters: tuple[float, ...], reach: float
-) -> None:
-    """A law fitted to its own values returns them, inside the window and beyond it."""
-    true = np.array(parameters[: len(law.parameter_names)])
-    if law.parameter_names[-1] == "b":
-        true[-1] /= cycle[-1]
-    displacement = law.value(true, cycle)
-    end = cycle[-1] * reach
-    column = {"c": 1.0, "a": np.log(end), "b": end}
-    size = sum(abs(x) * column[name] for x, name in zip(true, law.parameter_names, strict=True))
-    bound = round_off(law, cycle, np.full_like(cycle, size), end) + 100 * EPS * size
-    if law.name == "karrech2007":
-        bound *= np.linalg.cond(np.stack([np.log(cycle) / np.log(end), cycle / end], 1))
-    found = law.fit(cycle, displacement)
-    assert np.abs(law.value(found, cycle) - displacement).max() <= bound
-    true_increment = law.increment(true, cycle[-1], end)
-    assert np.abs(law.increment(found, cycle[-1], end) - true_increment) <= bound
-
-
-@every_default_law
-@given(cycle=windows(), parameters=st.tuples(lengths, lengths, lengths))
-@settings(max_examples=40, deadline=None)
-def test_increment_is_the_difference_of_values(
-    law: Law, cycle: FloatArray, parameters: tuple[float, ...]
-) -> None:
-    """increment(N, N + h) = u(N + h) - u(N), for one end and for many at once."""
-    chosen = np.array(parameters[: len(law.parameter_names)])[:, None] * np.ones(4)
-    ends = cycle[-1] * np.array([1.0, 1.5, 7.0])
-    increment = law.increment(chosen, cycle[-1], ends)
-    difference = law.value(chosen, ends) - law.value(chosen, cycle[-1])
-    size = np.abs(chosen).max() * 2 * ends[-1]
-    assert increment.shape == (3, 4)
-    assert np.abs(increment - difference).max() <= 8 * EPS * size
-    np.testing.assert_array_equal(increment[1], law.increment(chosen, cycle[-1], ends[1]))
-
-
-@every_law
 @given(cycle=windows(), seed=seeds, factor=st.floats(-5.0, 5.0))
 @settings(max_examples=40, deadline=None)
 def test_fit_is_linear_in_displacement(
@@ -180,20 +106,6 @@ def test_fit_is_linear_in_displacement(
     weight = np.abs(law.fit(cycle, np.eye(len(cycle))))
     size = np.tensordot(weight, np.abs(first) + abs(factor) * np.abs(second), 1)
     assert (np.abs(combined - separate) <= 1e4 * EPS * size).all()
-
-
-@every_default_law
-@given(cycle=windows(), seed=seeds, shift=st.floats(-1.0, 1.0))
-@settings(max_examples=40, deadline=None)
-def test_increment_does_not_see_the_origin(
-    law: Law, cycle: FloatArray, seed: int, shift: float
-) -> None:
-    """Displacements counted from anywhere give the same estimate (karrech2007 does not)."""
-    displacement, end = paths(seed, (len(cycle), 3)), 3 * cycle[-1]
-    here = law.increment(law.fit(cycle, displacement), cycle[-1], end)
-    there = law.increment(law.fit(cycle, displacement + shift), cycle[-1], end)
-    bound = round_off(law, cycle, np.abs(displacement) + abs(shift), end)
-    assert (np.abs(here - there) <= bound).all()
 
 
 @pytest.mark.parametrize("law", [*DEFAULTS, get_law("log-linear")], ids=lambda law: law.name)
@@ -264,13 +176,15 @@ def test_unknown_law_names_the_nearest(wrong: str, meant: str) -> None:
     with pytest.raises(UsageError) as raised:
         get_law("quadratic")
     assert raised.value.what == "there is no law 'quadratic'"
+    with pytest.raises(UsageError, match="use 'stretched-exponential'"):
+        get_law("sato")
 
 
 def test_hundred_thousand_grains_take_less_than_a_second() -> None:
     """Fit and increment of 1e5 grains, 3 axes, 100 cycles: under 1 s of one thread, linear laws."""
     cycle = np.arange(51.0, 151.0)
     displacement = np.random.default_rng(0).random((100, 100_000, 3))
-    for law in [*LAWS, get_law("log-linear"), get_law("shenton")]:
+    for law in [*LAWS, get_law("log-linear")]:
         seconds = []
         for _ in range(3):
             start = time.process_time()

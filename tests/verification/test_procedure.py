@@ -17,6 +17,7 @@ from adapters.engines.fake import SETTLEMENT
 from adapters.errors import NotConverged, NotCredible, UsageError
 from adapters.files.run_folder import Outcome, RunFolder
 from adapters.files.window import Window, load_window
+from adapters.moves import Jump
 from adapters.procedure import fixed as jump_fixed
 from adapters.procedure import room as jump_room
 from adapters.procedure import run as procedure
@@ -83,9 +84,9 @@ def test_healing_cycles_stay_out_of_the_fit(
     seen: list[np.ndarray] = []
     real = stages.get_move("smoothed")
 
-    def spy(cycle: np.ndarray, *rest: object) -> np.ndarray:
-        seen.append(cycle)
-        return real.displacement(cycle, *rest)  # type: ignore[arg-type]
+    def spy(jump: Jump) -> np.ndarray:
+        seen.append(jump.cycle)
+        return real.displacement(jump)
 
     monkeypatch.setattr(stages, "get_move", lambda name: replace(real, displacement=spy))
     settle(tmp_path / "run", "procedure.h=10", "procedure.total_cycles=120")

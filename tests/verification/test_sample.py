@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import pairwise, product
+from itertools import product
 from math import pi, sqrt
 
 import numpy as np
@@ -13,6 +13,7 @@ from scipy.integrate import quad
 from scipy.stats import kstest, truncnorm
 
 from adapters.bed.container import Container
+from adapters.bed.overlaps import find_pairs_within
 from adapters.bed.radii import (
     PAPER_RELATIVE_DENSITY,
     RadiusDistribution,
@@ -27,7 +28,6 @@ from adapters.bed.sample import (
     measure_bed_height,
     measure_sample,
     measure_volume_below,
-    pairs_in_contact,
     relative_density,
 )
 from adapters.bed.state import Contacts, FloatArray, State, make_no_contacts
@@ -138,7 +138,7 @@ def test_start_is_inside_and_without_overlap(
     law = RadiusDistribution("uniform", 3e-3, spread * 3e-3)
     radius = sample_radii(law, count, seed)
     position, height = draw_sample_start(radius, container, density, seed)
-    for i, j in pairs_in_contact(position, radius):
+    for i, j in find_pairs_within(position, radius, 0.0):
         raise AssertionError(f"grains {i} and {j} overlap")
     walls = container.walls(piston_height=height)
     for point, normal in zip(walls.plane_point, walls.plane_normal, strict=True):
@@ -151,20 +151,6 @@ def test_start_is_inside_and_without_overlap(
         assert filled == pytest.approx(density, rel=1e-12)
     again, _ = draw_sample_start(radius, container, density, seed)
     assert np.array_equal(position, again)
-
-
-@settings(max_examples=20, deadline=None)
-@given(count=st.integers(2, 60), seed=st.integers(0, 1000), spread=st.floats(0, 0.3))
-def test_pairs_in_contact_is_brute_force(count: int, seed: int, spread: float) -> None:
-    """The tree search finds the same pairs as comparing each grain with each."""
-    generator = np.random.default_rng(seed)
-    position = generator.uniform(0, 1, (count, 3))
-    radius = 0.15 * (1 + spread * generator.uniform(-1, 1, count))
-    distance = np.linalg.norm(position[:, None] - position[None], axis=2)
-    touching = np.argwhere(np.triu(distance <= radius[:, None] + radius, k=1))
-    found = pairs_in_contact(position, radius)
-    assert (found[:, 0] < found[:, 1]).all()
-    assert sorted(map(tuple, found.tolist())) == sorted(map(tuple, touching.tolist()))
 
 
 @pytest.mark.parametrize("container", CONTAINERS, ids=str)
@@ -211,7 +197,7 @@ def test_start_at_the_densest_a_scene_allows() -> None:
     law = RadiusDistribution("uniform", 3e-3, 0.47 * 3e-3)
     radius = sample_radii(law, 1000, 2)
     position, height = draw_sample_start(radius, QUARTER, 0.15, 2)
-    assert len(pairs_in_contact(position, radius)) == 0
+    assert len(find_pairs_within(position, radius, 0.0)) == 0
     assert relative_density(position, radius, QUARTER, height) == pytest.approx(0.15, rel=1e-12)
 
 
@@ -273,34 +259,13 @@ def test_cubic_lattice() -> None:
     assert measure_bed_height(position, radius) == pytest.approx(5.0, rel=1e-14)
 
 
-@given(
-    millimetres=st.lists(st.integers(-10, 1200), min_size=2, max_size=8, unique=True).map(sorted),
-    seed=st.integers(0, 100),
-)
-def test_layers_add_up(millimetres: list[int], seed: int) -> None:
-    """The layers of a profile hold together what the whole slab holds."""
-    edges = np.array(millimetres) / 1000
-    radius = sample_radii(TABLE_1, 50, seed)
-    position = np.random.default_rng(seed).uniform(0, 1, (50, 3))
-    layers = np.array(
-        [relative_density(position, radius, QUARTER, b, a) for a, b in pairwise(edges)]
-    )
-    whole = relative_density(position, radius, QUARTER, edges[-1], edges[0])
-    assert layers @ np.diff(edges) == pytest.approx(
-        whole * (edges[-1] - edges[0]), rel=1e-9, abs=1e-12
-    )
-
-
 # ---------------------------------------------------------------------------------- contacts
 
 
 def test_coordination_of_a_cubic_lattice() -> None:
-    """Touching spheres, 3 x 3 x 3: 2 * 54/27 = 4 with grains, plus 9 on the floor, 27 rattle-free.
-
-    Pairs are found by distance, so this also proves that touching counts as contact.
-    """
+    """Touching spheres, 3 x 3 x 3: 2 * 54/27 = 4 with grains, plus 9 on the floor, none rattles."""
     position = cubic_lattice((3, 3, 3))
-    pair = pairs_in_contact(position, np.full(27, 0.5)) + 1
+    pair = find_pairs_within(position, np.full(27, 0.5), 1e-9) + 1
     floor = np.zeros((27, 3))
     floor[position[:, 2] < 1, 2] = 2.5
     found = coordination_number(
@@ -321,13 +286,8 @@ def test_rattlers_do_not_count_as_carrying() -> None:
     assert found.with_walls == found.grains
     assert found.without_rattlers == pytest.approx((2 + 2 + 3) / 3)
     assert found.rattler_share == pytest.approx(2 / 5)
-
-
-def test_gas_has_no_contacts() -> None:
-    """Without any contact every figure is zero and every grain a rattler."""
-    found = coordination_number(make_no_contacts(), np.arange(4), {})
-    assert (found.grains, found.with_walls, found.without_rattlers) == (0, 0, 0)
-    assert found.rattler_share == 1
+    gas = coordination_number(make_no_contacts(), np.arange(4), {})
+    assert (gas.grains, gas.with_walls, gas.without_rattlers, gas.rattler_share) == (0, 0, 0, 1)
 
 
 def test_figures_of_a_stack() -> None:

@@ -122,7 +122,7 @@ def environment() -> dict[str, str]:
 
 
 def read_trackbed(path: str) -> Any:
-    from adapters.files.dump import read_frames
+    from adapters.files.dump_reader import read_frames
 
     frames = list(read_frames(path))
     return frames[-1].column("x")

@@ -15,7 +15,7 @@ from adapters.bed import contact_law
 from adapters.bed.contact_law import Collision
 from adapters.bed.state import Contacts, FloatArray
 from adapters.engines.liggghts import LiggghtsEngine
-from adapters.files.dump import read_frames
+from adapters.files.dump_reader import read_frames
 from adapters.files.window import read_contacts
 from adapters.scene.file import load_scene
 from adapters.scene.tables import Scene
@@ -168,7 +168,7 @@ def head_on(
 
     ``steps`` in the time of an undamped contact; ``slide`` [m/s] is a velocity of both along z.
     """
-    mass = contact_law.effective_mass(grain_mass(scene), grain_mass(scene))
+    mass = grain_mass(scene) / 2
     undamped = contact_law.hertz_collision(speed, scene.stiffness.grain, RADIUS / 2, mass)
     time_step = undamped.contact_time / steps
     gap = 2.25 * speed * time_step  # small, and no whole number of steps

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -11,11 +10,10 @@ import numpy as np
 
 from adapters.bed.state import FloatArray
 from adapters.engines.lammps import LammpsEngine
-from adapters.engines.lammps_decks import TANGENTIAL_RULES
-from adapters.files.dump import read_frames
+from adapters.files.dump_reader import read_frames
 from adapters.files.window import read_contacts
 from adapters.scene.tables import Scene
-from validation.bench.few_grains import RADIUS, Track, TrackRun
+from validation.bench.few_grains import RADIUS, Track
 
 DECK = """\
 variable gravity index 0.0
@@ -47,13 +45,12 @@ def track_run(
     time_step: float,
     every: int = 1,
     materials: Callable[[str], str] = str,
-    rule: str = TANGENTIAL_RULES[0],
 ) -> Track:
     """Run LAMMPS, without gravity; as `validation.bench.few_grains.track_run`.
 
-    ``rule`` is one of `TANGENTIAL_RULES`.  Raises as `LammpsEngine.run`.
+    Raises as `LammpsEngine.run`.
     """
-    engine = LammpsEngine(rule)
+    engine = LammpsEngine()
     lines = []
     for number, v in enumerate(velocity, 1):
         lines.append(f"group grain_{number} id {number}")
@@ -80,8 +77,3 @@ def track_run(
     )
     time = time_step * np.array([frame.time_step for frame in frames])
     return Track(time, position, velocity, spin, force, contacts)
-
-
-def track_run_under(rule: str) -> TrackRun:
-    """`track_run` under a tangential rule."""
-    return partial(track_run, rule=rule)

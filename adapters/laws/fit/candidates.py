@@ -37,8 +37,6 @@ class Candidates:
     """Predictions of c candidates, each a law on a window, for n series."""
 
     law: tuple[str, ...]
-    decades: tuple[float, ...]
-    """Window of each candidate; inf: all data."""
     increment: FloatArray
     """From the last cycle to the one asked for, shape (c, n)."""
     miss: FloatArray
@@ -176,7 +174,6 @@ def find_candidates(cycle: FloatArray, displacement: FloatArray, to_cycle: float
         combined = np.median(np.stack(list(past.values())), axis=0) - happened
     return Candidates(
         tuple(name for name, _ in found),
-        tuple(decades for _, decades in found),
         np.stack(list(found.values())),
         np.stack([miss[key] for key in found]),
         distance,

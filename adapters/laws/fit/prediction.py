@@ -48,17 +48,9 @@ class Prediction:
         The fields by name; of ``laws`` those of `LawSaid`.  ``failure_excluded`` only with
         ``--fail-at``, and ``count_cycles_needed``, which the command adds, only with ``--error``.
         """
-        content = {
-            "law": self.law,
-            "parameters": self.parameters,
-            "prediction": self.prediction,
-            "band": list(self.band),
-            "unit": self.unit,
-            "regime": self.regime,
-            "laws": {name: asdict(said) for name, said in self.laws.items()},
-        }
-        if self.failure_excluded is not None:
-            content["failure_excluded"] = self.failure_excluded
+        content = asdict(self) | {"band": list(self.band)}
+        if self.failure_excluded is None:
+            del content["failure_excluded"]
         return content
 
 

@@ -3,14 +3,13 @@
 from adapters.laws.form.contract import Law, check_training_data, log_ratio, outer
 from adapters.laws.form.projection import (
     Shape,
+    ShapedLaw,
     bound_time_shape,
     centred,
-    fit_two_terms,
-    orthonormal,
+    unit_vectors,
 )
-from adapters.laws.form.shaped import ShapedLaw
 
 __all__ = [
     "Law", "Shape", "ShapedLaw", "bound_time_shape", "centred", "check_training_data",
-    "fit_two_terms", "log_ratio", "orthonormal", "outer",
+    "log_ratio", "outer", "unit_vectors",
 ]  # fmt: skip

@@ -1,24 +1,23 @@
-"""Least squares for u(N) = c + sum_j a_j phi_j(N; theta): c and a_j eliminated, theta searched.
+"""Laws u(N) = c + a phi(N; theta) by least squares: c and a eliminated, theta searched.
 
-Variable projection (Golub and Pereyra 1973): for given shape parameters theta the best c and a_j
+Variable projection (Golub and Pereyra 1973): for given shape parameters theta the best c and a
 are known in closed form, so only one or two shape parameters are searched, for all series at once.
 A grid over their whole range finds the basin, damped Gauss-Newton steps the bottom of it.
-
-Amplitudes a_j of one series have one sign: a bed that settles by two mechanisms does not settle by
-the difference of two large opposite ones.  The sign itself is free, so heave is fitted as well.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from adapters.bed import FloatArray
+from adapters.laws.form.contract import check_training_data
 
-Columns = Callable[[FloatArray, FloatArray], FloatArray]
-"""phi(N, theta): N (k, 1), theta (m, g) to columns (p, k, g)."""
+Column = Callable[[FloatArray, FloatArray], FloatArray]
+"""phi(N, theta): N (k, 1), theta (m, g) to columns (k, g)."""
 
 GRID_ROWS = 200
 """Cycles that the grid looks at; it only has to find the basin."""
@@ -59,92 +58,41 @@ def bound_time_shape(cycle: FloatArray) -> Shape:
     return Shape(0.1 * first, 100 * last, 1 + round(5 * float(np.log10(1000 * last / first))))
 
 
-def orthonormal(columns: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Gram-Schmidt on one or two centred columns, shape (p, k, ...).
-
-    Returns q, as ``columns``, and r of shape (3, ...): the norm of the first, the second's part
-    along it, and the norm of the rest.  A column that vanishes, or is the other one to round-off,
-    gets q = 0 and norm 0.
-    """
-    first = columns[0]
-    norm = np.sqrt((first * first).sum(axis=0))
-    q = np.zeros_like(columns)
-    np.divide(first, norm, out=q[0], where=norm > 0)
-    triangle = np.zeros((3, *norm.shape))
-    triangle[0] = norm
-    if len(columns) == 2:
-        along = (q[0] * columns[1]).sum(axis=0)
-        rest = columns[1] - along * q[0]
-        size = np.sqrt((columns[1] ** 2).sum(axis=0))
-        left = np.sqrt((rest * rest).sum(axis=0))
-        left = np.where(left > len(first) * np.finfo(float).eps * size, left, 0.0)
-        np.divide(rest, left, out=q[1], where=left > 0)
-        triangle[1], triangle[2] = along, left
-    return q, triangle
+def centred(array: FloatArray) -> FloatArray:
+    """Less its mean along the first axis: this eliminates c."""
+    return array - array.mean(axis=0, keepdims=True)
 
 
-def amplitudes(projection: FloatArray, triangle: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Amplitudes of one sign and how much of the sum of squares they explain.
-
-    ``projection`` q_j . u, shape (p, ...); ``triangle`` of `orthonormal`.  Where the best two
-    amplitudes differ in sign, the constrained minimum has one of them zero: the better single one.
-    """
-    r00, r01, r11 = triangle
-    y0 = projection[0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        single = np.where(r00 > 0, y0 / r00, 0.0)
-        if len(projection) == 1:
-            return single[None], y0 * y0
-        y1 = projection[1]
-        second = np.where(r11 > 0, y1 / r11, 0.0)
-        first = np.where(r00 > 0, (y0 - r01 * second) / r00, 0.0)
-        size = r01 * r01 + r11 * r11
-        onto = r01 * y0 + r11 * y1
-        alone = np.where(size > 0, onto / size, 0.0)
-    both = (first * second >= 0) & (r11 > 0)
-    prefer = y0 * y0 >= onto * alone
-    a0 = np.where(both, first, np.where(prefer, single, 0.0))
-    a1 = np.where(both, second, np.where(prefer, 0.0, alone))
-    gain = np.where(both, y0 * y0 + y1 * y1, np.where(prefer, y0 * y0, onto * alone))
-    return np.stack([a0, a1]), gain
-
-
-def centred(array: FloatArray, axis: int) -> FloatArray:
-    """Less its mean along ``axis``: this eliminates c."""
-    return array - array.mean(axis=axis, keepdims=True)
-
-
-def fit_two_terms(columns: FloatArray, displacement: FloatArray) -> FloatArray:
-    """Amplitudes of one sign, shape (2, ...), for columns (2, k) without shape parameters."""
-    q, triangle = orthonormal(centred(columns, 1)[..., None])
-    flat = displacement.reshape(len(displacement), -1)
-    found, _ = amplitudes(q[..., 0] @ flat, triangle)
-    return found.reshape(2, *displacement.shape[1:])
+def unit_vectors(values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Centred columns (k, ...) over their norms (...), which come second; 0 where one vanishes."""
+    norm = np.sqrt((values * values).sum(axis=0))
+    unit = np.zeros_like(values)
+    np.divide(values, norm, out=unit, where=norm > 0)
+    return unit, norm
 
 
 def fit_shaped(
-    columns: Columns, shapes: tuple[Shape, ...], cycle: FloatArray, displacement: FloatArray
+    column: Column, shapes: tuple[Shape, ...], cycle: FloatArray, displacement: FloatArray
 ) -> FloatArray:
-    """Parameters c, a_j, theta, shape (1 + p + m, n), of n series (k, n) at cycles (k,)."""
+    """Parameters c, a, theta, shape (2 + m, n), of n series (k, n) at cycles (k,)."""
     width = max(1, CHUNK // len(cycle))
     parts = [
-        fit_chunk(columns, shapes, cycle, displacement[:, start : start + width])
+        fit_chunk(column, shapes, cycle, displacement[:, start : start + width])
         for start in range(0, displacement.shape[1], width)
     ]
     return np.concatenate(parts, axis=1)
 
 
 def fit_chunk(
-    columns: Columns, shapes: tuple[Shape, ...], cycle: FloatArray, displacement: FloatArray
+    column: Column, shapes: tuple[Shape, ...], cycle: FloatArray, displacement: FloatArray
 ) -> FloatArray:
-    target = centred(displacement, 0)
-    searched = search_grid(columns, shapes, cycle, target)
-    searched = _search(columns, shapes, cycle, target, searched)
-    theta = _theta(shapes, searched)
-    shape_values = columns(cycle[:, None], theta)
-    found, _ = _projected(shape_values, target)
-    constant = displacement.mean(axis=0) - (found * shape_values.mean(axis=1)).sum(axis=0)
-    return np.concatenate([constant[None], found, theta])
+    target = centred(displacement)
+    searched = search_grid(column, shapes, cycle, target)
+    theta = _theta(shapes, _search(column, shapes, cycle, target, searched))
+    values = column(cycle[:, None], theta)
+    found, _ = _projected(values, target)
+    constant = displacement.mean(axis=0) - found * values.mean(axis=0)
+    return np.concatenate([constant[None], found[None], theta])
 
 
 def _theta(shapes: tuple[Shape, ...], searched: FloatArray) -> FloatArray:
@@ -155,30 +103,28 @@ def _theta(shapes: tuple[Shape, ...], searched: FloatArray) -> FloatArray:
 
 
 def search_grid(
-    columns: Columns, shapes: tuple[Shape, ...], cycle: FloatArray, target: FloatArray
+    column: Column, shapes: tuple[Shape, ...], cycle: FloatArray, target: FloatArray
 ) -> FloatArray:
     """The grid point that explains most of each series, shape (m, n), as searched variables."""
     grids = np.meshgrid(*(shape.searched() for shape in shapes), indexing="ij")
     points = np.stack([grid.ravel() for grid in grids])
     rows = np.unique(np.linspace(0, len(cycle) - 1, min(len(cycle), GRID_ROWS)).astype(int))
-    few = centred(target[rows], 0)
-    values = columns(cycle[rows, None], _theta(shapes, points))
-    q, triangle = orthonormal(centred(values, 1))
-    projection = np.matmul(np.swapaxes(q, 1, 2), few)
-    _, gain = amplitudes(projection, triangle[..., None])
-    return points[:, np.argmax(gain, axis=0)]
+    unit, _ = unit_vectors(centred(column(cycle[rows, None], _theta(shapes, points))))
+    along = np.matmul(unit.T, centred(target[rows]))
+    return points[:, np.argmax(along * along, axis=0)]
 
 
 def _projected(values: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Amplitudes (p, n) and residuals (k, n) of centred series with columns (p, k, n) each."""
-    values = centred(values, 1)
-    q, triangle = orthonormal(values)
-    found, _ = amplitudes((q * target).sum(axis=1), triangle)
-    return found, target - (found[:, None] * values).sum(axis=0)
+    """Amplitudes (n,) and residuals (k, n) of centred series with columns (k, n)."""
+    values = centred(values)
+    unit, norm = unit_vectors(values)
+    along = (unit * target).sum(axis=0)
+    found = np.divide(along, norm, out=np.zeros_like(along), where=norm > 0)
+    return found, target - found * values
 
 
 def _search(
-    columns: Columns,
+    column: Column,
     shapes: tuple[Shape, ...],
     cycle: FloatArray,
     target: FloatArray,
@@ -197,7 +143,7 @@ def _search(
     times = cycle[:, None]
 
     def residual(searched: FloatArray, series: FloatArray) -> FloatArray:
-        return _projected(columns(times, _theta(shapes, searched)), series)[1]
+        return _projected(column(times, _theta(shapes, searched)), series)[1]
 
     for _ in range(STEPS):
         if not len(active):
@@ -246,3 +192,50 @@ def solve_damped_step(slopes: FloatArray, missed: FloatArray, damping: FloatArra
             (mixed * gradient[0] - diagonal[0] * gradient[1]) / determinant,
         ]
     )
+
+
+class ShapedLaw(ABC):
+    """u(N) = c + a phi(N; theta), theta of one or two shape parameters.
+
+    A law says its names and units, `column` and `shapes`; parameters are in the order c, a, theta.
+    Fits of different laws minimise the same sum of squares, so their residuals compare.
+    """
+
+    name: str
+    parameter_names: tuple[str, ...]
+    parameter_units: tuple[str, ...]
+    minimum_cycles: int
+    first_state = 0
+
+    @abstractmethod
+    def column(self, cycle: FloatArray, theta: FloatArray) -> FloatArray:
+        """phi(N; theta), shape (...), for theta of shape (m, ...); cycles broadcast."""
+
+    @abstractmethod
+    def shapes(self, cycle: FloatArray) -> tuple[Shape, ...]:
+        """Ranges of theta for data at these cycles."""
+
+    def fit(self, cycle: FloatArray, displacement: FloatArray) -> FloatArray:
+        """Parameters, shape (2 + m, ...); see `Law.fit`."""
+        cycle, displacement = check_training_data(self, cycle, displacement)
+        flat = displacement.reshape(len(cycle), -1)
+        found = fit_shaped(self.column, self.shapes(cycle), cycle, flat)
+        return found.reshape(-1, *displacement.shape[1:])
+
+    def value(self, parameters: FloatArray, cycle: float | FloatArray) -> FloatArray:
+        """u(N) [m]; see `Law.value`."""
+        return np.asarray(parameters[0] + self._trend(parameters, cycle))
+
+    def increment(
+        self, parameters: FloatArray, start: float, end: float | FloatArray
+    ) -> FloatArray:
+        """u(end) - u(start) [m]; see `Law.increment`."""
+        return self._trend(parameters, end) - self._trend(parameters, start)
+
+    def _trend(self, parameters: FloatArray, cycle: float | FloatArray) -> FloatArray:
+        """a phi: u(N) - c [m]."""
+        cycle, parameters = np.asarray(cycle, float), np.asarray(parameters, float)
+        tail = parameters.shape[1:]
+        times = cycle.reshape((*cycle.shape, *(1,) * len(tail)))
+        theta = parameters[2:].reshape((-1, *(1,) * cycle.ndim, *tail))
+        return np.asarray(parameters[1] * self.column(times, theta))

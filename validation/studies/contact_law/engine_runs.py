@@ -21,7 +21,7 @@ from adapters.bed.state import FloatArray
 from adapters.engines.lammps import LammpsEngine
 from adapters.engines.liggghts import LiggghtsEngine
 from adapters.engines.yade import PARAMETERS, YadeEngine
-from adapters.files.dump import read_frames
+from adapters.files.dump_reader import read_frames
 from adapters.scene.tables import Scene
 from validation.bench import few_grains, few_grains_lammps
 from validation.bench.few_grains_lammps import VECTORS

@@ -44,9 +44,9 @@ def pair_of(setting: Setting) -> Pair:
         radius, effective = setting.radius, mass
     else:
         wall = grain
-        radius = contact_law.equivalent_radius(setting.radius, setting.partner_radius)
+        radius = 1 / (1 / setting.radius + 1 / setting.partner_radius)
         ratio = (setting.partner_radius / setting.radius) ** 3 * setting.partner_mass_factor
-        effective = contact_law.effective_mass(mass, ratio * mass)
+        effective = 1 / (1 / mass + 1 / (ratio * mass))
     return Pair(
         contact_law.equivalent_modulus(*grain, *wall),
         contact_law.equivalent_shear_modulus(*grain, *wall),

@@ -17,7 +17,7 @@ from adapters.bed.sample import (
 )
 from adapters.bed.state import FloatArray
 from adapters.engines.contract import Engine, EngineStart, get_engine
-from adapters.engines.lammps import LammpsEngine
+from adapters.engines.lammps_decks import TANGENTIAL
 from adapters.files.window import Window, read_state, read_window
 from adapters.procedure.checks import check_state, check_window
 from adapters.scene.file import load_scene
@@ -57,7 +57,7 @@ class Way:
 
     def made(self) -> Engine:
         """The engine itself."""
-        return LammpsEngine(self.rule) if self.rule else get_engine(self.engine)
+        return get_engine(self.engine)
 
     def scene(self, seed: int) -> Scene:
         """The scene of the bed of a seed, as this way has it."""
@@ -165,14 +165,14 @@ def run_way(
         made.mkdir(parents=True)
     top = float((position[:, 2] + radius).max())
     decks = engine.write_preparation(scene, position, radius, top, settled)
-    leave_out_pull(way, settled)
+    change_law(way, settled)
     rest = engine.run(scene, "in.prepare", settled, lambda: None, decks)
     state = read_state(settled, engine.wall_names(scene, piston=False))
     check_state(scene, state)
     face = float((state.position[:, 2] + radius).max())
     begin = EngineStart(settled / "end.restart", state.time_step, 0, face, first=True)
     decks = engine.write_cycles(scene, begin, cycles, loaded)
-    leave_out_pull(way, loaded)
+    change_law(way, loaded)
     done = engine.run(scene, "in.cycles", loaded, lambda: None, decks)
     window = read_window(loaded, 0, engine.wall_names(scene, piston=True), face)
     check_window(scene, window, cycles)
@@ -181,15 +181,13 @@ def run_way(
     return figures, rest.cpu_s + done.cpu_s
 
 
-def leave_out_pull(way: Way, folder: Path) -> None:
-    """Have no contact pull, where the way says so."""
-    if way.pulls:
-        return
-    words, without = NO_PULL
-    edited = 0
-    for path in folder.glob("*.in"):
-        text = path.read_text()
-        if words in text:
-            path.write_text(text.replace(words, without))
-            edited += 1
-    assert edited, words
+def change_law(way: Way, folder: Path) -> None:
+    """Have every contact of a way's decks keep its rule, and pull or not, where the way says so."""
+    changes = [(TANGENTIAL, way.rule)] * bool(way.rule) + [NO_PULL] * (not way.pulls)
+    for old, new in changes:
+        edited = 0
+        for path in folder.glob("*.in"):
+            text = path.read_text()
+            edited += text.count(old)
+            path.write_text(text.replace(old, new))
+        assert edited, f"no contact law in {folder}"

@@ -14,12 +14,13 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from adapters.bed.sample import GRAVITY, pairs_in_contact
+from adapters.bed.overlaps import find_pairs_within
+from adapters.bed.sample import GRAVITY
 from adapters.bed.state import FloatArray, load_state
 from adapters.engines.contract import get_engine
 from adapters.engines.process import explain_engine_failure, run_process
 from adapters.errors import NotCredible
-from adapters.files.dump import read_frames
+from adapters.files.dump_reader import read_frames
 from adapters.procedure.progress import Progress
 from adapters.procedure.run import run_scene
 from adapters.scene.file import load_scene
@@ -204,4 +205,4 @@ def check_end(end: FloatArray, grains: int) -> None:
 
 def count_contacts(end: FloatArray) -> float:
     """Mean number of grains that touch a grain, from positions and radii alone."""
-    return 2 * len(pairs_in_contact(end[:, 1:4], end[:, 7])) / len(end)
+    return 2 * len(find_pairs_within(end[:, 1:4], end[:, 7], 0.0)) / len(end)

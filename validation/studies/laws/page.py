@@ -11,7 +11,7 @@ import numpy as np
 from adapters.laws.fit.refusal import UNCERTAIN
 from adapters.laws.fit.regime import WHY_NOT
 from validation.studies.laws.bars import check_bars
-from validation.studies.laws.run import LAWS, MEMBERS
+from validation.studies.laws.run import MEMBERS
 from validation.study import format_table, summarise_bars
 
 Row = dict[str, Any]
@@ -20,17 +20,18 @@ FORMS = {
     "log": ("c + a ln N", "the same with its constant; Hettler; ORE"),
     "log-linear": ("c + a ln N + b N", "Shenton, as the paper uses it"),
     "power": ("c + a N^b", "Monismith 1975; Selig and Waters"),
-    "shenton": ("c + a N^0.2 + b N", "Shenton 1985"),
+    "shenton": ("c + a N^0.2 + b N", "Shenton 1985; left trackbed"),
     "hyperbolic": ("c + a N / (tau + N)", "Kondner 1963"),
     "stretched-exponential": ("c + a (1 - exp(-(N/tau)^b))", "Philippe and Bideau 2002"),
     "inverse-log": ("c + a (1 - 1/(1 + B ln(1 + N/tau)))", "Knight et al. 1995"),
-    "sato": ("c + g (1 - exp(-N/tau)) + b N", "Sato 1995"),
-    "hca": ("c + a ln(1 + N/tau) + b N", "Niemunis et al. 2005"),
+    "sato": ("c + g (1 - exp(-N/tau)) + b N", "Sato 1995; left trackbed"),
+    "hca": ("c + a ln(1 + N/tau) + b N", "Niemunis et al. 2005; left trackbed"),
     "karrech2007": ("a ln N + b N, whole law added", "Karrech et al. 2007, eqs 17-21"),
     "polyfit": ("c + a ln N, not anchored", "rival: numpy.polyfit"),
     "curve_fit": ("a N^b, not anchored", "rival: scipy.optimize.curve_fit"),
 }
 """Equation and source of every method."""
+RIVALS = ("polyfit", "curve_fit")
 STOPPED = 0.29
 """Strain above which a test was stopped."""
 NAMES = {
@@ -149,7 +150,7 @@ def draw(rows: Sequence[Row], picture: Path) -> None:
         for name, row in {"auto": found[source]["auto"], **found[source]["methods"]}.items():
             if name == "karrech2007":  # off by orders of magnitude
                 continue
-            colour = "#c8553d" if name == "auto" else "#1b6ca8" if name in LAWS else "0.45"
+            colour = "#c8553d" if name == "auto" else "0.45" if name in RIVALS else "#1b6ca8"
             cost, error = 1e3 * row["cost_s"], 100 * row["error"]
             axis.plot([cost] * 2, [error, 100 * row["error_90"]], color=colour, lw=0.8)
             axis.plot(cost, error, "*" if name == "auto" else "o", color=colour, ms=6)
