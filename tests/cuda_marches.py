@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from qdem_fem.contact.bounds import bound_spring_network
 from qdem_fem.contact.search.pairs import Pairs
 from qdem_fem.contact.search.periodic import extents
-from qdem_fem.contact.spheres.options import pair_stiffness
+from qdem_fem.contact.spheres.options import compute_pair_stiffness
 from validation.bench.qdem_gpu.contact import STEPS, two_cubes
 from validation.bench.qdem_gpu.search import Cloud, contact_of, lists_gpu
 
@@ -54,20 +54,20 @@ class Sums(NamedTuple):
 
 def sums_gpu(given: Cloud, seed: int, first: Integers, lost: bool) -> Sums:
     """`Sums` on a GPU of bodies that begin at ``first`` (b + 1,); one vertex may be ``lost``."""
+    from qdem_fem.contact.cuda import sums
     from qdem_fem.contact.cuda.arrays import DeviceContact
-    from qdem_fem.contact.cuda.sums import find_device_extents
     from qdem_fem.kernel.cuda.step import cuda
 
     there = DeviceContact(contact_of(given, seed), given.side)
     moved = np.zeros((len(given.radius), 4))
     moved[:, :3] = given.position - given.before
     moved[len(moved) // 2, 1] += np.inf if lost else 0.0
-    position, own = cuda.to_device(given.position), np.arange(len(given.radius)) % 3 != 0
+    position = cuda.to_device(given.position)
     return Sums(
-        there.gap(position),
-        there.bound(cuda.to_device(1 + given.radius)),
-        find_device_extents(position, 1, cuda.to_device(own), cuda.to_device(first)),
-        there.positions(cuda.to_device(moved.ravel())) is not None,
+        sums.find_gap(there.on, position, there.walls),
+        sums.bound_present(there.on, there.walls, cuda.to_device(1 + given.radius)),
+        sums.find_device_extents(position, 1, cuda.to_device(first)),
+        sums.find_positions(there.on, cuda.to_device(moved.ravel())),
     )
 
 
@@ -87,30 +87,30 @@ def sums_processor(given: Cloud, seed: int, first: Integers) -> Sums:
     return Sums(
         np.concatenate(gaps).max(initial=0.0),
         bound_spring_network(
-            ends, pair_stiffness(*stiffness[ends.T]), 2 * stiffness * walls.sum(axis=0),
+            ends, compute_pair_stiffness(*stiffness[ends.T]), 2 * stiffness * walls.sum(axis=0),
             1 + given.radius,
         ),
-        extents(x[:, 1], np.arange(len(x)) % 3 != 0, first),
+        extents(x[:, 1], first),
         True,
     )  # fmt: skip
 
 
-def sums_before(values: Integers) -> Integers:
-    """`qdem_fem.kernel.cuda.sums_before` of (n,) on a GPU."""
-    from qdem_fem.kernel.cuda import scan as cuda_scan
+def sum_before(values: Integers) -> Integers:
+    """`qdem_fem.kernel.cuda.sum_before` of (n,) on a GPU."""
+    from qdem_fem.kernel.cuda import sums
     from qdem_fem.kernel.cuda.step import cuda
 
-    found: Integers = cuda_scan.sums_before(cuda.to_device(values), len(values)).copy_to_host()
+    found: Integers = sums.sum_before(cuda.to_device(values), len(values)).copy_to_host()
     return found
 
 
-def motion_summed(displacement: Floats, velocity: Floats, mass: Floats, parts: int) -> Floats:
-    """`qdem_fem.kernel.cuda.motion_summed` of fields (n, 4) by so many threads on a GPU."""
+def sum_motion(displacement: Floats, velocity: Floats, mass: Floats, parts: int) -> Floats:
+    """`qdem_fem.kernel.cuda.sum_motion` of fields (n, 4) by so many threads on a GPU."""
     from qdem_fem.kernel.cuda import sums as cuda_sums
     from qdem_fem.kernel.cuda.step import cuda
 
     with patch.object(cuda_sums, "PARTS", parts):
-        return cuda_sums.motion_summed(
+        return cuda_sums.sum_motion(
             *(cuda.to_device(array.ravel()) for array in (displacement, velocity, mass))
         )
 

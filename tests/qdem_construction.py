@@ -28,7 +28,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from qdem_fem.element.kinematics import FloatArray, IntArray, isotropic
+from qdem_fem.element.kinematics import isotropic
+from qdem_fem.files import Floats, Integers
 
 INTERFACES = (
     (0, 1, 2, 3),
@@ -45,7 +46,7 @@ is an even permutation, so that the normal of the kite run through in this order
 # --- stress of a tetrahedron: eqs 1 to 8 -------------------------------------------------------
 
 
-def edge_vectors(vertices: FloatArray) -> FloatArray:
+def edge_vectors(vertices: Floats) -> Floats:
     """Columns: the vectors from vertex 0 to the other three, (..., 4, 3) -> (..., 3, 3).
 
     Of positions [m] this is dX or dx of eq. 1, of velocities [m/s] it is dv of eq. 5.  The rows
@@ -54,12 +55,12 @@ def edge_vectors(vertices: FloatArray) -> FloatArray:
     return np.swapaxes(vertices[..., 1:, :] - vertices[..., :1, :], -1, -2)
 
 
-def deformation_gradient(reference: FloatArray, current: FloatArray) -> FloatArray:
+def deformation_gradient(reference: Floats, current: Floats) -> Floats:
     """F = dx dX^-1 [-], (..., 3, 3), from positions (..., 4, 3) [m] (eq. 1)."""
     return edge_vectors(current) @ np.linalg.inv(edge_vectors(reference))
 
 
-def strain_finger(deformation: FloatArray) -> FloatArray:
+def strain_finger(deformation: Floats) -> Floats:
     """eps = (B - I)/2 [-], (..., 3, 3), with B = F F^T (eqs 3, 4): the left Green strain.
 
     Below strains of 1e-8 the difference B - I loses its digits; `tests.qdem_reference_forces` has
@@ -68,43 +69,38 @@ def strain_finger(deformation: FloatArray) -> FloatArray:
     return (deformation @ np.swapaxes(deformation, -1, -2) - np.eye(3)) / 2
 
 
-def stress_elastic(strain: FloatArray, lame_first: ArrayLike, lame_second: ArrayLike) -> FloatArray:
+def stress_elastic(strain: Floats, lame_first: ArrayLike, lame_second: ArrayLike) -> Floats:
     """T_E = lambda_E tr(eps) I + 2 mu_E eps [Pa], (..., 3, 3) (eq. 2)."""
     return isotropic(strain, lame_first, lame_second)
 
 
-def velocity_gradient(current: FloatArray, velocity: FloatArray) -> FloatArray:
+def velocity_gradient(current: Floats, velocity: Floats) -> Floats:
     """L = dv dx^-1 [1/s], (..., 3, 3), from positions [m] and velocities [m/s] (eq. 5)."""
     return edge_vectors(velocity) @ np.linalg.inv(edge_vectors(current))
 
 
-def strain_rate(velocity_gradient: FloatArray) -> FloatArray:
+def strain_rate(velocity_gradient: Floats) -> Floats:
     """D = (L + L^T)/2 [1/s], (..., 3, 3); the spin W = L - D makes no stress (eq. 6)."""
     return (velocity_gradient + np.swapaxes(velocity_gradient, -1, -2)) / 2
 
 
 def stress_viscous(
-    strain_rate: FloatArray, viscous_first: ArrayLike, viscous_second: ArrayLike
-) -> FloatArray:
+    strain_rate: Floats, viscous_first: ArrayLike, viscous_second: ArrayLike
+) -> Floats:
     """T_D = lambda_D tr(D) I + 2 mu_D D [Pa], viscosities in Pa s, (..., 3, 3) (eq. 7)."""
     return isotropic(strain_rate, viscous_first, viscous_second)
-
-
-def stress_kelvin_voigt(elastic: FloatArray, viscous: FloatArray) -> FloatArray:
-    """T = T_E + T_D [Pa]: spring and dashpot side by side (eq. 8)."""
-    return elastic + viscous
 
 
 # --- the four cells of a tetrahedron: processes 1 to 3 -----------------------------------------
 
 
-def volume(vertices: FloatArray) -> FloatArray:
+def volume(vertices: Floats) -> Floats:
     """V = dX_1 . (dX_2 x dX_3)/6 [m^3], (...): positive for a right-handed tetrahedron."""
     first, second, third = np.moveaxis(edge_vectors(vertices), -1, 0)
     return np.asarray(np.sum(first * np.cross(second, third), axis=-1) / 6)
 
 
-def interior_triangles(vertices: FloatArray) -> FloatArray:
+def interior_triangles(vertices: Floats) -> Floats:
     """Corners [m] of the 12 triangles, (..., 6, 2, 3, 3): interface, triangle, corner, x y z.
 
     The interface of the cells of i and j, `INTERFACES`, is <ec_ij, fc_ijk, fc_ijl> (triangle 0)
@@ -124,14 +120,14 @@ def interior_triangles(vertices: FloatArray) -> FloatArray:
     return np.stack(pairs, axis=-4)
 
 
-def area_vector(triangle: FloatArray) -> FloatArray:
+def area_vector(triangle: Floats) -> Floats:
     """S n = a x b / 2 [m^2], (..., 3), of triangles with corners (..., 3, 3) [m] (eq. 9)."""
     a = triangle[..., 1, :] - triangle[..., 0, :]
     b = triangle[..., 2, :] - triangle[..., 0, :]
     return np.asarray(np.cross(a, b) / 2)
 
 
-def cell_volumes(vertices: FloatArray) -> FloatArray:
+def cell_volumes(vertices: Floats) -> Floats:
     """Volumes [m^3] of the four cells, (..., 4): a quarter of the tetrahedron's each.
 
     By the divergence theorem, V = 1/3 sum S n.(x - x_j) over the surface; the outer faces of cell
@@ -151,14 +147,12 @@ def cell_volumes(vertices: FloatArray) -> FloatArray:
 # --- from stress to forces on particles: eqs 9 to 11 --------------------------------------------
 
 
-def force_on_triangle(stress: FloatArray, area_vector: FloatArray) -> FloatArray:
+def force_on_triangle(stress: Floats, area_vector: Floats) -> Floats:
     """f = T n S = T (a x b)/2 [N], (..., 3) (eq. 9)."""
     return np.einsum("...ij,...j->...i", stress, area_vector)
 
 
-def cell_forces(
-    vertices: FloatArray, stress: FloatArray, *, as_printed: bool = False
-) -> FloatArray:
+def cell_forces(vertices: Floats, stress: Floats, *, as_printed: bool = False) -> Floats:
     """f_j: sum of the forces on the triangles of cell j [N], (..., 4, 3) (eq. 10).
 
     ``vertices`` (..., 4, 3) [m] are the current ones, ``stress`` (..., 3, 3) [Pa] is Cauchy's.
@@ -175,7 +169,7 @@ def cell_forces(
     return -forces if as_printed else forces
 
 
-def cell_forces_from_faces(vertices: FloatArray, stress: FloatArray) -> FloatArray:
+def cell_forces_from_faces(vertices: Floats, stress: Floats) -> Floats:
     """The paper's simpler alternative to eq. 10: each outer face shares its force equally [N].
 
     Shapes as `cell_forces`.  T S n with n out of the tetrahedron is what the surroundings do to
@@ -191,7 +185,7 @@ def cell_forces_from_faces(vertices: FloatArray, stress: FloatArray) -> FloatArr
     return forces
 
 
-def particle_forces(elements: IntArray, cell_forces: FloatArray, count: int) -> FloatArray:
+def particle_forces(elements: Integers, cell_forces: Floats, count: int) -> Floats:
     """p_i: sum of the forces on all cells of particle i [N], (count, 3) (eq. 11).
 
     ``elements`` (m, 4) names the particles on the vertices, ``cell_forces`` is (m, 4, 3) [N].
@@ -201,29 +195,16 @@ def particle_forces(elements: IntArray, cell_forces: FloatArray, count: int) -> 
     return forces
 
 
-def particle_masses(
-    nodes: FloatArray, elements: IntArray, density: float | FloatArray
-) -> FloatArray:
-    """A quarter of the mass of every tetrahedron around a particle [kg], (n,) (sec. 2.4).
-
-    ``nodes`` (n, 3) [m] in the reference configuration, ``elements`` (m, 4), ``density`` a float
-    or (m,) [kg/m^3].
-    """
-    masses = np.zeros(len(nodes))
-    np.add.at(masses, elements, (density * volume(nodes[elements]) / 4)[:, None])
-    return masses
-
-
 def internal_forces_constructed(
-    nodes: FloatArray,
-    elements: IntArray,
-    displacement: FloatArray,
-    velocity: FloatArray,
+    nodes: Floats,
+    elements: Integers,
+    displacement: Floats,
+    velocity: Floats,
     lame: tuple[ArrayLike, ArrayLike],
     viscous: tuple[ArrayLike, ArrayLike] = (0.0, 0.0),
     *,
     as_printed: bool = False,
-) -> FloatArray:
+) -> Floats:
     """Internal forces on all particles [N], (n, 3): the whole of section 2, eqs 1 to 11.
 
     ``nodes`` (n, 3) [m] reference positions, ``displacement`` (n, 3) [m], ``velocity`` (n, 3)
@@ -233,6 +214,6 @@ def internal_forces_constructed(
     reference, current = nodes[elements], (nodes + displacement)[elements]
     strain = strain_finger(deformation_gradient(reference, current))
     rate = strain_rate(velocity_gradient(current, velocity[elements]))
-    stress = stress_kelvin_voigt(stress_elastic(strain, *lame), stress_viscous(rate, *viscous))
+    stress = stress_elastic(strain, *lame) + stress_viscous(rate, *viscous)  # eq. 8
     forces = cell_forces(current, stress, as_printed=as_printed)
     return particle_forces(elements, forces, len(nodes))

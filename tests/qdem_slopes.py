@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 import qdem_fem as q
 from qdem_fem.mesh.generation import make_box_mesh
-from validation.bench.qdem.contact import FACES_OF, GRAVITY, SIDE, STONE
+from validation.bench.qdem.contact import GRAVITY, SIDE, STONE
 
 
 def slope_gain(
@@ -26,9 +26,7 @@ def slope_gain(
     if model == "spheres":
         contact = q.SphereContact(radius, stiffness / 9, share / 2, planes=walls)
     else:
-        contact = q.SurfaceContact(
-            stiffness / SIDE**2, share / 2, planes=walls, faces=FACES_OF[model]
-        )
+        contact = q.SurfaceContact(stiffness / SIDE**2, share / 2, planes=walls)
     body = q.Body(make_box_mesh((SIDE,) * 3, (2, 2, 2), "kuhn", (0, 0, height)), STONE, rigid=rigid)
     times = np.linspace(0, ramp, 200)
     along = GRAVITY * np.sin(alpha) * 0.5 * (1 - np.cos(np.pi * times / ramp))
@@ -66,7 +64,7 @@ def tetrahedron(model: str, friction: float) -> tuple[float, float]:
         contact: q.SphereContact | q.SurfaceContact = q.SphereContact(radius, stiffness, friction)
         lift = 2 * radius - weight / stiffness
     else:
-        contact = q.SurfaceContact(1e11, friction, faces=FACES_OF[model])
+        contact = q.SurfaceContact(1e11, friction)
         bears = area / 3 * (1 - (1 / 3) ** 50)
         lift = -weight / (0.5 * 1e11 * bears)
     plate = q.Body(

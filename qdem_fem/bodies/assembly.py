@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from qdem_fem.bodies.conditions import Conditions
+from qdem_fem.bodies.conditions import Conditions, take_out_held
 from qdem_fem.bodies.deformable import Body
 from qdem_fem.bodies.frames import BodyFrames
 from qdem_fem.element import MEASURES, Strain
-from qdem_fem.kernel.cpu import Constraints, Fields, Loads, Probes, aligned_zeros, build_layout
+from qdem_fem.files import Floats, Integers
+from qdem_fem.kernel.cpu import Constraints, Fields, Loads, Probes, build_layout, make_aligned_zeros
 from qdem_fem.kernel.cpu import step as kernel
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 THREAD_ELEMENTS = 16_384
 """Fewer elements than this for each thread lose more at barriers than they gain."""
@@ -35,6 +33,22 @@ NO_PROBES = Probes(np.zeros(0, np.int64), np.zeros((0, 0, 3)), 1, 1)
 
 EVERY = slice(None)
 """Of all nodes."""
+
+
+class Given(NamedTuple):
+    """What acts on the nodes in some steps."""
+
+    table: Floats
+    """(steps + 1, series) amplitudes at the times of the steps."""
+    loads: Loads = NO_LOADS
+    held: Constraints = NO_CONSTRAINTS
+    probes: Probes = NO_PROBES
+    gravity: Floats | None = None
+    """(steps + 1, 3) [m/s^2]; None: there is none."""
+
+
+NOTHING = Given(np.ones((2, 1)))
+"""In one step."""
 
 
 class Assembly:
@@ -109,12 +123,12 @@ class Assembly:
 
     def _state(self, inverse_mass: Floats) -> Fields:
         numbers = 4 * self.n_nodes
-        inverse = aligned_zeros(self.n_nodes, self.dtype)
+        inverse = make_aligned_zeros(self.n_nodes, self.dtype)
         inverse[:] = inverse_mass
         return Fields(
-            aligned_zeros(numbers, self.dtype),
-            aligned_zeros(numbers, self.dtype),
-            aligned_zeros(self.packed.window_count, self.dtype),
+            make_aligned_zeros(numbers, self.dtype),
+            make_aligned_zeros(numbers, self.dtype),
+            make_aligned_zeros(self.packed.window_count, self.dtype),
             inverse,
         )
 
@@ -223,93 +237,65 @@ class Assembly:
         for name, values in fields.items():
             self._write(getattr(self.state, name), values)
 
-    def window(
-        self,
-        steps: int,
-        step: float,
-        loads: Loads,
-        held: Constraints,
-        probes: Probes,
-        table: Floats,
-        gravity: Floats | None,
-        work: Floats,
-    ) -> tuple[int, float]:
-        """Compute steps; ``gravity`` (steps + 1, 3) [m/s^2].  Returns steps done, bad elements."""
+    def window(self, steps: int, step: float, given: Given, work: Floats) -> tuple[int, float]:
+        """Compute steps, and add to the ``work`` (3,) [J]; returns steps done, bad elements."""
         frames, user_node = self.frames, self.packed.node_order
         if frames is None:
-            return self.run_kernel(
-                self.state, steps, step, loads, held, probes, table, gravity, work
-            )
-        journey = frames.journey(steps, step, gravity)
-        done, bad = self.run_kernel(
-            self.state, steps, step, frames.loads_turned(loads, user_node), held, probes, table,
-            None if frames.falls else gravity, work,
-        )  # fmt: skip
-        frames.probes_world(probes, user_node, done, step, journey)
-        work[0] += frames.carried_work(loads, user_node, table[:done], step, journey)
+            return self.run_kernel(self.state, steps, step, given, work)
+        journey = frames.journey(steps, step, given.gravity)
+        seen = self._seen_from_frames(frames, given)
+        done, bad = self.run_kernel(self.state, steps, step, seen, work)
+        frames.probes_world(given.probes, user_node, done, step, journey)
+        work[0] += frames.carried_work(given.loads, user_node, given.table[:done], step, journey)
         frames.advance(done, step, journey)
         return done, bad
+
+    def _seen_from_frames(self, frames: BodyFrames, given: Given) -> Given:
+        """The same in the directions of the frames, and without what they fall by themselves."""
+        return given._replace(
+            loads=frames.loads_turned(given.loads, self.packed.node_order),
+            gravity=None if frames.falls else given.gravity,
+        )
 
     def pack_gravity(self, gravity: Floats | None) -> Any:
         """Gravity (k, 3) [m/s^2] as the kernel reads it, four numbers a step; None without."""
         if gravity is None:
             return None
-        accelerations = aligned_zeros(4 * len(gravity), self.dtype)
+        accelerations = make_aligned_zeros(4 * len(gravity), self.dtype)
         accelerations.reshape(-1, 4)[:, :3] = gravity
         return accelerations
 
     def run_kernel(
-        self,
-        state: Fields,
-        steps: int,
-        step: float,
-        loads: Loads,
-        held: Constraints,
-        probes: Probes,
-        table: Floats,
-        gravity: Floats | None,
-        work: Floats,
+        self, state: Fields, steps: int, step: float, given: Given, work: Floats
     ) -> tuple[int, float]:
         """Run the kernel on a state as it is, in the frames of the bodies."""
-        accelerations = self.pack_gravity(gravity)
         before = numba.get_num_threads()
         numba.set_num_threads(self.threads)
         try:
             done, bad = kernel.choose_window_kernel(self.threads)(
-                self.law, self.viscous, self.packed.layout, state, loads, held, probes, table,
-                accelerations, work, self.dtype.type(step), steps,
+                self.law, self.viscous, self.packed.layout, state, given.loads, given.held,
+                given.probes, given.table, self.pack_gravity(given.gravity), work,
+                self.dtype.type(step), steps,
             )  # fmt: skip
         finally:
             numba.set_num_threads(before)
         return int(done), float(bad)
 
-    def accelerations(
-        self,
-        displacement: Floats,
-        velocity: Floats,
-        loads: Loads,
-        table: Floats,
-        gravity: Floats | None,
-    ) -> Floats:
+    def accelerations(self, displacement: Floats, velocity: Floats, given: Given) -> Floats:
         """``f(u, v)/m`` [m/s^2] of all nodes, (n, 3), loads included, held or not."""
         frames = self.frames
         if frames is None:
-            return self.accelerations_own(displacement, velocity, loads, table, gravity)
+            return self.accelerations_own(displacement, velocity, given)
         own = self.accelerations_own(
-            frames.displacement_own(displacement), frames.velocity_own(velocity),
-            frames.loads_turned(loads, self.packed.node_order), table,
-            None if frames.falls else gravity,
-        )  # fmt: skip
+            frames.displacement_own(displacement),
+            frames.velocity_own(velocity),
+            self._seen_from_frames(frames, given),
+        )
         seen = frames.turned(own)
-        return seen if gravity is None or not frames.falls else seen + gravity[0]
+        return seen if given.gravity is None or not frames.falls else seen + given.gravity[0]
 
     def accelerations_own(
-        self,
-        displacement: Floats,
-        velocity: Floats,
-        loads: Loads,
-        table: Floats,
-        gravity: Floats | None,
+        self, displacement: Floats, velocity: Floats, given: Given = NOTHING
     ) -> Floats:
         """`accelerations` within the frames, by the kernel: one step of one second of a copy."""
         scratch = self.scratch
@@ -318,9 +304,7 @@ class Assembly:
         self._write(scratch.displacement, displacement)
         self._write(scratch.velocity, velocity)
         before = self._read(scratch.velocity)
-        self.run_kernel(
-            scratch, 1, 1.0, loads, NO_CONSTRAINTS, NO_PROBES, table, gravity, np.zeros(3)
-        )
+        self.run_kernel(scratch, 1, 1.0, given, np.zeros(3))
         scratch.forces[:] = 0.0
         return self._read(scratch.velocity) - before
 
@@ -339,9 +323,7 @@ class Assembly:
         work = np.zeros(3)
         for name in FIELDS:
             getattr(self.scratch, name)[:] = getattr(self.state, name)
-        self.run_kernel(
-            self.scratch, 1, 1.0, NO_LOADS, NO_CONSTRAINTS, NO_PROBES, np.ones((2, 1)), None, work
-        )
+        self.run_kernel(self.scratch, 1, 1.0, NOTHING, work)
         self.scratch.forces[:] = 0.0
         return float(work[2])
 
@@ -349,12 +331,7 @@ class Assembly:
         """``values`` (n, 3) without their parts along held components and roller normals."""
         flat = np.zeros(4 * self.n_nodes)
         flat.reshape(-1, 4)[self.place, :3] = values
-        at = held.roller_at[:, None] + np.arange(3)
-        across = np.einsum("rc,rc->r", flat[at], held.roller_normal)
-        # a node of several rollers is there several times; its normals are orthogonal
-        np.subtract.at(flat, at, across[:, None] * held.roller_normal)
-        flat[held.node_at] = 0.0
-        return flat.reshape(-1, 4)[self.place, :3]
+        return take_out_held(flat, held).reshape(-1, 4)[self.place, :3]
 
     def lists(self, conditions: Conditions, gravity: bool) -> tuple[Loads, Constraints]:
         """The kernel's lists of loads and constraints; in single precision, frames to suit."""

@@ -8,11 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from qdem_fem.files import ConditionError, Driver
+from qdem_fem.files import ConditionError, Driver, Floats, Integers
 from qdem_fem.kernel.cpu import Constraints, Loads, Packed
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 COMPONENTS = "xyz"
 PARALLEL = 1e-9
@@ -49,17 +46,6 @@ class Roller:
     normal: Floats
 
 
-@dataclass(eq=False)
-class Absorbing:
-    """Nodes of faces that absorb waves (`qdem_fem.bodies.face_tensors`)."""
-
-    nodes: Integers
-    damping: Floats
-    """C (k, 3, 3) [N s/m]"""
-    stiffness: Floats
-    """K (k, 3, 3) [N/m]; zero without a depth"""
-
-
 @dataclass
 class Conditions:
     """All conditions of a simulation, in the order in which they were given."""
@@ -67,7 +53,6 @@ class Conditions:
     loads: list[NodalLoad] = field(default_factory=list)
     held: list[Held] = field(default_factory=list)
     rollers: list[Roller] = field(default_factory=list)
-    absorbing: list[Absorbing] = field(default_factory=list)
 
     def drivers(self) -> list[Driver]:
         """What changes with time, each once, loads first."""
@@ -158,6 +143,18 @@ class Conditions:
                     nodes.append(node)
                     normals.append(kept[-1])
         return np.array(nodes, dtype=np.int64), np.array(normals).reshape(-1, 3)
+
+
+def take_out_held(flat: Floats, held: Constraints) -> Floats:
+    """A field in the kernel's order, in place without its parts along held components and normals.
+
+    A node of several rollers is there several times; its normals are orthogonal.
+    """
+    at = held.roller_at[:, None] + np.arange(3)
+    across = np.einsum("rc,rc->r", flat[at], held.roller_normal)
+    np.subtract.at(flat, at, across[:, None] * held.roller_normal)
+    flat[held.node_at] = 0.0
+    return flat
 
 
 def _joined(parts: Sequence[NDArray[np.generic]]) -> NDArray[np.int64]:

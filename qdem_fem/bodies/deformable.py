@@ -2,44 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cached_property
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from qdem_fem.bodies.rigid_mass import RigidMass, rigid_mass
+from qdem_fem.bodies.rigid_mass import RigidMass, compute_rigid_mass
 from qdem_fem.element import (
     MEASURES,
     Material,
     Strain,
-    displacement_gradient,
-    stress_cauchy,
-    von_mises,
+    compute_cauchy_stress,
+    compute_displacement_gradient,
+    compute_von_mises,
 )
-from qdem_fem.files import ConditionError, MaterialError
+from qdem_fem.files import ConditionError, Floats, Integers, MaterialError
 from qdem_fem.mesh import TetMesh, element_gradients, find_surface_faces, read_mesh
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 Rigid = bool | Literal["lumped"]
 """Whether a body is rigid, and with which inertia; `Body` says what each means."""
-
-
-class Mover(Protocol):
-    """What moves a body: it has the body's fields while it does."""
-
-    strain: Strain
-
-    def field_of(self, body: Body, name: str) -> Floats:
-        """``displacement`` [m] or ``velocity`` [m/s] of the body's nodes now, (n, 3)."""
-
-    def set_field(self, body: Body, name: str, values: Floats) -> None:
-        """Set one of them."""
-
-    def velocities(self, bodies: Sequence[Body]) -> Floats:
-        """Velocities of some bodies, one after the other [m/s], (n, 3)."""
 
 
 class Body:
@@ -79,8 +61,8 @@ class Body:
         self.material = material.per_element(len(self.mesh.elements))
         self._displacement = np.zeros_like(self.mesh.nodes)
         self._velocity = np.zeros_like(self.mesh.nodes)
-        self.mover: Mover | None = None
-        """The simulation that the body is in."""
+        self.mover: Any = None
+        """The `qdem_fem.Simulation` that the body is in, which has its fields while it is."""
 
     @property
     def nodes(self) -> Floats:
@@ -106,7 +88,7 @@ class Body:
     def rigid_mass(self) -> RigidMass:
         """Mass, centre and inertia as a rigid body."""
         mass = np.asarray(self.material.density) * self.gradients[1]
-        return rigid_mass(self.nodes, self.elements, mass, lumped=self.rigid == "lumped")
+        return compute_rigid_mass(self.nodes, self.elements, mass, lumped=self.rigid == "lumped")
 
     @property
     def displacement(self) -> Floats:
@@ -148,15 +130,17 @@ class Body:
         """Elastic Cauchy stress of the elements [Pa], (m, 3, 3) (eq. 2); zero of a rigid body."""
         if self.rigid:
             return np.zeros((len(self.elements), 3, 3))
-        gradient = displacement_gradient(self.gradients[0], self.elements, self.displacement)
-        nominal = MEASURES[self.strain].stress_nominal(
+        gradient = compute_displacement_gradient(
+            self.gradients[0], self.elements, self.displacement
+        )
+        nominal = MEASURES[self.strain].compute_nominal_stress(
             gradient, self.material.lame_first, self.material.lame_second
         )
-        return stress_cauchy(gradient, nominal, self.strain)
+        return compute_cauchy_stress(gradient, nominal, self.strain)
 
     def von_mises(self) -> Floats:
         """Von Mises stress of the elements [Pa], (m,)."""
-        return von_mises(self.stress())
+        return compute_von_mises(self.stress())
 
     def select_nodes(self, nodes: Any, where: str) -> Integers:
         """Node numbers of a selection: a mask (n,), an index or indices.

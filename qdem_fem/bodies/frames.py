@@ -17,10 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from qdem_fem.files import Floats, Integers
 from qdem_fem.kernel.cpu import Loads, Probes
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 FAR = 1 / 16
 """Displacement in the frame, over the size of an element, at which the frame is renewed.

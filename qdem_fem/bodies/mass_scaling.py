@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from qdem_fem.bodies.deformable import Body
-
-Floats = NDArray[np.float64]
+from qdem_fem.files import Floats
 
 
 def find_element_step(body: Body, part: slice = slice(None)) -> Floats:

@@ -5,12 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from qdem_fem.files import ConditionError
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from qdem_fem.files import ConditionError, Floats, Integers
 
 RIGID_TOLERANCE = 1e-9
 """Greatest departure from a rigid motion, over its size, of a field that a user gives."""
@@ -35,7 +31,7 @@ class RigidMass:
         return np.asarray((self.axes.T * self.inertia) @ self.axes)
 
 
-def rigid_mass(
+def compute_rigid_mass(
     nodes: Floats, elements: Integers, element_mass: Floats, *, lumped: bool = False
 ) -> RigidMass:
     """Mass properties of tetrahedra of uniform density each.
@@ -65,7 +61,7 @@ def rigid_mass(
     return RigidMass(mass, centre, moments, np.ascontiguousarray(axes.T))
 
 
-def cross_matrix(vector: Floats) -> Floats:
+def make_cross_matrix(vector: Floats) -> Floats:
     """``[a]`` with ``[a] b = a x b``, (..., 3, 3)."""
     x, y, z = np.moveaxis(vector, -1, 0)
     zero = np.zeros_like(x)
@@ -73,7 +69,7 @@ def cross_matrix(vector: Floats) -> Floats:
     return rows.reshape(*vector.shape[:-1], 3, 3)
 
 
-def stiffness_six(body: Integers, arm: Floats, stiffness: Floats, count: int) -> Floats:
+def make_stiffness_six(body: Integers, arm: Floats, stiffness: Floats, count: int) -> Floats:
     """``K = sum k J^T J`` of springs on rigid bodies, ``J = (1, -[r])``, (count, 6, 6).
 
     ``body`` (v,), ``arm`` (v, 3) [m]: of each spring, from its body's centre; ``stiffness`` (v,)
@@ -90,19 +86,19 @@ def stiffness_six(body: Integers, arm: Floats, stiffness: Floats, count: int) ->
         second[:, i, j] = summed(pulls[i] * arm[:, j])
     spring = np.zeros((count, 6, 6))
     spring[:, :3, :3] = total[:, None, None] * np.eye(3)
-    spring[:, 3:, :3] = cross_matrix(first)
-    spring[:, :3, 3:] = -cross_matrix(first)
+    spring[:, 3:, :3] = make_cross_matrix(first)
+    spring[:, :3, 3:] = -make_cross_matrix(first)
     spring[:, 3:, 3:] = np.trace(second, axis1=1, axis2=2)[:, None, None] * np.eye(3) - second
     return spring
 
 
-def turn_matrix(turn: Floats) -> Floats:
+def make_turn_matrix(turn: Floats) -> Floats:
     """``R - 1`` of unit quaternions (..., 4), scalar first, without cancellation, (..., 3, 3)."""
-    across = cross_matrix(turn[..., 1:])
+    across = make_cross_matrix(turn[..., 1:])
     return np.asarray(2 * (turn[..., :1, None] * across + across @ across))
 
 
-def rigid_displacement_fit(
+def fit_rigid_displacement(
     nodes: Floats, centre: Floats, displacement: Floats, where: str
 ) -> tuple[Floats, Floats]:
     """Shift of the centre (3,) [m] and unit quaternion (4,) of a displacement (n, 3) [m].
@@ -120,14 +116,14 @@ def rigid_displacement_fit(
     left[:, 2] *= np.sign(np.linalg.det(left @ right))
     x, y, z, w = Rotation.from_matrix(left @ right).as_quat(canonical=True)
     turn = np.array([w, x, y, z])
-    shift = mean + turn_matrix(turn) @ (centre - nodes.mean(axis=0))
-    rigid = shift + (nodes - centre) @ turn_matrix(turn).T
+    shift = mean + make_turn_matrix(turn) @ (centre - nodes.mean(axis=0))
+    rigid = shift + (nodes - centre) @ make_turn_matrix(turn).T
     size = max(float(np.ptp(nodes, axis=0).max()), float(abs(displacement).max()))
     _check_rigid(displacement - rigid, size, f"{where}, displacement")
     return shift, turn
 
 
-def rigid_velocity_fit(arm: Floats, velocity: Floats, where: str) -> tuple[Floats, Floats]:
+def fit_rigid_velocity(arm: Floats, velocity: Floats, where: str) -> tuple[Floats, Floats]:
     """Velocity of the centre [m/s] and angular velocity [1/s], (3,) each, of a field (n, 3).
 
     ``arm`` (n, 3) [m]: from the centre to the nodes as they are now; least squares.  Raises
@@ -136,7 +132,9 @@ def rigid_velocity_fit(arm: Floats, velocity: Floats, where: str) -> tuple[Float
     if not velocity.any():
         return np.zeros(3), np.zeros(3)
     size = float(abs(arm).max())
-    motion = np.concatenate([np.tile(np.eye(3), (len(arm), 1, 1)), -cross_matrix(arm / size)], 2)
+    motion = np.concatenate(
+        [np.tile(np.eye(3), (len(arm), 1, 1)), -make_cross_matrix(arm / size)], 2
+    )
     answer = np.linalg.lstsq(motion.reshape(-1, 6), velocity.ravel(), rcond=None)[0]
     _check_rigid(velocity - motion @ answer, float(abs(velocity).max()), f"{where}, velocity")
     return answer[:3], answer[3:] / size

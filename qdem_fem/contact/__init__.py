@@ -2,12 +2,12 @@
 
 from qdem_fem.contact.critical_step import CriticalStep, find_critical_step
 from qdem_fem.contact.sphere_state import PARTED, SphereContacts
-from qdem_fem.contact.state import Contacts, Floats
+from qdem_fem.contact.state import Contacts
 from qdem_fem.contact.surface_state import SurfaceContacts
-from qdem_fem.contact.system import System, choose_assembly
+from qdem_fem.contact.system import Motion, System, choose_assembly
 from qdem_fem.contact.window import run_window
 
 __all__ = [
-    "PARTED", "Contacts", "CriticalStep", "Floats", "SphereContacts", "SurfaceContacts", "System",
-    "choose_assembly", "find_critical_step", "run_window",
+    "PARTED", "Contacts", "CriticalStep", "Motion", "SphereContacts", "SurfaceContacts",
+    "System", "choose_assembly", "find_critical_step", "run_window",
 ]  # fmt: skip

@@ -10,6 +10,19 @@ springs, D, in place of ``(sum of k)/m``.  The Gram matrix of the springs' ends,
 J^T k^1/2``, is a sum over nodes and rigid bodies c of parts that are not negative, are at most
 ``D_c`` and are zero for the springs of others; so it is at most the diagonal matrix of the sums of
 both ends' D.
+
+`bound_allowed_contacts` holds for any contacts there may ever be, and pays for it: it gives the
+lightest vertex of all as many as the scene allows, to another as light, and adds what elements do
+to what contact does, though they do it elsewhere.  Bodies that lie together in a bed touch where
+they touch.  Until pairs are looked for again, no contact acts that is not in the list of pairs; and
+a spring of ``k_n`` along n and ``k_t < k_n`` across is at most one of ``k_n`` in all directions:
+
+    k_n n n^T + k_t (1 - n n^T) <= k_n 1,   so   K_c <= K_near
+
+for any of the listed pairs that touch, and any directions.  `find_near_step` finds the critical
+step with ``K + K_near`` as that of the elements is found, by Lanczos iterations; it holds until the
+list is renewed.  With rigid bodies, whose vertices have no mass of their own, it is that of the
+elements with `bound_spring_network` of the springs near: lower, by no iterations.
 """
 
 from __future__ import annotations
@@ -18,14 +31,14 @@ from collections.abc import Callable
 from math import inf, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from qdem_fem.contact.critical_step import find_critical_step
+from qdem_fem.contact.system import System
+from qdem_fem.files import Floats, Integers
 
 
 def find_no_rigid_bound(stiffness: Floats) -> Floats:
-    """`qdem_fem.rigid.forces.RigidBodies.frequency_bound` where there are none."""
+    """`qdem_fem.rigid.RigidBodies.frequency_bound` where there are none."""
     return np.zeros_like(stiffness)
 
 
@@ -77,3 +90,36 @@ def shorten_step_by_contact(step: float, stiffness: float, *, viscous: bool) -> 
     if not viscous:
         return 1 / sqrt(1 / step**2 + stiffness / 4)
     return 2 / (1 / step + sqrt(1 / step**2 + stiffness))
+
+
+def find_near_step(
+    run: System,
+    near: tuple[Integers, Floats, Floats],
+    nodes: Integers,
+    inverse_mass: Floats,
+    rigid: Callable[[Floats], Floats],
+    elements: float,
+) -> float:
+    """Critical step [s] for any contacts there can be before pairs are looked for again.
+
+    ``near``: ends (p, 2) and stiffness (p,) of springs between vertices, stiffness (c,) of those
+    to walls [N/m]; ``nodes`` (c,), ``inverse_mass`` (c,) [1/kg]: of the vertices; ``rigid``: as in
+    `bound_spring_network`; ``elements``: critical step of bodies that touch nothing [s].
+    """
+    ends, stiffness, wall = near
+    if run.rigid is not None:
+        bound = bound_spring_network(ends, stiffness, wall, inverse_mass, rigid)
+        return shorten_step_by_contact(elements, bound, viscous=run.viscous)
+
+    def springs(u: Floats) -> Floats:
+        """``-M^-1 K_near u`` [m/s^2], (n, 3)."""
+        moved = u[nodes]
+        pull = -wall[:, None] * moved
+        of_pairs = stiffness[:, None] * (moved[ends[:, 1]] - moved[ends[:, 0]])
+        np.add.at(pull, ends[:, 0], of_pairs)
+        np.subtract.at(pull, ends[:, 1], of_pairs)
+        change = np.zeros_like(u)
+        change[nodes] = pull * inverse_mass[:, None]
+        return change
+
+    return find_critical_step(run, springs).value

@@ -8,13 +8,12 @@ from functools import partial
 from math import inf, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
-from qdem_fem.bodies import NO_LOADS, Body, find_element_step
+from qdem_fem.bodies import Body, find_element_step
 from qdem_fem.contact.system import System
-from qdem_fem.element import displacement_gradient, elastic_energy
+from qdem_fem.element import compute_displacement_gradient, compute_elastic_energy
+from qdem_fem.files import Floats
 
-Floats = NDArray[np.float64]
 LANCZOS_TOLERANCE = 1e-3
 """Relative residual; the eigenvalue's own error is of the order of its square."""
 ROUNDS = 20
@@ -36,8 +35,6 @@ class CriticalStep:
     """Critical time step [s], on the safe side by the residual of the iteration."""
     omega: float
     """Highest angular frequency, without viscosity [rad/s]."""
-    damping_ratio: float
-    """Viscous damping of that motion, over the critical one [-]."""
     element: int
     """The element that governs it: the one with most energy in that motion; -1 where there is no
     deformable body."""
@@ -45,8 +42,6 @@ class CriticalStep:
     """The body that element is in, by whose mesh it is numbered."""
     mode: Floats
     """The governing motion, largest component 1, (n, 3)."""
-    forces_evaluated: int
-    """Force evaluations spent."""
     remark: str = ""
     """What to know of a step that one element makes much shorter than the others need."""
 
@@ -56,7 +51,7 @@ class CriticalStep:
         return "contact" if self.element < 0 else f"element {self.element} of {self.body}"
 
 
-def lagged_viscous_step(stiffness: float, damping: float) -> float:
+def find_lagged_viscous_step(stiffness: float, damping: float) -> float:
     """Stable step of one mode when the viscous force uses the velocity half a step behind [s].
 
     ``u(n+1) - 2 u(n) + u(n-1) + dt c (u(n) - u(n-1)) + dt^2 k u(n) = 0`` is stable up to
@@ -70,8 +65,8 @@ def lagged_viscous_step(stiffness: float, damping: float) -> float:
 
 def find_highest_mode(
     accelerate: Callable[[Floats, Floats], Floats], mass: Floats, *, viscous: bool, seed: int = 0
-) -> tuple[float, float, float, Floats, int]:
-    """Critical step, omega^2, c and shape of the governing motion by Lanczos iterations.
+) -> tuple[float, float, Floats]:
+    """Critical step, omega^2 and shape of the governing motion by Lanczos iterations.
 
     ``accelerate(u, v)`` (n, 3) [m/s^2]: linear in both, zero on held components; ``mass`` (n,)
     [kg].  Lanczos (ARPACK) on ``M^-1/2 (K + 2 C/dt) M^-1/2`` finds in some tens of products what
@@ -82,18 +77,15 @@ def find_highest_mode(
 
     n = len(mass)
     root = np.sqrt(np.where(mass > 0, mass, 1.0))[:, None]
-    count = 0
 
     def product(x: Floats, rate: float) -> Floats:
-        nonlocal count
-        count += 1
         u = np.ascontiguousarray(x.reshape(n, 3) / root)
         return (-accelerate(u, rate * u) * root).ravel()
 
     start = np.random.default_rng(seed).normal(size=3 * n)
     step, rate = inf, 0.0
     if not (product(start, 0.0).any() or (viscous and product(start, 1.0).any())):
-        return inf, 0.0, 0.0, np.zeros((n, 3)), count  # all is held
+        return inf, 0.0, np.zeros((n, 3))  # all is held
     for _ in range(ROUNDS):
         operator = LinearOperator((3 * n, 3 * n), matvec=partial(product, rate=rate), dtype=float)
         if 3 * n <= 24:  # too small for Lanczos
@@ -108,11 +100,11 @@ def find_highest_mode(
         damping = max(0.0, (value - stiffness) / rate) if rate > 0 else 0.0
         if rate == 0.0 and viscous:
             damping = float(vector @ (product(vector, 1.0) - product(vector, 0.0)))
-        before, step = step, lagged_viscous_step(stiffness + residual, damping)
+        before, step = step, find_lagged_viscous_step(stiffness + residual, damping)
         start, rate = vector, 2 / step if np.isfinite(step) else 0.0
         if not viscous or abs(step - before) < ROUND_TOLERANCE * step:
             break
-    return step, stiffness, damping, vector.reshape(n, 3) / root, count
+    return step, stiffness, vector.reshape(n, 3) / root
 
 
 def find_critical_step(
@@ -126,37 +118,30 @@ def find_critical_step(
     assembly, (_, held) = run.assembly, run.pack_lists()
     if not len(assembly.elements):
         still = np.zeros((assembly.n_nodes, 3))
-        return CriticalStep(inf, 0.0, 0.0, -1, run.bodies[0].name, still, 0)
+        return CriticalStep(inf, 0.0, -1, run.bodies[0].name, still)
     size = PROBE_STRAIN * max(float(np.ptp(body.nodes, axis=0).max()) for body in run.bodies)
-    nothing = np.ones((2, 1))
     follows = run.master != np.arange(len(run.master))
 
     def accelerate(u: Floats, v: Floats) -> Floats:
         u, v = u[run.master], v[run.master]
         scale = size / max(abs(u).max(), 1e-300)
         u, v = (assembly.hold(scale * field, held) for field in (u, v))
-        change = assembly.accelerations_own(u, v, NO_LOADS, nothing, None)
-        if run.absorbers is not None:
-            change = change + run.absorbers.spring_accelerations(u)
+        change = assembly.accelerations_own(u, v)
         if springs is not None:
             change = change + springs(u)
         change = assembly.hold(change, held) / scale
         change[follows] = 0.0  # no motion of their own: the operator stays symmetric
         return change
 
-    step, stiffness, damping, mode, count = find_highest_mode(
-        accelerate, assembly.mass, viscous=run.viscous
-    )
+    step, stiffness, mode = find_highest_mode(accelerate, assembly.mass, viscous=run.viscous)
     mode = mode[run.master]
     body, element = find_governing_element(run, mode)
     return CriticalStep(
         value=float(step),
         omega=float(np.sqrt(max(stiffness, 0.0))),
-        damping_ratio=damping / (2 * np.sqrt(stiffness)) if stiffness > 0 else 0.0,
         element=element,
         body=body.name,
         mode=mode / (abs(mode).max() or 1.0),
-        forces_evaluated=count,
         remark=remark_on_short_step(run, stiffness, body, element),
     )
 
@@ -190,9 +175,9 @@ def find_governing_element(run: System, mode: Floats) -> tuple[Body, int]:
             continue
         gradients, volumes = body.gradients
         moved = mode[start : start + len(body.nodes)]
-        gradient = displacement_gradient(gradients, body.elements, moved)
+        gradient = compute_displacement_gradient(gradients, body.elements, moved)
         material = body.material
-        energy = elastic_energy(
+        energy = compute_elastic_energy(
             gradient, volumes, material.lame_first, material.lame_second, "small"
         )
         found.append((float(energy.max()), body, int(np.argmax(energy))))

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from qdem_fem.contact.bounds import bound_spring_network
-from qdem_fem.contact.outside import find_outsides
 from qdem_fem.contact.search import (
     NO_IMAGE,
     Pairs,
+    PeriodicWidth,
+    check_extents,
+    check_joined,
     choose_skin,
+    extents,
     find_near_walls,
+    find_outer_nodes,
     make_pairs,
     renew_pairs,
 )
@@ -26,12 +29,13 @@ from qdem_fem.contact.spheres import (
     Planes,
     SphereContact,
     Spheres,
+    compute_pair_stiffness,
+    compute_tangential_stiffness,
     make_plane_arrays,
-    pair_stiffness,
-    tangential_stiffness,
 )
-from qdem_fem.contact.state import Contacts, ContactTouching, Floats, Integers
+from qdem_fem.contact.state import Contacts, ContactTouching
 from qdem_fem.contact.system import System
+from qdem_fem.files import Floats, Integers
 
 PARTED = 1 + 1e-9
 """By how much a list reaches farther than what has parted, for round-off."""
@@ -44,13 +48,19 @@ class SphereContacts(Contacts):
     """Spheres at the surface vertices of all bodies of a simulation, and what they remember."""
 
     kernel: Contact
+    room: float = np.inf
+    """By how much a pair's reach may be more for no body to meet its image across the width [m]."""
 
     def __init__(self, run: System, asked: SphereContact) -> None:
-        outside = [
-            replace(o, node=o.node[o.own], reference=o.reference[o.own], own=o.own[o.own])
-            for o in find_outsides(run, asked.periodic, 0.0)
-        ]
-        super().__init__(run, asked, outside)
+        outer, joined = [], []
+        for body, start in zip(run.bodies, run.first_node, strict=False):
+            master = run.master[start : start + len(body.nodes)] - start
+            nodes, slab = find_outer_nodes(body, master, asked.periodic)
+            outer.append(nodes)
+            joined.append(slab)
+        super().__init__(run, asked, outer)
+        self.slab = np.array(joined)
+        """Whether a body is one with its images across the width, (bodies,)."""
         counts = np.diff(self.first_vertex)
 
         def by_body(values: list[float]) -> Floats:
@@ -59,7 +69,7 @@ class SphereContacts(Contacts):
         normal = by_body([asked.of_body(b.name, "normal_stiffness") for b in run.bodies])
         radius = by_body([asked.of_body(b.name, "radius") for b in run.bodies])
         poisson = by_body([float(np.mean(b.material.poisson)) for b in run.bodies])
-        self.one = pair_stiffness(normal, normal.max(initial=0.0))
+        self.one = compute_pair_stiffness(normal, normal.max(initial=0.0))
         self.skin = float(SKIN_OF_SPHERES * radius.min() if asked.skin is None else asked.skin)
         free = asked.skin is None and asked.contacts != NEAR
         self.skins = (self.skin, float(radius.min()) if free else self.skin)
@@ -72,7 +82,7 @@ class SphereContacts(Contacts):
             Spheres(
                 self.reference, 4 * self.place, self.force_at,
                 np.repeat(np.arange(len(counts)), counts), radius, normal,
-                tangential_stiffness(normal, poisson),
+                compute_tangential_stiffness(normal, poisson),
             ),
             make_pairs(
                 np.zeros(size + 1, np.int64), np.zeros(0, np.int64), np.zeros((size, 0), bool),
@@ -93,7 +103,6 @@ class SphereContacts(Contacts):
         return found
 
     def forget(self) -> None:
-        """Let go of all springs."""
         self.pairs.touching[:] = 0
         self.kernel.force[:] = 0.0
         self.kernel.planes.spring[:] = 0.0
@@ -101,18 +110,37 @@ class SphereContacts(Contacts):
 
     def renew_lists(self, position: Floats) -> None:
         """Look for pairs around vertices at (c, 3) [m]; the skin follows how fast they move."""
+        self.check_images(position)
         least, most = self.skins
         room = least + self.room / 2
         self.skin = choose_skin(
             self.skin, self.lasted, self.idle(), len(self.nodes), least, min(most, room)
         )  # fmt: skip
-        self.pairs_look(position, max(self.skin, min(self.parted(position), self.deep, room)))
+        self.look_for_pairs(position, max(self.skin, min(self.parted(position), self.deep, room)))
+
+    def extents(self, position: Floats, side: PeriodicWidth) -> Floats:
+        """Extent of each body along the axis of a width [m], (bodies,)."""
+        return extents(position[:, side.number], self.first_vertex)
+
+    def check_images(self, position: Floats) -> None:
+        """Raise `ConditionError` for a body that would touch its own image across the width."""
+        if (side := self.asked.periodic) is None:
+            return
+        run = self.run
+        fixed = np.flatnonzero(run.master != np.arange(len(run.master)))
+        for b in np.unique(np.searchsorted(run.first_node, fixed, side="right") - 1):
+            if not self.slab[b]:
+                nodes = slice(*run.first_node[b : b + 2])
+                master = run.master[nodes] - run.first_node[b]
+                check_joined(run.bodies[b], master, side, self.where)
+        size = self.extents(position, side)
+        self.room = check_extents(run.bodies, size, self.slab, self.reach, side, self.where)
 
     def idle(self) -> int:
         """Pairs of the list that do not touch."""
         return len(self.pairs.second) - int(self.pairs.touching.sum())
 
-    def pairs_look(self, position: Floats, skin: float) -> None:
+    def look_for_pairs(self, position: Floats, skin: float) -> None:
         """List the pairs within ``skin`` [m] of each other at (c, 3) [m]."""
         spheres = self.kernel.spheres
         pairs = renew_pairs(
@@ -144,7 +172,6 @@ class SphereContacts(Contacts):
         return find_near_walls(position, radius, planes.point, planes.normal, skin)
 
     def describe_deepest(self) -> tuple[str, str]:
-        """The pair that overlaps most, and what to do."""
         touching, radius = self.touching(), self.kernel.spheres.radius
         worst = "a vertex is in a wall by more than its radius"
         if len(touching.overlap):
@@ -165,14 +192,13 @@ class SphereContacts(Contacts):
         return bound_spring_network(*springs, self.inverse_mass, self.bound_rigid)
 
     def find_near_springs(self) -> tuple[Integers, Floats, Floats]:
-        """`Contacts.find_near_springs`"""
         self.refresh()
         return self._springs(self._ends(every=True), np.diff(self.pairs.wall_first))
 
     def _springs(self, ends: Integers, walls: Integers) -> tuple[Integers, Floats, Floats]:
         """k_n of pairs (p, 2), and of so many walls (c,) of each vertex [N/m], behind the pairs."""
         normal = self.kernel.spheres.normal
-        stiffness = pair_stiffness(normal[ends[:, 0]], normal[ends[:, 1]])
+        stiffness = compute_pair_stiffness(normal[ends[:, 0]], normal[ends[:, 1]])
         return ends, stiffness, 2 * normal * walls
 
     def _ends(self, *, every: bool = False) -> Integers:
@@ -197,12 +223,11 @@ class SphereContacts(Contacts):
         )
 
     def energy(self) -> tuple[float, float]:
-        """Energy in the springs, and work that the sliders took since the start [J]."""
         self.refresh()
         spheres, planes = self.kernel.spheres, self.kernel.planes
         ends, touching = self._ends(), self.touching()
         normal, tangential = (
-            pair_stiffness(k[ends[:, 0]], k[ends[:, 1]])
+            compute_pair_stiffness(k[ends[:, 0]], k[ends[:, 1]])
             for k in (spheres.normal, spheres.tangential)
         )
         twice = (normal * touching.overlap**2).sum()
@@ -214,19 +239,16 @@ class SphereContacts(Contacts):
         return 0.5 * float(twice), float(self.kernel.slid.sum())
 
     def plane_force(self, number: int) -> Floats:
-        """Force of the bodies on a wall [N], (3,)."""
         self.refresh()
         return -np.asarray(self.kernel.planes.force[number].sum(axis=0))
 
     def find_touching_bodies(self) -> tuple[Integers, Integers]:
-        """`Contacts.find_touching_bodies`"""
         self.refresh()
         body = self.kernel.spheres.body
         pressed = (self.kernel.planes.force != 0).any(axis=(0, 2))
         return body[self._ends()], body[pressed]
 
     def stored(self) -> dict[str, NDArray[Any]]:
-        """Everything that the next step reads, to the bit."""
         self.refresh()
         arrays = {f"contact_{name}": getattr(self.pairs, name) for name in PAIR_ARRAYS}
         if self.asked.periodic is not None:
@@ -237,7 +259,6 @@ class SphereContacts(Contacts):
         }
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Take what `stored` gave."""
         given = {name: arrays[f"contact_{name}"].copy() for name in PAIR_ARRAYS + CONTACT_ARRAYS}
         walls = self.walls(given["start"], self.skin)
         image = NO_IMAGE if self.asked.periodic is None else arrays["contact_image"].copy()

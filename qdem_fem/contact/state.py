@@ -12,24 +12,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from qdem_fem.bodies import Given
 from qdem_fem.contact.bounds import (
     bound_allowed_contacts,
+    find_near_step,
     find_no_rigid_bound,
     shorten_step_by_contact,
 )
 from qdem_fem.contact.critical_step import CriticalStep
-from qdem_fem.contact.near import check_near, near_step
-from qdem_fem.contact.outside import Outside
-from qdem_fem.contact.search import PeriodicWidth, check_extents, check_joined, extents
 from qdem_fem.contact.spheres import LOOK_AGAIN, NEAR, TOO_DEEP, SphereContact
 from qdem_fem.contact.surface import SurfaceContact, check_inside
 from qdem_fem.contact.system import System
 from qdem_fem.contact.window import advance_contact, run_window
-from qdem_fem.files import ConditionError, ContactTooDeep, StepWarning
-from qdem_fem.kernel.cpu import Constraints, Loads, Probes
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from qdem_fem.files import ConditionError, ContactTooDeep, Floats, Integers, StepWarning, Unstable
 
 CHECKED = 64
 """Steps between two looks at whether the contacts there are allow the step: a look costs two."""
@@ -69,23 +64,18 @@ class Contacts(ABC):
     """Depth in another body beyond which a point of this one is not seen [m]."""
     reach: float
     """Way within which two vertices may be looked at as touching [m]."""
-    room: float = np.inf
-    """By how much that may be more for no body to meet its own image across the width [m]."""
 
     def __init__(
-        self, run: System, asked: SphereContact | SurfaceContact, outside: Sequence[Outside]
+        self, run: System, asked: SphereContact | SurfaceContact, outer: Sequence[Integers]
     ) -> None:
+        """``outer``: the nodes of every body that contact acts on."""
         self.run, self.asked, self.contacts = run, asked, asked.contacts
-        self.outside = outside
-        """What contact sees of every body."""
         starts = run.first_node[:-1]
-        self.nodes = np.concatenate([o.node + s for o, s in zip(outside, starts, strict=True)])
+        self.nodes = np.concatenate([own + start for own, start in zip(outer, starts, strict=True)])
         """(c,) vertices, in the numbers of all bodies"""
-        self.first_vertex = np.concatenate([[0], np.cumsum([len(o.node) for o in outside])])
+        self.first_vertex = np.concatenate([[0], np.cumsum([len(own) for own in outer])])
         """First vertex of every body, and the end, (bodies + 1,)."""
-        self.own = np.concatenate([o.own for o in outside])
-        """(c,) as in `Outside`"""
-        self.reference = np.concatenate([o.reference for o in outside])
+        self.reference = np.concatenate([body.nodes for body in run.bodies])[self.nodes]
         self.place = run.assembly.place[self.nodes]
         self.force_at = 4 * self.place + run.assembly.packed.node_window[self.place]
         inverse = np.asarray(run.assembly.state.inverse_mass, dtype=float)
@@ -171,14 +161,14 @@ class Contacts(ABC):
         """What is held has changed: find the bounds on the step again when they are needed."""
         self._allowed = self._near = None
 
-    def near_step(self, elements: float) -> float:
-        """`qdem_fem.contact.near_step` of the present list of pairs [s].
+    def find_near_step(self, elements: float) -> float:
+        """`qdem_fem.contact.find_near_step` of the present list of pairs [s].
 
         ``elements``: critical step of bodies that touch nothing [s].
         """
         self.refresh()
         if self._near is None:
-            self._near = near_step(
+            self._near = find_near_step(
                 self.run, self.find_near_springs(), self.nodes, self.inverse_mass, self.bound_rigid,
                 elements,
             )  # fmt: skip
@@ -204,7 +194,6 @@ class Contacts(ABC):
         position = self.positions()
         if position is None:
             return  # the march says what made it so
-        self.check_images(position)
         self.renew_lists(position)
         self._near = None
         self.renewals += 1
@@ -216,35 +205,14 @@ class Contacts(ABC):
         position = self.reference + displacement[4 * self.place[:, None] + np.arange(3)]
         return position if np.isfinite(position).all() else None
 
-    def extents(self, position: Floats, side: PeriodicWidth) -> Floats:
-        """Extent of each body along the axis of a width [m], (bodies,)."""
-        return extents(position[:, side.number], self.own, self.first_vertex)
-
-    def check_images(self, position: Floats) -> None:
-        """Raise `ConditionError` for a body that would touch its own image across the width."""
-        if (side := self.asked.periodic) is None:
-            return
-        run, slab = self.run, np.array([o.joined for o in self.outside])
-        fixed = np.flatnonzero(run.master != np.arange(len(run.master)))
-        for b in np.unique(np.searchsorted(run.first_node, fixed, side="right") - 1):
-            if not slab[b]:
-                nodes = slice(*run.first_node[b : b + 2])
-                master = run.master[nodes] - run.first_node[b]
-                check_joined(run.bodies[b], master, side, self.where)
-        size = self.extents(position, side)
-        self.room = check_extents(run.bodies, size, slab, self.reach, side, self.where)
-
     @property
     def where(self) -> str:
         """The time, or before the first step the key, for messages on the width."""
         return self.when if self.run.steps_done else "contact.periodic.width"
 
-    def window(
-        self, steps: int, step: float, loads: Loads, held: Constraints,
-        probes: Probes, table: Floats, gravity: Floats | None, work: Floats,
-    ) -> tuple[int, float]:  # fmt: skip
+    def window(self, steps: int, step: float, given: Given, work: Floats) -> tuple[int, float]:
         """`Assembly.window` with contact; comes back early where pairs have to be looked for."""
-        done, bad, said = self.march(steps, step, loads, held, probes, table, gravity, work)
+        done, bad, said = self.march(steps, step, given, work)
         self.lasted += done
         if said == LOOK_AGAIN:
             self.find_pairs()
@@ -254,9 +222,9 @@ class Contacts(ABC):
             self.check_deep(said)
         return done, bad
 
-    def march(self, steps: int, step: float, *given: Any) -> tuple[int, float, int]:
+    def march(self, steps: int, step: float, given: Given, work: Floats) -> tuple[int, float, int]:
         """`qdem_fem.contact.run_window` of these contacts."""
-        return run_window(self.run, self.kernel, steps, step, *given)
+        return run_window(self.run, self.kernel, steps, step, given, work)
 
     def step_contact(self, step: float) -> int:
         """Contact at the displacement as it is, to which a ``step`` [s] led; what it says."""
@@ -280,14 +248,22 @@ class Contacts(ABC):
         body = int(np.searchsorted(self.run.first_node, node, side="right")) - 1
         return f"node {node - self.run.first_node[body]} of {self.run.bodies[body].name}"
 
-    def step_check(self, step: float, elements: float, last: bool) -> None:
+    def check_step(self, step: float, elements: float, last: bool) -> None:
         """Warn where the contacts there are now make a ``step`` [s] too long.
 
         ``elements``: critical step of bodies that touch nothing [s]; ``last``: step of a march.
         Raises `Unstable` where those near now would, if the step was made for those near once.
         """
         if self.contacts == NEAR:
-            check_near(step, self.near_step(elements), self.where)
+            if step > (near := self.find_near_step(elements)):
+                raise Unstable(
+                    "vertices have come near each other whose contacts make the critical step "
+                    f"{near:.4g} s; the step is {step:.4g} s, for those that were near when the "
+                    "march began",
+                    where=self.where,
+                    remedy='begin again with a number of contacts in place of "near", or with a '
+                    "lower safety",
+                )
             return
         if not last and self.run.steps_done < self.checked + CHECKED:
             return
@@ -309,7 +285,7 @@ class Contacts(ABC):
     def critical_step(self, elements: CriticalStep) -> CriticalStep:
         """The critical step of the elements, made shorter by the contacts it allows for."""
         if self.contacts == NEAR:
-            return replace(elements, value=min(elements.value, self.near_step(elements.value)))
+            return replace(elements, value=min(elements.value, self.find_near_step(elements.value)))
         value = shorten_step_by_contact(elements.value, self.allowed, viscous=self.run.viscous)
         remark = elements.remark
         if isfinite(elements.value) and value < elements.value * SHORTER:

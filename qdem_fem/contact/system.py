@@ -7,22 +7,18 @@ step.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import nan
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from qdem_fem.bodies import Assembly, Body, Conditions, Motion, find_mass_scaling_factor
+from qdem_fem.bodies import Assembly, Body, Conditions, find_mass_scaling_factor
 from qdem_fem.element import Strain
-from qdem_fem.files import Driver
+from qdem_fem.files import Driver, Floats
 from qdem_fem.kernel.cpu import Constraints, Loads
 
 if TYPE_CHECKING:
-    from qdem_fem.bodies import Absorbers
     from qdem_fem.rigid import RigidBodies
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 def choose_assembly(device: str) -> type[Assembly]:
@@ -33,6 +29,30 @@ def choose_assembly(device: str) -> type[Assembly]:
 
     require_gpu()
     return CudaAssembly
+
+
+@dataclass
+class Motion:
+    """The state of a march beside its fields: what a checkpoint keeps with them."""
+
+    steps_done: int = 0
+    step: float | None = None
+    """Time step that the march began with [s]; None before."""
+    behind: bool = False
+    """True while velocities are half a step behind; False: they are at the time itself."""
+    work: Floats = field(default_factory=lambda: np.zeros(3))
+    """Work of the loads and of prescribed motion, and what viscosity took, since the start [J]."""
+    gravity_work: float = 0.0
+    """Work of gravity since the start [J]."""
+    displacement_set: bool = False
+    """Whether the user set a displacement since the last step."""
+    put_in: float = nan
+    """Energy of the state that the user set [J]; NaN: not known yet."""
+
+    @property
+    def time(self) -> float:
+        """Time reached [s]."""
+        return self.steps_done * (self.step or 0.0)
 
 
 @dataclass(eq=False)
@@ -60,7 +80,6 @@ class System:
         self.viscous = any(b.material.is_viscous for b in self.bodies if not b.rigid)
         self._assembly: Assembly | None = None
         self._rigid: RigidBodies | None = None
-        self._absorbers: Absorbers | None = None
         self._lists: tuple[Loads, Constraints] | None = None
 
     @property
@@ -99,16 +118,6 @@ class System:
         """The rigid bodies; None where there are none."""
         return self._rigid if self.assembly is not None else None
 
-    @property
-    def absorbers(self) -> Absorbers | None:
-        """Dashpots and springs of absorbing faces; None where there are none."""
-        if self._absorbers is None and self.conditions.absorbing:
-            from qdem_fem.bodies import Absorbers
-
-            held = self.pack_lists()[1]
-            self._absorbers = Absorbers(self.assembly, held, self.conditions.absorbing)
-        return self._absorbers
-
     def pack_lists(self) -> tuple[Loads, Constraints]:
         """The kernel's lists of the present conditions."""
         if self._lists is None:
@@ -123,4 +132,4 @@ class System:
 
     def note_conditions_changed(self, ties: bool) -> None:
         """Make the lists again when next needed; ``ties``: what is held has changed, too."""
-        self._lists = self._absorbers = None
+        self._lists = None

@@ -1,11 +1,20 @@
 """The tetrahedron: kinematics, strain measures (one file each), stress, material."""
 
 from qdem_fem.element import stress
-from qdem_fem.element.kinematics import displacement_gradient, volume_change, von_mises
+from qdem_fem.element.kinematics import (
+    compute_displacement_gradient,
+    compute_volume_change,
+    compute_von_mises,
+)
 from qdem_fem.element.material import Material
-from qdem_fem.element.strain_measures import MEASURES, Strain, elastic_energy, stress_cauchy
+from qdem_fem.element.strain_measures import (
+    MEASURES,
+    Strain,
+    compute_cauchy_stress,
+    compute_elastic_energy,
+)
 
 __all__ = [
-    "MEASURES", "Material", "Strain", "displacement_gradient", "elastic_energy", "stress",
-    "stress_cauchy", "volume_change", "von_mises",
+    "MEASURES", "Material", "Strain", "compute_cauchy_stress", "compute_displacement_gradient",
+    "compute_elastic_energy", "compute_volume_change", "compute_von_mises", "stress",
 ]  # fmt: skip

@@ -13,16 +13,16 @@ from numpy.typing import ArrayLike
 
 from qdem_fem.element.kinematics import (
     IDENTITY,
-    FloatArray,
     cofactor,
     contraction,
     isotropic,
     trace,
     transposed,
 )
-from qdem_fem.element.stress import Nine, viscous_current
+from qdem_fem.element.stress import Nine, compute_viscous_stress
+from qdem_fem.files import Floats
 
-viscous_numbers = viscous_current
+compute_viscous_numbers = compute_viscous_stress
 
 
 class Finger(NamedTuple):
@@ -35,19 +35,19 @@ MEASURE = Finger
 OBJECTIVE = True
 
 
-def strain_of(H: FloatArray) -> FloatArray:
+def compute_strain(H: Floats) -> Floats:
     """eps = (F F^T - I)/2 = (H + H^T + H H^T)/2 [-] (eqs 3, 4)."""
     return (H + transposed(H) + H @ transposed(H)) / 2
 
 
-def stress_nominal(H: FloatArray, lame_first: ArrayLike, lame_second: ArrayLike) -> FloatArray:
+def compute_nominal_stress(H: Floats, lame_first: ArrayLike, lame_second: ArrayLike) -> Floats:
     """P = T cof(F) [Pa] with the Cauchy stress T of the Finger strain (eqs 2, 9, 10)."""
-    return isotropic(strain_of(H), lame_first, lame_second) @ cofactor(IDENTITY + H)
+    return isotropic(compute_strain(H), lame_first, lame_second) @ cofactor(IDENTITY + H)
 
 
-def energy_stored(
-    H: FloatArray, volume: FloatArray, lame_first: ArrayLike, lame_second: ArrayLike
-) -> FloatArray:
+def compute_stored_energy(
+    H: Floats, volume: Floats, lame_first: ArrayLike, lame_second: ArrayLike
+) -> Floats:
     """Stored energy of every element [J], (m,): ``V0 mu (J tr(eps) - (J - 1))`` for lambda = mu.
 
     There is none else: ``V0 (lambda - mu)/2 tr(eps)^2`` is added, so the value is exact for
@@ -57,13 +57,15 @@ def energy_stored(
     first, minors = trace(H)[..., 0, 0], cofactor(H)
     spread = first + contraction(H, H) / 2  # tr(eps)
     beyond_first = trace(minors)[..., 0, 0] + contraction(H, minors) / 3
-    j = first + beyond_first  # volume_change(H)
+    j = first + beyond_first  # compute_volume_change(H)
     # (1 + j) tr(eps) - j, its first order tr H - tr H left out
     density = mu * (contraction(H, H) / 2 - beyond_first + j * spread)
     return volume * (density + (lam - mu) / 2 * spread**2)
 
 
-def stress_numbers(h: Nine, lame_first: Any, lame_second: Any, half: Any) -> tuple[Nine, Any]:
+def compute_stress_numbers(
+    h: Nine, lame_first: Any, lame_second: Any, half: Any
+) -> tuple[Nine, Any]:
     """``P = T cof F`` with ``T = lambda tr(eps) I + 2 mu eps``, ``eps = (B - I)/2`` (eqs. 2-4).
 
     Since ``B cof F = J F``, with ``K = H^T - cof H``, ``II = tr cof H``, ``III = det H``::
@@ -86,8 +88,8 @@ def stress_numbers(h: Nine, lame_first: Any, lame_second: Any, half: Any) -> tup
     )
     pressure = lame_first * (trace + half * squares)
     alpha = (pressure + pressure * trace) + lame_second * change
-    volume_change = trace + change
-    beta = lame_second + lame_second * volume_change
+    growth = trace + change
+    beta = lame_second + lame_second * growth
     gamma = lame_second - pressure
     stress = (
         (alpha + beta * h0) + gamma * (h0 - c0),
@@ -100,19 +102,19 @@ def stress_numbers(h: Nine, lame_first: Any, lame_second: Any, half: Any) -> tup
         beta * h7 + gamma * (h5 - c7),
         (alpha + beta * h8) + gamma * (h8 - c8),
     )
-    return stress, (half + half) + volume_change
+    return stress, (half + half) + growth
 
 
-def pulls_viscous(
+def compute_fused_pulls(
     h: Nine, w: Nine, g: Nine, lame_first: Any, lame_second: Any, viscous_first: Any,
     viscous_second: Any, half: Any,
 ) -> tuple[Nine, Any, Any]:  # fmt: skip
-    """`element_pulls` of `stress_numbers` and `viscous_current` together, with less work.
+    """Pulls of `compute_stress_numbers` and `compute_viscous_stress` together, with less work.
 
     With ``c_a = cof(F) grad N_a``, which is ``J`` times the gradient in the current
     configuration: ``J L = sum_a w_a (x) c_a`` (eq. 5) and ``f_a = -V0 T c_a`` (eqs. 8-10).
-    ``w``: edges of the velocity [m/s], as the edges of `element_gradient`.  Returns the pulls,
-    ``J`` and the power that viscosity takes, ``V0 J T_D : D`` [W].
+    ``w``: edges of the velocity [m/s], as the edges of `compute_element_gradient`.  Returns the
+    pulls, ``J`` and the power that viscosity takes, ``V0 J T_D : D`` [W].
     """
     h0, h1, h2, h3, h4, h5, h6, h7, h8 = h
     one = half + half

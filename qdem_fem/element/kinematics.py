@@ -8,17 +8,16 @@ precision down to the smallest displacements.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from qdem_fem.files import Floats, Integers
 
 IDENTITY = np.eye(3)
 
 
-def displacement_gradient(
-    gradients: FloatArray, elements: IntArray, displacement: FloatArray
-) -> FloatArray:
+def compute_displacement_gradient(
+    gradients: Floats, elements: Integers, displacement: Floats
+) -> Floats:
     """H = sum_a u_a (x) grad_X N_a [-], (m, 3, 3), of displacements (n, 3) [m]; F = I + H (eq. 1).
 
     Of velocities [m/s] it is the rate of H [1/s].  Only differences to vertex 0 enter, so a common
@@ -28,22 +27,22 @@ def displacement_gradient(
     return np.swapaxes(u[:, 1:] - u[:, :1], -1, -2) @ gradients
 
 
-def transposed(matrix: FloatArray) -> FloatArray:
+def transposed(matrix: Floats) -> Floats:
     """A^T of every matrix."""
     return np.swapaxes(matrix, -1, -2)
 
 
-def trace(matrix: FloatArray) -> FloatArray:
+def trace(matrix: Floats) -> Floats:
     """tr A of every matrix, with two axes of length 1 to multiply matrices."""
     return np.trace(matrix, axis1=-2, axis2=-1)[..., None, None]
 
 
-def contraction(first: FloatArray, second: FloatArray) -> FloatArray:
+def contraction(first: Floats, second: Floats) -> Floats:
     """A : B of every pair of matrices, (m,)."""
     return np.einsum("...ij,...ij->...", first, second)
 
 
-def cofactor(matrix: FloatArray) -> FloatArray:
+def cofactor(matrix: Floats) -> Floats:
     """cof A = det(A) A^-T of every matrix, also where A has no inverse: cyclic minors."""
     minors = np.empty_like(matrix)
     for i, j in np.ndindex(3, 3):
@@ -54,35 +53,30 @@ def cofactor(matrix: FloatArray) -> FloatArray:
     return minors
 
 
-def volume_change(H: FloatArray) -> FloatArray:
+def compute_volume_change(H: Floats) -> Floats:
     """J - 1 = tr H + tr cof H + det H [-], (m,), without cancellation."""
     minors = cofactor(H)
     determinant = contraction(H, minors) / 3
     return trace(H)[..., 0, 0] + trace(minors)[..., 0, 0] + determinant
 
 
-def strain_green(H: FloatArray) -> FloatArray:
-    """Green's strain E = (F^T F - I)/2 = (H + H^T + H^T H)/2 [-]."""
-    return (H + transposed(H) + transposed(H) @ H) / 2
-
-
-def isotropic(tensor: FloatArray, first: ArrayLike, second: ArrayLike) -> FloatArray:
+def isotropic(tensor: Floats, first: ArrayLike, second: ArrayLike) -> Floats:
     """first tr(A) I + 2 second A of a symmetric A (..., 3, 3): the common form of eqs 2 and 7."""
     trace = np.trace(tensor, axis1=-2, axis2=-1)[..., None, None]
     one, two = (np.asarray(value, float)[..., None, None] for value in (first, second))
     return one * trace * np.eye(3) + 2 * two * tensor
 
 
-def energy_quadratic(
-    strain: FloatArray, volume: FloatArray, lame_first: ArrayLike, lame_second: ArrayLike
-) -> FloatArray:
+def compute_quadratic_energy(
+    strain: Floats, volume: Floats, lame_first: ArrayLike, lame_second: ArrayLike
+) -> Floats:
     """``V0 (lambda/2 tr(e)^2 + mu e : e)`` of every element [J], (m,); ``volume`` is V0 [m^3]."""
     lam, mu = np.asarray(lame_first, float), np.asarray(lame_second, float)
     first = trace(strain)[..., 0, 0]
     return volume * (lam / 2 * first**2 + mu * contraction(strain, strain))
 
 
-def von_mises(cauchy: FloatArray) -> FloatArray:
+def compute_von_mises(cauchy: Floats) -> Floats:
     """sqrt(3/2 s : s) [Pa], (m,), with the deviator s of the Cauchy stress (m, 3, 3)."""
     deviator = cauchy - trace(cauchy) * IDENTITY / 3
     return np.sqrt(1.5 * contraction(deviator, deviator))

@@ -7,12 +7,10 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from qdem_fem.files import MaterialError
+from qdem_fem.files import Floats, MaterialError
 
-FloatArray = NDArray[np.float64]
-Value = float | FloatArray
+Value = float | Floats
 
 _UNITS = {
     "young": "Pa",
@@ -112,15 +110,6 @@ class Material:
 
     def _values(self) -> tuple[Value, ...]:
         return tuple(getattr(self, field.name) for field in fields(self))
-
-    def _key(self) -> tuple[object, ...]:
-        return tuple(tuple(v) if isinstance(v, np.ndarray) else v for v in self._values())
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Material) and self._key() == other._key()
-
-    def __hash__(self) -> int:
-        return hash(self._key())
 
 
 def _real(name: str, value: Any) -> Value:

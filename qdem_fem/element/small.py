@@ -9,8 +9,9 @@ from typing import Any, NamedTuple
 
 from numpy.typing import ArrayLike
 
-from qdem_fem.element.kinematics import FloatArray, energy_quadratic, isotropic, transposed
+from qdem_fem.element.kinematics import compute_quadratic_energy, isotropic, transposed
 from qdem_fem.element.stress import Nine
+from qdem_fem.files import Floats
 
 
 class Small(NamedTuple):
@@ -23,24 +24,26 @@ MEASURE = Small
 OBJECTIVE = False
 
 
-def strain_of(H: FloatArray) -> FloatArray:
+def compute_strain(H: Floats) -> Floats:
     """e = (H + H^T)/2 [-]."""
     return (H + transposed(H)) / 2
 
 
-def stress_nominal(H: FloatArray, lame_first: ArrayLike, lame_second: ArrayLike) -> FloatArray:
+def compute_nominal_stress(H: Floats, lame_first: ArrayLike, lame_second: ArrayLike) -> Floats:
     """P = T = lambda tr(e) I + 2 mu e [Pa] of linear elasticity."""
-    return isotropic(strain_of(H), lame_first, lame_second)
+    return isotropic(compute_strain(H), lame_first, lame_second)
 
 
-def energy_stored(
-    H: FloatArray, volume: FloatArray, lame_first: ArrayLike, lame_second: ArrayLike
-) -> FloatArray:
+def compute_stored_energy(
+    H: Floats, volume: Floats, lame_first: ArrayLike, lame_second: ArrayLike
+) -> Floats:
     """Stored energy of every element [J], (m,): the potential of the stress."""
-    return energy_quadratic(strain_of(H), volume, lame_first, lame_second)
+    return compute_quadratic_energy(compute_strain(H), volume, lame_first, lame_second)
 
 
-def stress_numbers(h: Nine, lame_first: Any, lame_second: Any, half: Any) -> tuple[Nine, Any]:
+def compute_stress_numbers(
+    h: Nine, lame_first: Any, lame_second: Any, half: Any
+) -> tuple[Nine, Any]:
     """Linear elasticity, ``P = lambda tr(H) I + mu (H + H^T)``; with it the method is linear FEM.
 
     Returns 1 for ``J`` (NaN where ``H`` is not finite).  Not for bodies that turn: a rotation by
@@ -57,8 +60,10 @@ def stress_numbers(h: Nine, lame_first: Any, lame_second: Any, half: Any) -> tup
     return stress, (half + half) + (trace - trace)
 
 
-def viscous_numbers(h: Nine, d: Nine, viscous_first: Any, viscous_second: Any, half: Any) -> Nine:
-    """``P = lambda_D tr(Hdot) I + mu_D (Hdot + Hdot^T)``: linear viscosity, as `stress_numbers`."""
+def compute_viscous_numbers(
+    h: Nine, d: Nine, viscous_first: Any, viscous_second: Any, half: Any
+) -> Nine:
+    """``P = lambda_D tr(Hdot) I + mu_D (Hdot + Hdot^T)``: linear viscosity."""
     pressure = viscous_first * (d[0] + d[4] + d[8])
     twice = viscous_second + viscous_second
     xy, xz = viscous_second * (d[1] + d[3]), viscous_second * (d[2] + d[6])

@@ -1,8 +1,8 @@
 """What all strain measures share, written once for numbers, arrays, lanes and GPU.
 
 Every function takes the displacement gradient ``H = F - I`` as nine values in rows and gives ``P``,
-the nominal stress of which the nodal forces are ``f_a = -V0 P grad N_a`` (`element_pulls`).  Only
-``+ - * /`` are used, so a value may be a number, a NumPy array, `qdem_fem.kernel.cpu.lanes.Lanes`
+the nominal stress of which the nodal forces are ``f_a = -V0 P grad N_a`` (`compute_element_pulls`).
+Only ``+ - * /`` are used, so a value may be a number, an array, `qdem_fem.kernel.cpu.lanes.Lanes`
 or a register of a GPU.  ``half`` is 0.5 in the precision of the values: a literal 0.5 would turn
 single precision on a GPU into double.  With ``lame_*`` times the volume, ``P`` comes times it.
 
@@ -18,7 +18,7 @@ Nine = tuple[Any, Any, Any, Any, Any, Any, Any, Any, Any]
 """A 3 x 3 matrix in rows."""
 
 
-def element_gradient(e: Nine, g: Nine) -> Nine:
+def compute_element_gradient(e: Nine, g: Nine) -> Nine:
     """``H = sum_a e_a (x) grad N_a`` of eq. 1, from the edges of a nodal field.
 
     ``e``: the field at corners 1, 2, 3 less that at corner 0, three components each [m];
@@ -37,7 +37,7 @@ def element_gradient(e: Nine, g: Nine) -> Nine:
     )
 
 
-def element_pulls(p: Nine, g: Nine) -> Nine:
+def compute_element_pulls(p: Nine, g: Nine) -> Nine:
     """``P grad N_a`` of corners 1, 2, 3: what eqs. 9 and 10 sum up, with the sign turned.
 
     The force on corner a is minus this; that on corner 0 is the sum of the three.
@@ -55,7 +55,9 @@ def element_pulls(p: Nine, g: Nine) -> Nine:
     )
 
 
-def viscous_current(h: Nine, d: Nine, viscous_first: Any, viscous_second: Any, half: Any) -> Nine:
+def compute_viscous_stress(
+    h: Nine, d: Nine, viscous_first: Any, viscous_second: Any, half: Any
+) -> Nine:
     """``P = T_D cof F`` with ``T_D = lambda_D tr(D) I + 2 mu_D D``, ``L = Hdot F^-1`` (eqs. 5-7).
 
     ``d``: rate of the displacement gradient [1/s]; viscosities [Pa s].  With ``C = cof F``,
@@ -91,7 +93,7 @@ def viscous_current(h: Nine, d: Nine, viscous_first: Any, viscous_second: Any, h
     )
 
 
-def matrix_product(p: Nine, d: Nine) -> Any:
+def compute_matrix_product(p: Nine, d: Nine) -> Any:
     """``P : Hdot``, the power of a stress [W/m^3] at a rate of the displacement gradient [1/s]."""
     return (
         p[0] * d[0] + p[1] * d[1] + p[2] * d[2] + p[3] * d[3] + p[4] * d[4] + p[5] * d[5]

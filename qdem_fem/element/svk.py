@@ -11,14 +11,14 @@ from numpy.typing import ArrayLike
 
 from qdem_fem.element.kinematics import (
     IDENTITY,
-    FloatArray,
-    energy_quadratic,
+    compute_quadratic_energy,
     isotropic,
-    strain_green,
+    transposed,
 )
-from qdem_fem.element.stress import Nine, viscous_current
+from qdem_fem.element.stress import Nine, compute_viscous_stress
+from qdem_fem.files import Floats
 
-viscous_numbers = viscous_current
+compute_viscous_numbers = compute_viscous_stress
 
 
 class Svk(NamedTuple):
@@ -29,25 +29,31 @@ class Svk(NamedTuple):
 
 MEASURE = Svk
 OBJECTIVE = True
-strain_of = strain_green
 
 
-def stress_nominal(H: FloatArray, lame_first: ArrayLike, lame_second: ArrayLike) -> FloatArray:
+def compute_strain(H: Floats) -> Floats:
+    """Green's strain E = (F^T F - I)/2 = (H + H^T + H^T H)/2 [-]."""
+    return (H + transposed(H) + transposed(H) @ H) / 2
+
+
+def compute_nominal_stress(H: Floats, lame_first: ArrayLike, lame_second: ArrayLike) -> Floats:
     """P = F S [Pa], S = lambda tr(E) I + 2 mu E; P = dW/dF of W = lambda/2 tr(E)^2 + mu E : E.
 
     Softens under compression, and loses all stiffness below a stretch of 0.58.
     """
-    return (IDENTITY + H) @ isotropic(strain_of(H), lame_first, lame_second)
+    return (IDENTITY + H) @ isotropic(compute_strain(H), lame_first, lame_second)
 
 
-def energy_stored(
-    H: FloatArray, volume: FloatArray, lame_first: ArrayLike, lame_second: ArrayLike
-) -> FloatArray:
+def compute_stored_energy(
+    H: Floats, volume: Floats, lame_first: ArrayLike, lame_second: ArrayLike
+) -> Floats:
     """Stored energy of every element [J], (m,): the potential of the stress."""
-    return energy_quadratic(strain_of(H), volume, lame_first, lame_second)
+    return compute_quadratic_energy(compute_strain(H), volume, lame_first, lame_second)
 
 
-def stress_numbers(h: Nine, lame_first: Any, lame_second: Any, half: Any) -> tuple[Nine, Any]:
+def compute_stress_numbers(
+    h: Nine, lame_first: Any, lame_second: Any, half: Any
+) -> tuple[Nine, Any]:
     """St. Venant-Kirchhoff, ``P = F S``, ``S = lambda tr(E) I + 2 mu E``, ``E = (F^T F - I)/2``.
 
     Conservative and exact under rotation.  Returns ``P`` and ``J``.  Not for strong compression:

@@ -1,5 +1,6 @@
-"""Time series, VTU files and tables of a run."""
+"""Time series, VTU files and tables of a run; errors, and names for arrays in signatures."""
 
+from qdem_fem.files.arrays import Floats, Integers
 from qdem_fem.files.errors import (
     CheckpointError,
     ConditionError,
@@ -21,7 +22,7 @@ from qdem_fem.files.series import Driver, Series, Value, is_real, ramp
 
 __all__ = [
     "CheckpointError", "ConditionError", "ContactTooDeep", "Driver", "ElementInverted",
-    "EnergyLost", "Interrupted", "LibraryMissing", "MaterialError", "MeshError", "NotConverged",
-    "QdemError", "Series", "StepWarning", "Table", "Unstable", "UsageError", "Value", "is_real",
-    "ramp", "read_table", "write_bodies_vtu", "write_pvd",
+    "EnergyLost", "Floats", "Integers", "Interrupted", "LibraryMissing", "MaterialError",
+    "MeshError", "NotConverged", "QdemError", "Series", "StepWarning", "Table", "Unstable",
+    "UsageError", "Value", "is_real", "ramp", "read_table", "write_bodies_vtu", "write_pvd",
 ]  # fmt: skip

@@ -1,10 +1,10 @@
 """Time: state, leapfrog, energies, checkpoints, static answers; `Simulation` is here."""
 
 from qdem_fem.march.checkpoint import read_checkpoint, write_checkpoint
-from qdem_fem.march.contacts import Contact
 from qdem_fem.march.dynamic_relaxation import StaticAnswer
 from qdem_fem.march.energies import Energy
 from qdem_fem.march.kinetic_damping import Damping, Rest, find_rest
+from qdem_fem.march.options import Contact
 from qdem_fem.march.rigid_motions import check_held
 from qdem_fem.march.simulation import History, Simulation
 from qdem_fem.march.state import State

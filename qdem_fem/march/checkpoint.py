@@ -18,20 +18,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from qdem_fem.bodies import Motion
-from qdem_fem.contact import CriticalStep
-from qdem_fem.files import CheckpointError, Driver, Series
+from qdem_fem.contact import CriticalStep, Motion
+from qdem_fem.files import CheckpointError, Series
 from qdem_fem.march.state import State
 from trackbed.run_files import write_whole
 
 Arrays = dict[str, NDArray[Any]]
 
-CHECKPOINT_FORMAT = 3
+CHECKPOINT_FORMAT = 4
 DIGEST = 64
 """Letters of a SHA-256 in hexadecimal."""
 BESIDE = "beside "
 """Before the names of arrays that are not the simulation's."""
-FUNCTION = "a function, not compared"
 
 
 def write_checkpoint(
@@ -118,66 +116,45 @@ def fingerprint_run(simulation: State) -> dict[str, str]:
         if simulation.given_step is not None
         else f"{simulation.safety!r} of the critical one",
         "mass_scaling": repr(simulation.mass_scaling),
-        "gravity": "none" if simulation.gravity is None else _driver_mark(simulation.gravity),
-        "loads": _mark(
-            *(
-                part
-                for load in conditions.loads
-                for part in (load.nodes, load.weights, _driver_mark(load.driver))
-            )
-        ),
-        "given displacements": _mark(
-            *(
-                part
-                for held in conditions.held
-                for part in (
-                    held.nodes,
-                    np.array(held.components),
-                    np.zeros(0) if held.factor is None else held.factor,
-                    "fixed" if held.driver is None else _driver_mark(held.driver),
-                )
-            )
-        ),
-        "rollers": _mark(
-            *(p for roller in conditions.rollers for p in (roller.nodes, roller.normal))
-        ),
+        "gravity": "none" if simulation.gravity is None else _mark(simulation.gravity),
+        "loads": _mark(conditions.loads),
+        "given displacements": _mark(conditions.held),
+        "rollers": _mark(conditions.rollers),
         "periodic pairs": _mark(simulation.master),
     }
-    if conditions.absorbing:
-        marks["absorbing faces"] = _mark(
-            *(p for a in conditions.absorbing for p in (a.nodes, a.damping, a.stiffness))
-        )
     if simulation.contact is not None:
         marks["contact"] = repr(simulation.contact)
         if simulation.contact.periodic is not None:
             marks["periodic width"] = repr(simulation.contact.periodic)
     for number, body in enumerate(simulation.bodies):
-        marks[f"mesh of body {number}"] = _mark(body.nodes, body.elements)
-        material = [np.asarray(getattr(body.material, f.name)) for f in fields(body.material)]
-        marks[f"material of body {number}"] = _mark(*material)
+        marks[f"mesh of body {number}"] = _mark([body.nodes, body.elements])
+        marks[f"material of body {number}"] = _mark(body.material)
         if body.rigid:
             marks[f"body {number} is rigid"] = str(body.rigid)
     return marks
 
 
-def _mark(*parts: NDArray[Any] | str) -> str:
-    """A hash of arrays and texts."""
+def _mark(part: Any) -> str:
+    """A hash of arrays, of lists and of what has fields; of a function, that it is one."""
     digest = hashlib.sha256()
-    for part in parts:
-        if isinstance(part, str):
-            digest.update(f"text {len(part)} {part}".encode())
-        else:
+
+    def take(part: Any) -> None:
+        if isinstance(part, np.ndarray):
             digest.update(f"{part.dtype.str} {part.shape}".encode())
             digest.update(np.ascontiguousarray(part).tobytes())
+        elif callable(part) and not isinstance(part, Series):
+            digest.update(b"a function")
+        elif isinstance(part, list | tuple):
+            digest.update(f"{len(part)} parts".encode())
+            for each in part:
+                take(each)
+        elif hasattr(part, "__dict__"):
+            take(list(vars(part).values()))
+        else:
+            digest.update(repr(part).encode())
+
+    take(part)
     return digest.hexdigest()
-
-
-def _driver_mark(driver: Driver) -> str:
-    if driver.varying is None:
-        return _mark(driver.constant)
-    if isinstance(driver.varying, Series):
-        return _mark(driver.varying.times, driver.varying.values)
-    return FUNCTION
 
 
 def _compare(saved: Mapping[str, str], here: Mapping[str, str], where: str) -> None:

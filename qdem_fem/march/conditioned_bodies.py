@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from qdem_fem.bodies import COMPONENTS, Absorbing, Body, Held, NodalLoad, Roller
+from qdem_fem.bodies import COMPONENTS, Body, Held, NodalLoad, Roller
 from qdem_fem.contact.search import find_partners
-from qdem_fem.files import ConditionError, Driver, Value, is_real
+from qdem_fem.files import ConditionError, Driver, Floats, Integers, Value
 from qdem_fem.march.leapfrog import level_velocities
 from qdem_fem.march.state import State
 from qdem_fem.mesh import find_faces_within, pressure_forces
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+C = TypeVar("C", NodalLoad, Held, Roller)
 
 
 class ConditionedBodies(State):
@@ -27,7 +26,7 @@ class ConditionedBodies(State):
     def fix(self, body: Body, nodes: Any, components: str = "xyz") -> Held:
         """Hold components of nodes where they are in the reference configuration."""
         chosen = self._components(components, "fix")
-        return self._hold(Held(self._nodes(body, nodes, "fix"), chosen))
+        return self._add(self.conditions.held, Held(self._nodes(body, nodes, "fix"), chosen))
 
     def prescribe(
         self,
@@ -45,7 +44,7 @@ class ConditionedBodies(State):
         driver = Driver(displacement, 1, "prescribe")
         here = self._nodes(body, nodes, "prescribe")
         factor = self._profile(body, here, profile, 1.0, "prescribe")
-        return self._hold(Held(here, chosen, driver, factor))
+        return self._add(self.conditions.held, Held(here, chosen, driver, factor))
 
     def roller(self, body: Body, nodes: Any, normal: ArrayLike) -> Roller:
         """Keep nodes in the plane through them with this normal, free within it."""
@@ -60,10 +59,7 @@ class ConditionedBodies(State):
             )
         self._check_deformable(body, "roller", "fix components of its nodes")
         roller = Roller(self._nodes(body, nodes, "roller"), direction / length)
-        level_velocities(self)
-        self.conditions.rollers.append(roller)
-        self.note_conditions_changed(ties=True)
-        return roller
+        return self._add(self.conditions.rollers, roller)
 
     def load(
         self, body: Body, nodes: Any, force: Value, profile: ArrayLike | None = None
@@ -75,41 +71,25 @@ class ConditionedBodies(State):
         chosen = self._nodes(body, nodes, "load")
         share = self._profile(body, chosen, profile, 1 / len(chosen), "load")
         weights = np.repeat(share[:, None], 3, axis=1)
-        return self._load(NodalLoad(chosen, weights, Driver(force, 3, "load")))
+        return self._add(
+            self.conditions.loads, NodalLoad(chosen, weights, Driver(force, 3, "load"))
+        )
 
     def pressure(self, body: Body, nodes: Any, pressure: Value) -> NodalLoad:
         """A ``pressure`` [Pa] along the inward reference normal of the faces within ``nodes``."""
-        local, faces = self._faces(body, nodes, "pressure")
-        areas = pressure_forces(body.nodes, faces, len(body.nodes))[local]
-        chosen = self._nodes(body, local, "pressure")
-        return self._load(NodalLoad(chosen, areas, Driver(pressure, 1, "pressure")))
-
-    def absorb(self, body: Body, nodes: Any, depth: float | None = None) -> Absorbing:
-        """Let waves out through the faces within ``nodes``, by dashpots
-        (`qdem_fem.bodies.absorbing`).
-
-        ``depth`` [m]: springs beside them, of a layer so deep of the body's material on rigid
-        ground; without them the body creeps under a load that lasts.  Components that are held or
-        prescribed have neither.
-        """
-        from qdem_fem.bodies import face_tensors
-
-        if self.precision != "float64" or self.device != "cpu":
+        chosen = self._nodes(body, nodes, "pressure")
+        local = chosen - self._offset(body)
+        mask = np.zeros(len(body.nodes), dtype=bool)
+        mask[local] = True
+        faces = find_faces_within(body.surface, mask)
+        if not len(faces):
             raise ConditionError(
-                "absorbing faces are computed in double precision on the processor",
-                where="absorb",
-                remedy='take precision="float64" and device="cpu"',
+                f"no surface face of {body.name} has all three nodes in the selection",
+                where="pressure",
             )
-        if depth is not None and not (is_real(depth) and np.isfinite(depth) and depth > 0):
-            raise ConditionError(f"a depth of {depth!r} m is not above zero", where="absorb")
-        self._check_deformable(body, "absorb", "leave it deformable")
-        local, faces = self._faces(body, nodes, "absorb")
-        damping, stiffness = (part[local] for part in face_tensors(body, faces, depth))
-        absorbing = Absorbing(self._nodes(body, local, "absorb"), damping, stiffness)
-        level_velocities(self)
-        self.conditions.absorbing.append(absorbing)
-        self.note_conditions_changed(ties=True)
-        return absorbing
+        areas = pressure_forces(body.nodes, faces, len(body.nodes))[local]
+        driver = Driver(pressure, 1, "pressure")
+        return self._add(self.conditions.loads, NodalLoad(chosen, areas, driver))
 
     def periodic(self, body: Body, nodes_a: Any, nodes_b: Any, tolerance: float = 1e-6) -> None:
         """Join opposite faces: every node of ``nodes_b`` moves as its partner of ``nodes_a``.
@@ -131,12 +111,10 @@ class ConditionedBodies(State):
             i, j = self.master[i], self.master[j]
             self.master[self.master == max(i, j)] = min(i, j)
 
-    def remove(self, condition: NodalLoad | Held | Roller | Absorbing) -> None:
-        """Take back a condition that `fix`, `load`, `absorb` and the like returned."""
-        lists: tuple[list[Any], ...] = (
-            self.conditions.loads, self.conditions.held, self.conditions.rollers,
-            self.conditions.absorbing,
-        )  # fmt: skip
+    def remove(self, condition: NodalLoad | Held | Roller) -> None:
+        """Take back a condition that `fix`, `load` and the like returned."""
+        every = self.conditions
+        lists: tuple[list[Any], ...] = every.loads, every.held, every.rollers
         for conditions in lists:
             if condition in conditions:
                 level_velocities(self)
@@ -159,19 +137,6 @@ class ConditionedBodies(State):
     def _nodes(self, body: Body, nodes: Any, where: str) -> Integers:
         start = self._offset(body)
         return body.select_nodes(nodes, where) + start
-
-    def _faces(self, body: Body, nodes: Any, where: str) -> tuple[Integers, Integers]:
-        """Nodes of a selection, and the surface faces (k, 3) with all three of theirs in it."""
-        self._offset(body)
-        local = body.select_nodes(nodes, where)
-        mask = np.zeros(len(body.nodes), dtype=bool)
-        mask[local] = True
-        faces = find_faces_within(body.surface, mask)
-        if not len(faces):
-            raise ConditionError(
-                f"no surface face of {body.name} has all three nodes in the selection", where=where
-            )
-        return local, faces
 
     def _probe(self, name: str, probe: Any) -> Integers:
         if isinstance(probe, tuple) and len(probe) == 2 and isinstance(probe[0], Body):
@@ -206,17 +171,11 @@ class ConditionedBodies(State):
             )
         return every[nodes - self._offset(body)]
 
-    def _hold(self, held: Held) -> Held:
+    def _add(self, conditions: list[C], condition: C) -> C:
         level_velocities(self)
-        self.conditions.held.append(held)
-        self.note_conditions_changed(ties=True)
-        return held
-
-    def _load(self, load: NodalLoad) -> NodalLoad:
-        level_velocities(self)
-        self.conditions.loads.append(load)
-        self.note_conditions_changed(ties=False)
-        return load
+        conditions.append(condition)
+        self.note_conditions_changed(ties=not isinstance(condition, NodalLoad))
+        return condition
 
     @staticmethod
     def _check_deformable(body: Body, where: str, remedy: str) -> None:

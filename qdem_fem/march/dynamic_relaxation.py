@@ -20,21 +20,17 @@ begin again when they no longer descend (Polak and Ribiere's rule, cut at zero).
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from qdem_fem.bodies import Body
-from qdem_fem.files import ConditionError, ElementInverted, NotConverged, is_real
+from qdem_fem.bodies import NOTHING, Assembly, Body, take_out_held
+from qdem_fem.files import ConditionError, ElementInverted, Floats, NotConverged, is_real
 from qdem_fem.march.energies import find_energy
 from qdem_fem.march.rigid_motions import check_held
 from qdem_fem.march.state import State
-from qdem_fem.march.static_problem import StaticProblem
 from qdem_fem.march.steps import find_inverted
-
-Floats = NDArray[np.float64]
 
 UNCHECKED_MOST = 32
 """Most steps between two evaluations of the true residual, while forces are nearly linear."""
@@ -188,7 +184,7 @@ def _conjugate(
             z = weight * r
             direction, rz, restart = z, float(r @ z), False
         checked = unchecked + 1 >= interval
-        step = _step(forces, project, u, direction, total, r, sigma, checked)
+        step = problem.find_step(u, direction, total, r, sigma, checked)
         if step is None:
             if u is sure:
                 found.note(u, r, size, problem)
@@ -198,69 +194,144 @@ def _conjugate(
             total, _ = forces(u)
             r = project(total)
             continue
-        u, total, sigma = u + step.length * direction, step.total, step.length
+        sigma, total, drift = step
+        u = u + sigma * direction
         unchecked = 0 if checked else unchecked + 1
         if checked:
             sure = u
-            loose = step.drift > RESIDUAL_DRIFT
+            loose = drift > RESIDUAL_DRIFT
             interval = max(1, interval // 4) if loose else min(2 * interval, UNCHECKED_MOST)
         before, r = r, project(total)
         z = weight * r
         ratio = max(0.0, float(z @ (r - before)) / rz)
-        found.lengths.append(step.length)
+        found.lengths.append(sigma)
         found.ratios.append(ratio)
         rz = float(r @ z)
         direction = z + ratio * direction
 
 
-@dataclass
-class _Step:
-    length: float
-    total: Floats
-    drift: float
+class StaticProblem:
+    """Forces, constraints and fictitious masses in the kernel's order, four numbers a node."""
 
+    def __init__(self, simulation: State) -> None:
+        own = simulation.assembly
+        conditions, now = simulation.conditions, np.full(1, simulation.time)
+        self.assembly = own
+        if own.dtype != np.float64 or type(own) is not Assembly:  # single precision, or a GPU
+            self.assembly = Assembly(
+                simulation.bodies, simulation.master, simulation.strain, "float64",
+                simulation.threads,
+            )  # fmt: skip
+        assembly, place = self.assembly, self.assembly.place
+        loads, held = assembly.lists(conditions, gravity=False)
+        row = conditions.table(now)[0]
+        self.external = np.zeros(4 * assembly.n_nodes)
+        np.add.at(self.external, loads.node_at, loads.weight * row[loads.series])
+        gravity = simulation.gravity_at(now)
+        if gravity is not None:
+            # the masses of the simulation itself, with what mass scaling added
+            weight = np.zeros((assembly.n_nodes, 4))
+            weight[place, :3] = own.mass[:, None] * gravity[0]
+            used = own.mass > 0
+            self.external.reshape(-1, 4)[place[used]] += weight[place[used]]
+        self.held, self.target = held, held.weight * row[held.series]
+        self.state = assembly._state(np.ones(assembly.n_nodes))
+        self.inverse_mass = find_inverse_stiffness(simulation, assembly)
+        self.initial = simulation.assembly.field("displacement")
+        self.steps = 0
 
-def _step(
-    forces: Callable[[Floats], tuple[Floats, bool]],
-    project: Callable[[Floats], Floats],
-    u: Floats,
-    direction: Floats,
-    total: Floats,
-    r: Floats,
-    sigma: float,
-    checked: bool,
-) -> _Step | None:
-    """The length along ``direction`` where the force along it vanishes, by secants.
+    def start(self) -> Floats:
+        """The present displacement with given components at their values."""
+        u = np.zeros(4 * self.assembly.n_nodes)
+        u.reshape(-1, 4)[self.assembly.place, :3] = self.initial
+        u = self.project(u)
+        u[self.held.node_at] = self.target
+        return u
 
-    Unchecked, forces there are those that a straight line through ``sigma`` predicts.  None when
-    elements turn inside out however short the step is.
-    """
-    slope = float(direction @ r)
-    for _ in range(TRIALS):
-        trial, sound = forces(u + sigma * direction)
-        if sound:
-            break
-        sigma /= 4
-    else:
-        return None
-    change = (trial - total) / sigma
-    bend = -float(direction @ change)
-    length = slope / bend if bend > 0 else 4 * sigma
-    if not checked:
-        return _Step(length, total + length * change, 0.0)
-    predicted = total + length * change
-    for _ in range(TRIALS):
-        true, sound = forces(u + length * direction)
-        left = float(direction @ project(true))
-        if sound and abs(left) <= SLOPE_LEFT * slope:
-            break
-        if not sound:
-            length /= 4
+    def finish(self, simulation: State, u: Floats) -> None:
+        """Leave the bodies of the simulation at rest at ``u``."""
+        moved = u.reshape(-1, 4)[self.assembly.place, :3]
+        simulation.assembly.set_field("displacement", moved)
+        simulation.assembly.set_field("velocity", np.zeros_like(moved))
+        simulation.pack_lists()[1].previous[:] = 0.0
+        simulation.motion.behind = False
+
+    def project(self, field: Floats) -> Floats:
+        """``field`` without what is held: given components and normals of rollers."""
+        return take_out_held(field.copy(), self.held)
+
+    def forces(self, u: Floats) -> tuple[Floats, bool]:
+        """``f_int + f_ext`` [N], reactions included, and whether all elements are sound.
+
+        The kernel's own step of one second with masses of one kilogram, from rest.
+        """
+        self.steps += 1
+        self.state.displacement[:] = u
+        self.state.velocity[:] = 0.0
+        _, bad = self.assembly.run_kernel(self.state, 1, 1.0, NOTHING, np.zeros(3))
+        self.state.forces[:] = 0.0
+        return self.state.velocity + self.external, bad == 0 and bool(
+            np.isfinite(self.state.velocity).all()
+        )
+
+    def find_step(
+        self, u: Floats, direction: Floats, total: Floats, r: Floats, sigma: float, checked: bool
+    ) -> tuple[float, Floats, float] | None:
+        """The length along ``direction`` where the force along it vanishes, the forces there, by
+        how much these are not those predicted.
+
+        By secants; unchecked, forces there are those that a straight line through ``sigma``
+        predicts.  None when elements turn inside out however short the step is.
+        """
+        slope = float(direction @ r)
+        for _ in range(TRIALS):
+            trial, sound = self.forces(u + sigma * direction)
+            if sound:
+                break
+            sigma /= 4
         else:
-            length *= float(np.clip(slope / (slope - left) if left < slope else 4.0, 0.1, 4.0))
-    if not sound:
-        return None
-    drift = float(
-        np.linalg.norm(project(true - predicted)) / (np.linalg.norm(project(true)) or 1.0)
-    )
-    return _Step(length, true, drift)
+            return None
+        change = (trial - total) / sigma
+        bend = -float(direction @ change)
+        length = slope / bend if bend > 0 else 4 * sigma
+        if not checked:
+            return length, total + length * change, 0.0
+        predicted = total + length * change
+        for _ in range(TRIALS):
+            true, sound = self.forces(u + length * direction)
+            left = float(direction @ self.project(true))
+            if sound and abs(left) <= SLOPE_LEFT * slope:
+                break
+            if not sound:
+                length /= 4
+            else:
+                length *= float(np.clip(slope / (slope - left) if left < slope else 4.0, 0.1, 4.0))
+        if not sound:
+            return None
+        drift = float(
+            np.linalg.norm(self.project(true - predicted))
+            / (np.linalg.norm(self.project(true)) or 1.0)
+        )
+        return length, true, drift
+
+    def force_scale(self, total: Floats, r: Floats) -> float:
+        """What a residual is measured by [N]: the loads, or the reactions where they are larger."""
+        reactions = np.linalg.norm(total - r)
+        return float(max(np.linalg.norm(self.project(self.external)), reactions))
+
+
+def find_inverse_stiffness(simulation: State, assembly: Assembly) -> Floats:
+    """``1/M`` with fictitious masses M: a third of the trace of ``K_aa`` at every node [N/m].
+
+    ``tr K_aa = sum_e V (lambda + 4 mu) |grad N_a|^2``.
+    """
+    shares = []
+    for body in simulation.bodies:
+        gradients, volumes = body.gradients
+        every = np.concatenate([-gradients.sum(axis=1, keepdims=True), gradients], axis=1)
+        modulus = np.asarray(body.material.lame_first) + 4 * np.asarray(body.material.lame_second)
+        shares.append((modulus * volumes)[:, None] * (every**2).sum(axis=2) / 3)
+    at = assembly.place[assembly.elements]
+    trace = np.bincount(at.ravel(), np.concatenate(shares).ravel(), assembly.n_nodes)
+    inverse = np.divide(1.0, trace, out=np.zeros_like(trace), where=trace > 0)
+    return np.repeat(inverse, 4)

@@ -4,14 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-from qdem_fem.element import displacement_gradient, elastic_energy
+from qdem_fem.element import compute_displacement_gradient, compute_elastic_energy
 from qdem_fem.march.leapfrog import find_half_work, find_velocity, find_viscous_half
 from qdem_fem.march.state import State
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -30,21 +25,17 @@ class Energy:
     """Work that sliders of contacts took since the start."""
     viscous: float = 0.0
     """What viscosity took since the start."""
-    absorbed: float = 0.0
-    """What dashpots of absorbing faces took since the start."""
-    foundation: float = 0.0
-    """In the springs of absorbing faces."""
 
 
 def find_energy(run: State) -> Energy:
-    """Energies now [J]; elastic energy as `qdem_fem.element.elastic_energy`."""
+    """Energies now [J]; elastic energy as `qdem_fem.element.compute_elastic_energy`."""
     velocity, motion = find_velocity(run), run.motion
     kinetic = 0.5 * float((run.assembly.mass * (velocity**2).sum(axis=1)).sum())
     if run.rigid is not None:
         kinetic += run.rigid.kinetic(run.rigid.now(run.acting()))
     elastic = sum(
-        elastic_energy(
-            displacement_gradient(body.gradients[0], body.elements, body.displacement),
+        compute_elastic_energy(
+            compute_displacement_gradient(body.gradients[0], body.elements, body.displacement),
             body.gradients[1], body.material.lame_first, body.material.lame_second, run.strain,
         ).sum()
         for body in run.bodies
@@ -57,17 +48,4 @@ def find_energy(run: State) -> Energy:
         if run.rigid is not None:
             external += float(run.rigid.find_half_work(run.acting()).sum())
     touching = (0.0, 0.0) if run.contacts is None else run.contacts.energy()
-    ground = find_ground_energies(run, velocity)
-    return Energy(kinetic, float(elastic), external, *touching, viscous, *ground)
-
-
-def find_ground_energies(run: State, velocity: Floats) -> tuple[float, float]:
-    """Taken by absorbing faces, and in their springs [J]; ``velocity`` (n, 3) [m/s]: of now."""
-    if run.absorbers is None:
-        return 0.0, 0.0
-    absorbed = run.motion.absorbed
-    if run.motion.behind:
-        absorbed += run.absorbers.find_half_taken(
-            run.assembly.field("velocity"), velocity, run.step
-        )
-    return absorbed, run.absorbers.spring_energy(run.assembly.field("displacement"))
+    return Energy(kinetic, float(elastic), external, *touching, viscous)

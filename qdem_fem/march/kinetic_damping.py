@@ -19,7 +19,7 @@ simulation is damped, so its loads should be constant.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -27,12 +27,10 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from qdem_fem.files import ConditionError, NotConverged
+from qdem_fem.files import ConditionError, Floats, NotConverged
 from qdem_fem.march.energies import find_energy
 from qdem_fem.march.state import State
 from qdem_fem.march.steps import march
-
-Floats = NDArray[np.float64]
 
 STEPS_A_LOOK = 40
 """Steps between two looks at the kinetic energy."""
@@ -54,7 +52,7 @@ class Rest:
     """How near to equilibrium bodies in contact are, and what it took."""
 
     unbalanced: float
-    """Root mean square of `find_resultants` over the mean of `contact_forces` [-]."""
+    """Root mean square of `find_resultants` over the mean contact force on a vertex [-]."""
     kinetic: float
     """Kinetic energy over that of springs and elements [-]; greatest since the last judgement."""
     loose: float
@@ -78,40 +76,33 @@ def find_resultants(run: State) -> Floats:
         raise ConditionError("bodies that do not touch", where="kinetic damping", remedy="contact=")
     contacts.refresh()
     total = np.zeros((len(run.bodies), 3))
-    np.add.at(total, bodies_of(run, contacts.nodes), contacts.kernel.force)
+    np.add.at(total, find_bodies_of(run, contacts.nodes), contacts.kernel.force)
     now = np.array([run.time])
     gravity = run.gravity_at(now)
     if gravity is not None:
-        total += masses(run)[:, None] * gravity[0]
+        total += compute_masses(run)[:, None] * gravity[0]
     for load in run.conditions.loads:
         force = load.weights * load.driver.sample(now)[0]
-        np.add.at(total, bodies_of(run, load.nodes), force)
+        np.add.at(total, find_bodies_of(run, load.nodes), force)
     for held in run.conditions.held:
         for component in held.components:
-            total[bodies_of(run, held.nodes), component] = 0.0
+            total[find_bodies_of(run, held.nodes), component] = 0.0
     for roller in run.conditions.rollers:
-        mine = np.unique(bodies_of(run, roller.nodes))
+        mine = np.unique(find_bodies_of(run, roller.nodes))
         total[mine] -= np.outer(total[mine] @ roller.normal, roller.normal)
     return total
 
 
-def bodies_of(run: State, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
+def find_bodies_of(run: State, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
     """Numbers of the bodies that nodes, in the numbers of all bodies, belong to."""
     return np.asarray(np.searchsorted(run.first_node, nodes, side="right") - 1)
 
 
-def masses(run: State) -> Floats:
+def compute_masses(run: State) -> Floats:
     """Mass of each body [kg], (bodies,)."""
     return np.array(
         [float((b.material.density * b.gradients[1]).sum()) for b in run.bodies], dtype=float
     )
-
-
-def contact_forces(run: State) -> Floats:
-    """Sizes of the contact forces on vertices that touch something, walls included [N], (t,)."""
-    assert run.contacts is not None
-    size = np.linalg.norm(run.contacts.kernel.force, axis=1)
-    return np.asarray(size[size > 0])
 
 
 def find_kinetic_each(run: State) -> Floats:
@@ -145,7 +136,7 @@ def find_grounded(run: State) -> NDArray[np.bool_]:
     pairs, walled = run.contacts.find_touching_bodies()
     held = [one.nodes for one in run.conditions.held if gravity[0, list(one.components)].any()]
     held += [one.nodes for one in run.conditions.rollers if one.normal @ gravity[0, :3]]
-    on = np.unique(np.concatenate([walled, *(bodies_of(run, nodes) for nodes in held)]))
+    on = np.unique(np.concatenate([walled, *(find_bodies_of(run, nodes) for nodes in held)]))
     one = np.concatenate([pairs[:, 0], on])
     other = np.concatenate([pairs[:, 1], np.full(len(on), count)])  # the ground is one more
     graph = coo_array((np.ones(len(one), bool), (one, other)), shape=(count + 1, count + 1))
@@ -196,10 +187,8 @@ class Damping:
     @classmethod
     def restored(cls, arrays: Mapping[str, NDArray[Any]]) -> Damping:
         """What `stored` gave."""
-        first, begun, peaks = (arrays[name].item() for name in ("first", "begun", "peaks"))
-        later = {name: arrays[name].item() for name in ("wait", "judged") if name in arrays}
-        landed = arrays.get("landed", np.ones(len(arrays["peak"]), bool))
-        return cls(arrays["peak"], arrays["since"], landed, first, begun, peaks, **later)
+        given: list[Any] = [arrays[field.name] for field in fields(cls)]
+        return cls(*(value if value.ndim else value.item() for value in given))
 
 
 def find_rest(
@@ -271,10 +260,12 @@ def find_rest(
 def _judged(run: State, greatest: float, peaks: int, steps: int, time: float) -> Rest:
     energy = find_energy(run)
     stored = energy.elastic + energy.contact
-    forces = contact_forces(run)
+    assert run.contacts is not None
+    forces = np.linalg.norm(run.contacts.kernel.force, axis=1)
+    forces = forces[forces > 0]  # on vertices that touch something, walls included
     size = np.linalg.norm(find_resultants(run), axis=1)
     gravity = run.gravity_at(np.array([run.time]))
-    weight = 0.0 if gravity is None else masses(run) * float(np.linalg.norm(gravity[0]))
+    weight = 0.0 if gravity is None else compute_masses(run) * float(np.linalg.norm(gravity[0]))
     return Rest(
         unbalanced=float(np.sqrt((size**2).mean()) / forces.mean()) if len(forces) else np.inf,
         kinetic=greatest / stored if stored > 0 else np.inf,

@@ -8,11 +8,10 @@ other.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from qdem_fem.bodies import Given
+from qdem_fem.files import Floats
 from qdem_fem.march.state import State
-
-Floats = NDArray[np.float64]
 
 
 def find_velocity(run: State) -> Floats:
@@ -24,10 +23,7 @@ def find_velocity(run: State) -> Floats:
         _, held = run.pack_lists()
         table = run.conditions.table(run.time + run.step * np.arange(2.0))
         ahead = held.weight * (table[1] - table[0])[held.series] / run.step
-        ahead_free = velocity + change
-        if run.absorbers is not None:
-            ahead_free = run.absorbers.slowed(ahead_free, run.step)
-        flat = _by_place(run, ahead_free)
+        flat = _by_place(run, velocity + change)
         flat[held.node_at] = 0.5 * (_by_place(run, velocity)[held.node_at] + ahead)
         velocity = flat.reshape(-1, 4)[run.assembly.place, :3]
     if run.rigid is not None:
@@ -41,12 +37,8 @@ def take_velocities_behind(run: State) -> None:
         displacement = run.assembly.field("displacement")
         velocity = run.assembly.field("velocity")
         change = _accelerations(run, displacement, velocity)
-        if run.absorbers is not None:
-            change = change - run.absorbers.decelerations(velocity)
         behind = velocity - 0.5 * run.step * change
         run.motion.work[:2] -= find_half_work(run, behind, velocity)
-        if run.absorbers is not None:
-            run.motion.absorbed -= run.absorbers.find_half_taken(behind, velocity, run.step)
         if run.rigid is not None:
             run.rigid.kick_half(-1, run.acting(), run.motion.work)
         _, held = run.pack_lists()
@@ -62,8 +54,6 @@ def level_velocities(run: State) -> None:
         behind, level = run.assembly.field("velocity"), find_velocity(run)
         run.motion.work[:2] += find_half_work(run, behind, level)
         run.motion.work[2] += find_viscous_half(run)
-        if run.absorbers is not None:
-            run.motion.absorbed += run.absorbers.find_half_taken(behind, level, run.step)
         if run.rigid is not None:
             run.rigid.kick_half(1, run.acting(), run.motion.work)
         run.assembly.set_field("velocity", level)
@@ -118,11 +108,8 @@ def find_free_accelerations(run: State, displacement: Floats, velocity: Floats) 
     """What the forces would make of all nodes now if none were held [m/s^2], (n, 3)."""
     loads, _ = run.pack_lists()
     now = np.full(2, run.time)
-    free = run.assembly.accelerations(
-        displacement, velocity, loads, run.conditions.table(now), run.gravity_at(now)
-    )
-    if run.absorbers is not None:
-        free = free + run.absorbers.spring_accelerations(displacement)
+    given = Given(run.conditions.table(now), loads, gravity=run.gravity_at(now))
+    free = run.assembly.accelerations(displacement, velocity, given)
     return free if run.contacts is None else free + run.contacts.accelerations()
 
 

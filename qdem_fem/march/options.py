@@ -2,52 +2,62 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from typing import Any
 
 from qdem_fem.bodies import Body
+from qdem_fem.contact.spheres import SphereContact
+from qdem_fem.contact.surface import SurfaceContact
 from qdem_fem.element import MEASURES
 from qdem_fem.files import ConditionError, is_real
 
-PRECISIONS = ("float64", "float32")
-DEVICES = ("cpu", "cuda")
+Contact = SphereContact | SurfaceContact
+WORDS = {
+    "strain": tuple(MEASURES),
+    "precision": ("float64", "float32"),
+    "device": ("cpu", "cuda"),
+}
 
 
-def check_bodies(bodies: Sequence[Body]) -> None:
-    """Raise `ConditionError` unless these are bodies, each once, that no simulation moves yet."""
-    if not bodies or not all(isinstance(body, Body) for body in bodies):
+def list_bodies(bodies: Any) -> list[Body]:
+    """The bodies of a simulation; those of one name get numbers: "body 0", "body 1", ...
+
+    Raises `ConditionError` unless these are bodies, each once, that no simulation moves yet.
+    """
+    if not isinstance(bodies, Iterable):
+        raise ConditionError(f"{bodies!r} is no list of bodies", where="simulation")
+    own = list(bodies)
+    if not own or not all(isinstance(body, Body) for body in own):
         raise ConditionError("give a list of at least one Body", where="simulation")
-    if len({id(body) for body in bodies}) < len(bodies):
+    if len({id(body) for body in own}) < len(own):
         raise ConditionError("a body is listed twice", where="simulation")
-    for body in bodies:
+    names = [body.name for body in own]
+    for number, body in enumerate(own):
         if body.mover is not None:
             raise ConditionError(
                 f"{body.name} is in another simulation, which moves it",
                 where="simulation",
                 remedy="make another of the same mesh: Body(body.mesh, body.material)",
             )
-
-
-def number_bodies(bodies: Sequence[Body]) -> None:
-    """Give bodies of one name numbers, "body 0", "body 1", ..., as messages name bodies."""
-    names = [body.name for body in bodies]
-    for number, body in enumerate(bodies):
         if names.count(body.name) > 1:
             body.name = f"{body.name} {number}"
+    return own
 
 
-def check_words(**given: Any) -> None:
-    """Raise `ConditionError` for a ``strain``, ``precision`` or ``device`` that there is not."""
-    known = {"strain": tuple(MEASURES), "precision": PRECISIONS, "device": DEVICES}
-    for name, value in given.items():
-        if value not in known[name]:
+def check_options(
+    *, step: float | None, safety: float, threads: int | None, mass_scaling: float | None,
+    **words: str,
+) -> None:  # fmt: skip
+    """Raise `ConditionError` for an option that there is not."""
+    for name, word in words.items():
+        if word not in WORDS[name]:
             raise ConditionError(
-                f"{value!r} is none of {', '.join(known[name])}", where=f"simulation, {name}"
+                f"{word!r} is none of {', '.join(WORDS[name])}", where=f"simulation, {name}"
             )
-
-
-def check_bounds(*, safety: float, threads: int | None) -> None:
-    """Raise `ConditionError` for a share of the critical step above 1, or part of a thread."""
+    numbers = {"step": step, "safety": safety, "threads": threads, "mass_scaling": mass_scaling}
+    for name, number in numbers.items():
+        if number is not None and not (is_real(number) and number > 0):
+            raise ConditionError(f"{number!r} is not above zero", where=f"simulation, {name}")
     if safety > 1:
         raise ConditionError(
             f"{safety!r} of the critical step is not stable",
@@ -58,14 +68,31 @@ def check_bounds(*, safety: float, threads: int | None) -> None:
         raise ConditionError(f"{threads!r} is no number of threads", where="simulation, threads")
 
 
-def check_numbers(**given: Any) -> None:
-    """Raise `ConditionError` for an option that is a number and not above zero; None is left."""
-    for name, number in given.items():
-        if number is not None and not (is_real(number) and number > 0):
-            raise ConditionError(f"{number!r} is not above zero", where=f"simulation, {name}")
+def check_contact(contact: Any, precision: str, device: str) -> None:
+    """Raise `ConditionError` for a contact that such a simulation can not have."""
+    if contact is None:
+        return
+    if not isinstance(contact, Contact):
+        raise ConditionError(
+            f"a {type(contact).__name__} is no contact",
+            where="simulation, contact",
+            remedy="give a SphereContact or a SurfaceContact",
+        )
+    if precision != "float64":
+        raise ConditionError(
+            "contact is computed in double precision",
+            where="simulation, contact",
+            remedy='take precision="float64"',
+        )
+    if device != "cpu" and not isinstance(contact, SphereContact):
+        raise ConditionError(
+            "contact of surfaces is computed on the processor",
+            where="simulation, contact",
+            remedy='take device="cpu", or a SphereContact',
+        )
 
 
-def check_rigid_options(bodies: Sequence[Body], precision: str, device: str) -> None:
+def check_rigid(bodies: list[Body], precision: str, device: str) -> None:
     """Raise `ConditionError` for rigid bodies where none are computed."""
     rigid = [body.name for body in bodies if body.rigid]
     if rigid and (precision != "float64" or device != "cpu"):

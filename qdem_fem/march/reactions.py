@@ -5,20 +5,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from qdem_fem.bodies import Held, Roller
-from qdem_fem.files import ConditionError, Driver
+from qdem_fem.files import ConditionError, Driver, Floats
 from qdem_fem.march.leapfrog import find_free_accelerations, find_velocity
 from qdem_fem.march.state import State
 
 if TYPE_CHECKING:
     from qdem_fem.rigid import RigidBodies
 
-Floats = NDArray[np.float64]
 
-
-def reaction(run: State, condition: Held | Roller) -> Floats:
+def find_reaction(run: State, condition: Held | Roller) -> Floats:
     """Total force of a support on the body now [N], (3,): ``sum m a - f`` over what it holds.
 
     ``f``: what elements, loads and gravity do to its nodes; ``a``: of the motion it prescribes.

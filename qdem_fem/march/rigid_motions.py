@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from qdem_fem.files import ConditionError
+from qdem_fem.files import ConditionError, Floats
 from qdem_fem.march.state import State
-
-Floats = NDArray[np.float64]
 
 HELD_SHARE = 1e-9
 """A rigid motion held by less than this share of a body's nodes' mean motion is called free."""

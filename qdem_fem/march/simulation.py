@@ -2,39 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil, nan
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from qdem_fem.bodies import Body, Held, Roller
 from qdem_fem.contact import choose_assembly
 from qdem_fem.element import Strain
-from qdem_fem.files import ConditionError, Driver, Value, is_real
+from qdem_fem.files import ConditionError, Driver, Floats, Value, is_real
 from qdem_fem.march.checkpoint import read_checkpoint, write_checkpoint
 from qdem_fem.march.conditioned_bodies import ConditionedBodies
-from qdem_fem.march.contacts import Contact, check_contact_options
 from qdem_fem.march.dynamic_relaxation import StaticAnswer, relax
 from qdem_fem.march.energies import Energy, find_energy
 from qdem_fem.march.leapfrog import find_velocity, level_velocities
 from qdem_fem.march.options import (
-    check_bodies,
-    check_bounds,
-    check_numbers,
-    check_rigid_options,
-    check_words,
-    number_bodies,
+    Contact,
+    check_contact,
+    check_options,
+    check_rigid,
+    list_bodies,
 )
-from qdem_fem.march.reactions import reaction
+from qdem_fem.march.reactions import find_reaction
 from qdem_fem.march.state import STEP_SAFETY
 from qdem_fem.march.steps import march
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 STEPS_MOST = 2**53
 """Numbers of steps are exact as floats up to here."""
@@ -88,17 +82,14 @@ class Simulation(ConditionedBodies):
         device: Literal["cpu", "cuda"] = "cpu",
         contact: Contact | None = None,
     ) -> None:
-        if not isinstance(bodies, Iterable):
-            raise ConditionError(f"{bodies!r} is no list of bodies", where="simulation")
-        own = list(bodies)
-        check_bodies(own)
-        number_bodies(own)
-        check_words(strain=strain, precision=precision, device=device)
-        check_numbers(step=step, safety=safety, threads=threads, mass_scaling=mass_scaling)
-        check_bounds(safety=safety, threads=threads)
-        check_contact_options(contact, precision, device)
+        own = list_bodies(bodies)
+        check_options(
+            strain=strain, precision=precision, device=device, step=step, safety=safety,
+            threads=threads, mass_scaling=mass_scaling,
+        )  # fmt: skip
+        check_contact(contact, precision, device)
         choose_assembly(device)
-        check_rigid_options(own, precision, device)
+        check_rigid(own, precision, device)
         super().__init__(
             own, strain, precision, threads, mass_scaling, device,
             None if gravity is None else Driver(gravity, 3, "gravity"),
@@ -110,15 +101,12 @@ class Simulation(ConditionedBodies):
     @property
     def added_mass(self) -> dict[str, float]:
         """What mass scaling added to each body, over its own mass [-]: the error it may make."""
-        mass = self.assembly.mass
-        added = {}
-        for body, start in zip(self.bodies, self.first_node, strict=False):
-            if body.rigid:
-                added[body.name] = 0.0
-                continue
-            own = float((body.material.density * body.gradients[1]).sum())
-            nodes = np.unique(self.master[start : start + len(body.nodes)])
-            added[body.name] = float(mass[nodes].sum()) / own - 1 if self.mass_scaling else 0.0
+        added = {body.name: 0.0 for body in self.bodies}
+        for body in self.bodies:
+            if self.mass_scaling and not body.rigid:
+                own = float((body.material.density * body.gradients[1]).sum())
+                nodes = np.unique(self.master[self._own(body)])
+                added[body.name] = float(self.assembly.mass[nodes].sum()) / own - 1
         return added
 
     def advance(
@@ -162,27 +150,18 @@ class Simulation(ConditionedBodies):
         Until the residual is below ``tolerance`` of the loads; time stands still, and `advance`
         goes on from there.  See `qdem_fem.march.relax` for what is raised.
         """
-        if self.contact is not None:
-            raise ConditionError(
-                "bodies in contact have no static answer here",
-                where="relax",
-                remedy="march, with viscosity, until they rest",
-            )
-        if self.rigid is not None:
-            raise ConditionError(
-                "rigid bodies have no static answer here", where="relax", remedy="march"
-            )
-        if self.conditions.absorbing:
-            raise ConditionError(
-                "absorbing faces have no static answer here",
-                where="relax",
-                remedy="fix them, relax, and remove the fix before absorb",
-            )
+        for there, what, remedy in (
+            (self.contact, "bodies in contact", "march, with viscosity, until they rest"),
+            (self.rigid, "rigid bodies", "march"),
+        ):
+            if there is not None:
+                said = f"{what} have no static answer here"
+                raise ConditionError(said, where="relax", remedy=remedy)
         return relax(self, tolerance, max_steps)
 
     def reaction(self, condition: Held | Roller) -> Floats:
         """Total force [N], (3,), that `fix`, `prescribe` or `roller` exerts on the body now."""
-        return reaction(self, condition)
+        return find_reaction(self, condition)
 
     def velocities(self, bodies: Sequence[Body]) -> Floats:
         """`Body.velocity` of some bodies, one after the other, computed once [m/s], (n, 3)."""

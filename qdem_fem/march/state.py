@@ -8,9 +8,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from qdem_fem.contact import CriticalStep, System, find_critical_step
+from qdem_fem.contact import (
+    CriticalStep,
+    SphereContacts,
+    SurfaceContacts,
+    System,
+    find_critical_step,
+)
+from qdem_fem.contact.spheres import SphereContact
 from qdem_fem.files import ConditionError
-from qdem_fem.march.contacts import Contact, contacts_of
+from qdem_fem.march.options import Contact
 
 if TYPE_CHECKING:
     from qdem_fem.contact import Contacts
@@ -76,7 +83,7 @@ class State(System):
     def contacts(self) -> Contacts | None:
         """The contacts of the bodies; None where they have none."""
         if self.contact is not None and self._contacts is None:
-            self._contacts = contacts_of(self, self.contact)
+            self._contacts = make_contacts(self, self.contact)
         return self._contacts
 
     def acting(self) -> Acting:
@@ -107,3 +114,14 @@ class State(System):
         """Find contacts again when next needed: the user moved a body."""
         if self._contacts is not None:
             self._contacts.stale = True
+
+
+def make_contacts(run: System, contact: Contact) -> Contacts:
+    """What computes a contact."""
+    if not isinstance(contact, SphereContact):
+        return SurfaceContacts(run, contact)
+    if run.device == "cpu":
+        return SphereContacts(run, contact)
+    from qdem_fem.contact.cuda import CudaSphereContacts
+
+    return CudaSphereContacts(run, contact)

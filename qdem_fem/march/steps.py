@@ -4,23 +4,18 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
-from functools import partial
 from math import isnan
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from qdem_fem.bodies import Body
-from qdem_fem.element import displacement_gradient, volume_change
-from qdem_fem.files import ElementInverted, StepWarning, Unstable
+from qdem_fem.bodies import Body, Given
+from qdem_fem.contact import run_window
+from qdem_fem.element import compute_displacement_gradient, compute_volume_change
+from qdem_fem.files import ElementInverted, Floats, Integers, StepWarning, Unstable
 from qdem_fem.kernel.cpu import Probes
 from qdem_fem.march.energies import find_energy
 from qdem_fem.march.leapfrog import admit_state, take_velocities_behind
 from qdem_fem.march.state import State
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 WINDOW_STEPS = 4096
 GRAVITY_STEPS = 16
@@ -51,7 +46,7 @@ def march(
         run.contacts.refresh()
     if isnan(motion.put_in):
         motion.put_in = find_set_energy(run)
-    step_check(run)
+    check_step(run)
     take_velocities_behind(run)
     loads, held = run.pack_lists()
     samples = Samples(motion.steps_done, steps, stride, len(nodes))
@@ -61,11 +56,7 @@ def march(
     if run.gravity is not None and run.gravity.varying is not None:
         most = GRAVITY_STEPS
     end = motion.steps_done + steps
-    window = assembly.window
-    if run.contacts is not None:
-        window = run.contacts.window
-    elif run.rigid is not None or run.absorbers is not None:
-        window = partial(run_window_alone, run)
+    window = assembly.window if run.contacts is None else run.contacts.window
     try:
         while motion.steps_done < end:
             assembly.renew_frames()
@@ -73,18 +64,21 @@ def march(
             times = run.step * (motion.steps_done + np.arange(count + 1, dtype=float))
             probes = samples.probes(4 * assembly.place[nodes], motion.steps_done)
             gravity = run.gravity_at(times)
-            before = moment(run) if gravity is not None else None
-            done, bad = window(
-                count, run.step, loads, held, probes, run.conditions.table(times), gravity,
-                motion.work,
-            )  # fmt: skip
+            before = find_moment(run) if gravity is not None else None
+            given = Given(run.conditions.table(times), loads, held, probes, gravity)
+            if run.contacts is None and run.rigid is not None:
+                done, bad, _ = run_window(run, None, count, run.step, given, motion.work)
+            else:
+                done, bad = window(count, run.step, given, motion.work)
             motion.steps_done += done
             if gravity is not None and before is not None and done:
-                after = moment(run)
-                motion.gravity_work += gravity_work(gravity[: done + 1], before, after, run.step)
-            motion_check(run, bad)
+                after = find_moment(run)
+                motion.gravity_work += compute_gravity_work(
+                    gravity[: done + 1], before, after, run.step
+                )
+            check_motion(run, bad)
             if run.contacts is not None:
-                run.contacts.step_check(
+                run.contacts.check_step(
                     run.step, run.elements_critical_step.value, last=motion.steps_done == end
                 )
             if progress is not None:
@@ -93,14 +87,6 @@ def march(
         if run.rigid is not None:
             run.rigid.follow()
     return samples
-
-
-def run_window_alone(run: State, *given: Any) -> tuple[int, float]:
-    """`Assembly.window` of a system with rigid bodies or absorbing faces that touch nothing."""
-    from qdem_fem.contact import run_window
-
-    done, bad, _ = run_window(run, None, *given)
-    return done, bad
 
 
 class Samples:
@@ -128,7 +114,7 @@ class Samples:
         return Probes(node_at, self.record[taken:], self.stride, ahead)
 
 
-def step_check(run: State) -> None:
+def check_step(run: State) -> None:
     """Warn, once for the present conditions, of a step that is above the critical one or short."""
     critical = run.critical_step
     remark = "" if run.given_step is not None else critical.remark
@@ -148,15 +134,10 @@ def find_set_energy(run: State) -> float:
     if still and run.contacts is None:
         return 0.0
     energy = find_energy(run)
-    return energy.kinetic + abs(energy.elastic) + energy.contact + energy.foundation
+    return energy.kinetic + abs(energy.elastic) + energy.contact
 
 
-def sum_energy_put_in(run: State) -> float:
-    """All energy that was ever put in [J]."""
-    return run.motion.put_in + abs(run.motion.work[:2]).sum() + abs(run.motion.gravity_work)
-
-
-def moment(run: State) -> tuple[Floats, Floats]:
+def find_moment(run: State) -> tuple[Floats, Floats]:
     """``sum m u`` [kg m] and ``sum m v`` [kg m/s] half a step before, (3,) each."""
     place, speed = run.assembly.moment()
     if run.rigid is not None:
@@ -164,13 +145,13 @@ def moment(run: State) -> tuple[Floats, Floats]:
     return place, speed
 
 
-def gravity_work(
+def compute_gravity_work(
     gravity: Floats,
     before: tuple[Floats, Floats],
     after: tuple[Floats, Floats],
     step: float,
 ) -> float:
-    """Work of gravity (k + 1, 3) [m/s^2] in a window of k steps [J], from `moment` at its ends.
+    """Work of gravity (k + 1, 3) [m/s^2] in a window of k steps [J], by `find_moment` at its ends.
 
     ``sum dt (g(t_k) + g(t_k+1))/2 P(k+1/2)``: its mean multiplies the way of the centre of mass,
     exactly; for the rest the momentum P within the window is the derivative of the cubic through
@@ -189,10 +170,11 @@ def gravity_work(
     return work + float(step * ((acting - mean) * momentum).sum())
 
 
-def motion_check(run: State, bad: float) -> None:
+def check_motion(run: State, bad: float) -> None:
     """Raise when the state can not be right: energy from nothing, or ``bad`` elements."""
     kinetic = run.assembly.kinetic() + (0.0 if run.rigid is None else run.rigid.kinetic())
-    put_in = sum_energy_put_in(run)
+    motion = run.motion
+    put_in = motion.put_in + abs(motion.work[:2]).sum() + abs(motion.gravity_work)
     ratio = run.step / run.critical_step.value
     if not kinetic <= UNSTABLE_GROWTH * put_in and (ratio > 1 or not np.isfinite(kinetic)):
         critical = run.critical_step
@@ -235,7 +217,9 @@ def find_inverted(bodies: Sequence[Body], displacement: Floats) -> tuple[str, in
             continue
         moved = displacement[start : start + len(body.nodes)]
         start += len(body.nodes)
-        jacobian = 1 + volume_change(displacement_gradient(body.gradients[0], body.elements, moved))
+        jacobian = 1 + compute_volume_change(
+            compute_displacement_gradient(body.gradients[0], body.elements, moved)
+        )
         wrong = np.flatnonzero(~(jacobian > 0))
         if wrong.size:
             worst = int(wrong[np.argmin(np.nan_to_num(jacobian[wrong], nan=-np.inf))])

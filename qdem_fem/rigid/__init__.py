@@ -1,10 +1,8 @@
 """Bodies that are rigid in a run: six freedoms each."""
 
 from qdem_fem.rigid import step
-from qdem_fem.rigid.forces import Acting, RigidBodies
+from qdem_fem.rigid.bodies import Acting, RigidBodies
 from qdem_fem.rigid.holds import find_hold
-from qdem_fem.rigid.step import Rigid, rigid_advance
+from qdem_fem.rigid.step import Rigid, advance_rigid
 
-__all__ = [
-    "Acting", "Rigid", "RigidBodies", "find_hold", "rigid_advance", "step",
-]  # fmt: skip
+__all__ = ["Acting", "Rigid", "RigidBodies", "advance_rigid", "find_hold", "step"]

@@ -7,13 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from qdem_fem.bodies import RigidMass, cross_matrix
-from qdem_fem.files import ConditionError
+from qdem_fem.bodies import RigidMass, make_cross_matrix
+from qdem_fem.files import ConditionError, Floats, Integers
 from qdem_fem.kernel.cpu import Constraints, Loads
 from qdem_fem.rigid.step import FREE, STILL
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 LOOSE = 1e-9
 """Share of a freedom's motion below which a held component does not see it."""
@@ -49,7 +46,7 @@ def find_hold(
     follow different motions.
     """
     size = float(np.sqrt(own.inertia[-1] / own.mass))
-    rows = np.concatenate([np.tile(np.eye(3), (len(arm), 1, 1)), -cross_matrix(arm / size)], 2)
+    rows = np.concatenate([np.tile(np.eye(3), (len(arm), 1, 1)), -make_cross_matrix(arm / size)], 2)
     rows = rows[np.arange(len(arm)), component]
     triangle = np.linalg.qr(np.concatenate([rows, np.zeros((6, 6))]), mode="r")
     _, stretch, motions = np.linalg.svd(triangle)

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from qdem_fem.kernel import exact, inlined
+from qdem_fem.kernel import cross, dot, exact, inlined, row
 
 FREE, STILL = 3, -1
 """Of ``Rigid.turning``; 0, 1, 2: turns about that axis of the laboratory alone."""
@@ -67,24 +67,6 @@ class Rigid(NamedTuple):
 
 
 @inlined
-def cross(a: Any, b: Any) -> Any:  # pragma: no cover
-    """a x b"""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@inlined
-def dot(a: Any, b: Any) -> Any:  # pragma: no cover
-    """a . b"""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@inlined
-def triple(a: Any, i: int) -> Any:  # pragma: no cover
-    """Row i of ``a`` (..., 3)."""
-    return a[i, 0], a[i, 1], a[i, 2]
-
-
-@inlined
 def axis_of(axes: Any, b: int, i: int) -> Any:  # pragma: no cover
     """Principal axis i of body b."""
     return axes[b, i, 0], axes[b, i, 1], axes[b, i, 2]
@@ -131,7 +113,7 @@ def around(q: Any, axis: Any, m: float, n: float, angle: float) -> Any:  # pragm
 def drift(c: Any, b: int, q: Any, spin: Any, step: float) -> Any:  # pragma: no cover
     """The turn of body b after ``step`` [s] without torque."""
     first, second, third = axis_of(c.axes, b, 0), axis_of(c.axes, b, 1), axis_of(c.axes, b, 2)
-    inverse = triple(c.inverse_inertia, b)
+    inverse = row(c.inverse_inertia, b)
     back = q[0], -q[1], -q[2], -q[3]
     own = turned(back, spin)
     m0, m1, m2 = dot(first, own), dot(second, own), dot(third, own)
@@ -185,7 +167,7 @@ def take_pulls(c: Any, b: int, forces: Any) -> Any:  # pragma: no cover
             continue
         for k in range(3):
             forces[at + k] = 0.0
-        force, torque = add_pull(force, torque, turned(q, triple(c.arm, i)), f)
+        force, torque = add_pull(force, torque, turned(q, row(c.arm, i)), f)
     return force, torque
 
 
@@ -196,7 +178,7 @@ def take_loads(c: Any, b: int, table_row: Any) -> Any:  # pragma: no cover
     for i in range(c.load_first[b], c.load_first[b + 1]):
         size, k = c.load_weight[i] * table_row[c.load_series[i]], c.load_component[i]
         f = size * (k == 0), size * (k == 1), size * (k == 2)
-        force, torque = add_pull(force, torque, turned(q, triple(c.load_arm, i)), f)
+        force, torque = add_pull(force, torque, turned(q, row(c.load_arm, i)), f)
     return force, torque
 
 
@@ -220,7 +202,7 @@ def place_vertices(
     y = turned_less(q, (0.0, 1.0, 0.0))
     z = turned_less(q, (0.0, 0.0, 1.0))
     for i in range(c.node_first[b], c.node_first[b + 1]):
-        arm, at = triple(c.arm, i), c.node_at[i]
+        arm, at = row(c.arm, i), c.node_at[i]
         for k in range(3):
             there = c.shift[b, k] + (x[k] * arm[0] + y[k] * arm[1] + z[k] * arm[2])
             velocity[at + k] = (there - displacement[at + k]) * rate
@@ -228,7 +210,7 @@ def place_vertices(
 
 
 @exact
-def rigid_advance(
+def advance_rigid(
     c: Any, forces: Any, displacement: Any, velocity: Any, table: Any, gravity: Any, work: Any,
     step: float,
 ) -> None:  # fmt: skip  # pragma: no cover
@@ -245,11 +227,11 @@ def rigid_advance(
         loaded = c.load_first[b + 1] > c.load_first[b]
         if loaded:
             load, lever = take_loads(c, b, table[0])
-            slow = angular_velocity(c, b, triple(c.spin, b))
+            slow = angular_velocity(c, b, row(c.spin, b))
         for k in range(3):
             c.spin[b, k] += step * (twist[k] + lever[k])
         if loaded or turning != FREE:
-            fast = angular_velocity(c, b, triple(c.spin, b))
+            fast = angular_velocity(c, b, row(c.spin, b))
         done = 0.0
         for k in range(3):
             before = c.velocity[b, k]
@@ -269,7 +251,7 @@ def rigid_advance(
         work[0] += 0.5 * step * done
         q = quaternion(c, b)
         if turning == FREE:
-            q = drift(c, b, q, triple(c.spin, b), step)
+            q = drift(c, b, q, row(c.spin, b), step)
         elif turning != STILL:
             q = turned_about(q, fast, step)
         c.turn[b, 0], c.turn[b, 1], c.turn[b, 2], c.turn[b, 3] = q

@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from qdem_fem.bodies import Body, NodalLoad, cross_matrix
+from qdem_fem.bodies import Body, NodalLoad, make_cross_matrix
 from qdem_fem.files import ConditionError, Series
 from qdem_fem.mesh import lumped_mass
 from qdem_fem.rigid import find_hold
@@ -109,7 +109,7 @@ def compliance_of(body: Body) -> BodyCompliance:
     arm = body.nodes[used] - body.rigid_mass.centre
     density, volume = np.asarray(body.material.density), body.gradients[1]
     weight = np.repeat(lumped_mass(body.elements, volume, density, len(body.nodes))[used], 3)
-    motion = np.concatenate([np.tile(np.eye(3), (len(arm), 1, 1)), -cross_matrix(arm)], axis=2)
+    motion = np.concatenate([np.tile(np.eye(3), (len(arm), 1, 1)), -make_cross_matrix(arm)], axis=2)
     motion = motion.reshape(-1, 6)
     resultant = np.linalg.inv(motion.T @ (weight[:, None] * motion))
     kept = np.setdiff1d(np.arange(len(weight)), _held_components(arm))

@@ -14,7 +14,6 @@ from pydantic import ValidationError
 from qdem_fem.element import MEASURES
 from qdem_fem.files import MeshError
 from qdem_fem.tables import (
-    Absorb,
     BodyTable,
     Condition,
     ContactTable,
@@ -185,8 +184,6 @@ def _condition(
         take(series_of, table.value, f"{key}.value", folder, vector=False)
     elif isinstance(table, Roller):
         take(unit_vector, table.normal, f"{key}.normal")
-    elif isinstance(table, Absorb):
-        arguments.append(table.depth)
     elif isinstance(table, Load):
         take(series_of, table.force, f"{key}.force", folder, vector=True)
     elif isinstance(table, Pressure):

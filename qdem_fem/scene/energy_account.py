@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
 
-STORED = ("kinetic", "elastic", "contact", "friction", "viscous", "absorbed", "foundation")
+STORED = ("kinetic", "elastic", "contact", "friction", "viscous")
 """Stored in the bodies or taken from them, where a run has it."""
 
 

@@ -24,7 +24,6 @@ ENERGY = 100
 ENERGIES = ("kinetic", "elastic", "external")
 CONTACT_ENERGIES = ("contact", "friction")
 VISCOUS_ENERGY = ("viscous",)
-ABSORBING_ENERGIES = ("absorbed", "foundation")
 COST = "cost.json"
 
 
@@ -288,8 +287,7 @@ def _read_cost(path: Path) -> dict[str, float]:
 def energy_names(run: Any) -> tuple[str, ...]:
     """Columns of energy.csv beside the time; of what the scene has and counts."""
     touching = () if run.contact is None else CONTACT_ENERGIES
-    ground = ABSORBING_ENERGIES if run.conditions.absorbing else ()
-    return ENERGIES + touching + VISCOUS_ENERGY * run.viscous + ground
+    return ENERGIES + touching + VISCOUS_ENERGY * run.viscous
 
 
 def _tables(path: Path, probes: dict[str, Any], energies: tuple[str, ...]) -> tuple[Table, Table]:

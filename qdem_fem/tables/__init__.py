@@ -3,7 +3,6 @@
 from qdem_fem.tables.contact import ContactTable, PeriodicTable, contact_faults, contact_of
 from qdem_fem.tables.file import scene_read
 from qdem_fem.tables.keys import (
-    Absorb,
     BodyTable,
     Condition,
     Fix,
@@ -33,10 +32,9 @@ from qdem_fem.tables.series import TimeSeries, WrongSeries, series_of
 from qdem_fem.tables.types import Cells, Share
 
 __all__ = [
-    "Absorb", "BodyTable", "Cells", "Condition", "ContactTable", "Fix", "Load", "MaterialTable",
-    "Mesh", "NoNodes", "Nodes", "Output", "Periodic", "PeriodicTable", "Prepared", "Prescribe",
-    "Pressure", "Probe", "Roller", "Scene", "SeriesTable", "Share", "SimulationTable", "Step",
-    "TimeSeries", "WrongSeries", "contact_faults", "contact_of", "find_named_nodes",
-    "find_output_faults", "list_named_files", "list_tables", "make_body_mesh", "scene_read",
-    "series_of", "unit_vector",
+    "BodyTable", "Cells", "Condition", "ContactTable", "Fix", "Load", "MaterialTable", "Mesh",
+    "NoNodes", "Nodes", "Output", "Periodic", "PeriodicTable", "Prepared", "Prescribe", "Pressure",
+    "Probe", "Roller", "Scene", "SeriesTable", "Share", "SimulationTable", "Step", "TimeSeries",
+    "WrongSeries", "contact_faults", "contact_of", "find_named_nodes", "find_output_faults",
+    "list_named_files", "list_tables", "make_body_mesh", "scene_read", "series_of", "unit_vector",
 ]  # fmt: skip

@@ -62,15 +62,13 @@ class ContactTable(Table):
     """Of two surfaces of the body's material [Pa/m]: a number, or by body."""
     points: Annotated[int, Field(ge=1, le=20)] | None = None
     """A face of a surface has that many points squared."""
-    faces: Literal["points", "overlaps"] | None = None
-    """What of a face bears: points within it, or its exact overlaps with other faces."""
     depth: Positive | None = None
     """Greatest depth of a surface in another [m]."""
 
 
 NEEDED = {"spheres": ("radius", "normal_stiffness"), "surface": ("modulus",)}
 """Keys of each model that have no default."""
-OPTIONS = {"spheres": ("skin", "contacts"), "surface": ("points", "faces", "depth", "contacts")}
+OPTIONS = {"spheres": ("skin", "contacts"), "surface": ("points", "depth", "contacts")}
 
 
 def contact_of(table: ContactTable | None) -> Contact | None:
@@ -80,7 +78,7 @@ def contact_of(table: ContactTable | None) -> Contact | None:
     names = [*NEEDED[table.model], *OPTIONS[table.model]]
     given = {name: getattr(table, name) for name in names if getattr(table, name) is not None}
     planes = tuple(ContactPlane(p.point, p.normal, p.friction) for p in table.plane)
-    if table.periodic is not None:
+    if table.model == "spheres" and table.periodic is not None:
         given["periodic"] = PeriodicWidth(table.periodic.axis, table.periodic.width)
     made = SphereContact if table.model == "spheres" else SurfaceContact
     return made(friction=table.friction, planes=planes, **given)
@@ -111,6 +109,8 @@ def contact_faults(
                 yield f"contact.{quantity}", f"body {missing[0]!r} has none"
     if table.model == "surface" and table.contacts == NEAR:
         yield "contact.contacts", "'near' is for spheres: give a number"
+    if table.model == "surface" and table.periodic is not None:
+        yield "contact.periodic", "a width is for spheres: take walls or rollers at its sides"
     for number, plane in enumerate(table.plane):
         if not any(plane.normal):
             yield f"contact.plane.{number}.normal", "has no direction"

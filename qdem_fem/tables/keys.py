@@ -193,13 +193,6 @@ class Roller(Condition):
     normal: Vector
 
 
-class Absorb(Condition):
-    """Waves leave through the surface faces whose three nodes are all named."""
-
-    depth: Positive | None = None
-    """Of the layer of the same material that was cut away, on rigid ground [m]; else endless."""
-
-
 class Load(Condition):
     """A total force [N], shared equally over the nodes."""
 
@@ -281,7 +274,6 @@ class Scene(Table):
     fix: Annotated[tuple[Fix, ...], Field(strict=False)] = ()
     prescribe: Annotated[tuple[Prescribe, ...], Field(strict=False)] = ()
     roller: Annotated[tuple[Roller, ...], Field(strict=False)] = ()
-    absorb: Annotated[tuple[Absorb, ...], Field(strict=False)] = ()
     load: Annotated[tuple[Load, ...], Field(strict=False)] = ()
     pressure: Annotated[tuple[Pressure, ...], Field(strict=False)] = ()
     periodic: Annotated[tuple[Periodic, ...], Field(strict=False)] = ()

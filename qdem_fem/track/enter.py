@@ -114,7 +114,7 @@ def _faults(text: SceneText) -> Iterator[Problem]:
     """What tables of a track demand of one another."""
     track, contact = text.tables.get("track"), text.tables.get("contact")
     simulation = text.tables.get("simulation")
-    for name in ("body", "fix", "prescribe", "roller", "absorb", "load", "pressure", "periodic"):
+    for name in ("body", "fix", "prescribe", "roller", "load", "pressure", "periodic"):
         if name in text.data:
             yield Problem(name, "[track] makes the bodies and their conditions")
     if isinstance(track, TrackTable):

@@ -21,7 +21,7 @@ BREAKS = (
     ('Move("cut", displacement)', "displacement", "MOVE of cut is no Move(name, displacement)"),
     ("(FakeEngine)", "", "the engine creep lacks command(scene, deck), "),
     ("start=None, ", "", "uzawa takes ['problem', 'tolerance']"),
-    ("energy_stored", "energy", "the strain measure murnaghan lacks energy_stored"),
+    ("compute_stored_energy", "energy", "the strain measure murnaghan lacks compute_stored_energy"),
     ("return make_flat_form(", "return (", "SHAPE of blocks draws no GrainForm"),
     ("return Polygon.regular(corners, diameter / 2)", "return [(0, 1)]",
      "SHAPE of regular draws list in 2D"),

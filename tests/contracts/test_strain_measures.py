@@ -12,24 +12,26 @@ import pytest
 from numba import njit
 from scipy.spatial.transform import Rotation
 
-from qdem_fem.element.kinematics import FloatArray, isotropic
+from qdem_fem.element.kinematics import isotropic
 from qdem_fem.element.strain_measures import MEASURES
+from qdem_fem.files import Floats
 
 LAMBDA = MU = 1.0
 ROUND_OFF = 1e-13
 ASKED = (
-    "MEASURE", "OBJECTIVE", "stress_numbers", "viscous_numbers", "stress_nominal", "energy_stored",
+    "MEASURE", "OBJECTIVE", "compute_stress_numbers", "compute_viscous_numbers",
+    "compute_nominal_stress", "compute_stored_energy",
 )  # fmt: skip
 
 every_measure = pytest.mark.parametrize("name", MEASURES)
 
 
-def draw_gradients(scale: float, seed: int = 0, count: int = 20) -> FloatArray:
+def draw_gradients(scale: float, seed: int = 0, count: int = 20) -> Floats:
     """Random displacement gradients (count, 3, 3)."""
     return np.random.default_rng(seed).uniform(-scale, scale, (count, 3, 3))
 
 
-def stress_small(H: FloatArray) -> FloatArray:
+def stress_small(H: Floats) -> Floats:
     """Nominal stress of linear elasticity."""
     return isotropic((H + np.swapaxes(H, 1, 2)) / 2, LAMBDA, MU)
 
@@ -50,7 +52,7 @@ def test_small_strains_are_linear_elasticity(name: str) -> None:
     for scale in (1e-4, 1e-5):
         H = draw_gradients(scale)
         small = stress_small(H)
-        P = MEASURES[name].stress_nominal(H, LAMBDA, MU)
+        P = MEASURES[name].compute_nominal_stress(H, LAMBDA, MU)
         error.append(np.linalg.norm(P - small) / np.linalg.norm(small))
     assert error[0] < 2e-3
     assert error[1] < 0.11 * error[0] + ROUND_OFF
@@ -60,8 +62,8 @@ def test_small_strains_are_linear_elasticity(name: str) -> None:
 def test_objective_or_says_that_it_is_not(name: str) -> None:
     """P(Q F) = Q P(F) exactly where ``OBJECTIVE`` says so."""
     H, Q = draw_gradients(0.3), Rotation.random(20, random_state=2).as_matrix()
-    P = MEASURES[name].stress_nominal(H, LAMBDA, MU)
-    turned = MEASURES[name].stress_nominal(Q @ (np.eye(3) + H) - np.eye(3), LAMBDA, MU)
+    P = MEASURES[name].compute_nominal_stress(H, LAMBDA, MU)
+    turned = MEASURES[name].compute_nominal_stress(Q @ (np.eye(3) + H) - np.eye(3), LAMBDA, MU)
     assert (np.abs(turned - Q @ P).max() < 1e-11) == MEASURES[name].OBJECTIVE
 
 
@@ -70,14 +72,14 @@ def test_objective_or_says_that_it_is_not(name: str) -> None:
 def test_stress_is_the_slope_of_the_energy(name: str, scale: float) -> None:
     """P = dW/dF by central differences of fourth order; step 0.02 of the strain."""
     H, step, one = draw_gradients(scale), 0.02 * scale, np.ones(20)
-    P = MEASURES[name].stress_nominal(H, LAMBDA, MU)
+    P = MEASURES[name].compute_nominal_stress(H, LAMBDA, MU)
     slope = np.empty_like(P)
     for i, j in np.ndindex(3, 3):
         way = np.zeros((3, 3))
         way[i, j] = step
         far, near = (
-            MEASURES[name].energy_stored(H + k * way, one, LAMBDA, MU)
-            - MEASURES[name].energy_stored(H - k * way, one, LAMBDA, MU)
+            MEASURES[name].compute_stored_energy(H + k * way, one, LAMBDA, MU)
+            - MEASURES[name].compute_stored_energy(H - k * way, one, LAMBDA, MU)
             for k in (2, 1)
         )
         slope[:, i, j] = (8 * near - far) / (12 * step)
@@ -87,15 +89,17 @@ def test_stress_is_the_slope_of_the_energy(name: str, scale: float) -> None:
 @every_measure
 @pytest.mark.parametrize("scale", [1e-12, 1e-3, 0.2])
 def test_stress_of_numbers_is_that_of_arrays(name: str, scale: float) -> None:
-    """`stress_numbers` on arrays and compiled is `stress_nominal`, and J = det F, to round-off."""
+    """`compute_stress_numbers`, on arrays and compiled, is the nominal stress, and J = det F."""
     H = draw_gradients(scale)
-    expected = MEASURES[name].stress_nominal(H, 0.7, 1.3)
-    found, jacobian = MEASURES[name].stress_numbers(tuple(H.reshape(-1, 9).T), 0.7, 1.3, 0.5)
+    expected = MEASURES[name].compute_nominal_stress(H, 0.7, 1.3)
+    found, jacobian = MEASURES[name].compute_stress_numbers(
+        tuple(H.reshape(-1, 9).T), 0.7, 1.3, 0.5
+    )
     bound = 100 * ROUND_OFF * np.abs(expected).max()
     np.testing.assert_allclose(np.stack(found, -1).reshape(-1, 3, 3), expected, atol=bound)
     if MEASURES[name].OBJECTIVE:
         np.testing.assert_allclose(jacobian, np.linalg.det(np.eye(3) + H), rtol=ROUND_OFF)
-    compiled: Any = njit(MEASURES[name].stress_numbers, error_model="numpy")
+    compiled: Any = njit(MEASURES[name].compute_stress_numbers, error_model="numpy")
     alone, _ = compiled(tuple(map(float, H[3].ravel())), 0.7, 1.3, 0.5)
     np.testing.assert_allclose(np.reshape(alone, (3, 3)), expected[3], atol=bound)
 
@@ -106,5 +110,5 @@ def test_viscosity_takes_energy(name: str) -> None:
     H, rate = draw_gradients(0.2), draw_gradients(1.0, seed=1)
     h, d = (tuple(A.reshape(-1, 9).T) for A in (H, rate))
     for first, second in ((-2 / 3, 1.0), (1.0, 0.0)):
-        stress = MEASURES[name].viscous_numbers(h, d, first, second, 0.5)
+        stress = MEASURES[name].compute_viscous_numbers(h, d, first, second, 0.5)
         assert (sum(p * r for p, r in zip(stress, d, strict=True)) > 0).all()

@@ -123,8 +123,7 @@ def test_gravity_that_changes() -> None:
     ("strain", "viscosity"),
     [
         ("finger", 0.0), ("finger", 200.0), ("svk", 0.0),
-        *(pytest.param(*words, marks=pytest.mark.long)
-          for words in (("corotational", 0.0), ("corotational", 200.0), ("svk", 200.0))),
+        pytest.param("svk", 200.0, marks=pytest.mark.long),
     ],
 )  # fmt: skip
 def test_momenta_of_a_free_body(strain: Any, viscosity: float) -> None:
@@ -203,18 +202,6 @@ def test_work_is_energy(name: str) -> None:
     size = after.kinetic + after.elastic
     assert abs(left[0]) < 0.02 * size
     assert abs(left[2]) < abs(left[0]) / 8
-
-
-def test_viscosity_takes_energy() -> None:
-    """A free body with viscosity loses energy in every window, never gains."""
-    body = stone(shear_viscosity=300.0, bulk_viscosity=100.0)
-    run = alone(body)
-    body.velocity = random_field(body, 0.1)
-    energies = []
-    for _ in range(8):
-        run.advance(30 * run.step)
-        energies.append(run.energy().kinetic + run.energy().elastic)
-    assert (np.diff(energies) < 0).all()
 
 
 def test_time_reversal() -> None:
@@ -410,17 +397,3 @@ def test_state_set_before_the_simulation_is_its_start() -> None:
     for each in (run, same):
         each.advance(20 * each.step)
     np.testing.assert_array_equal(body.displacement, twin.displacement)
-
-
-def test_a_rigid_motion_makes_no_stress() -> None:
-    """v = v0 + w x X is kept by no force at the start; finger strain is objective."""
-    body = stone()
-    alone(body)
-    body.displacement = np.cross([0, 0, 1.0], body.nodes) + 5  # no rotation: strains of order one
-    assert body.von_mises().max() > 1e3
-    angle = 0.7
-    turn = np.array(
-        [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
-    )
-    body.displacement = body.nodes @ (turn - np.eye(3)).T + 5
-    assert body.von_mises().max() < 1e-8 * YOUNG

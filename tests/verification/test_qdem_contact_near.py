@@ -11,7 +11,7 @@ import pytest
 from scipy.linalg import eigh
 
 import qdem_fem as q
-from qdem_fem.bodies.rigid_mass import cross_matrix
+from qdem_fem.bodies.rigid_mass import make_cross_matrix
 from qdem_fem.files.errors import ConditionError, StepWarning, Unstable
 from qdem_fem.mesh.generation import make_box_mesh
 from qdem_fem.tables.contact import ContactTable, contact_faults
@@ -69,7 +69,7 @@ def test_step_of_rigid_bodies_is_that_of_their_twelve_freedoms(kind: Any, shift:
         nodes = body.nodes + body.displacement
         face = nodes[np.isclose(nodes[:, 2], SIDE if sign == 1 else SIDE + 2 * RADIUS + 1e-5)]
         arm = face - body.rigid_mass.centre - body.displacement[0]
-        each = [np.broadcast_to(np.eye(3), (9, 3, 3)), -cross_matrix(arm)]
+        each = [np.broadcast_to(np.eye(3), (9, 3, 3)), -make_cross_matrix(arm)]
         jacobian.append(sign * np.concatenate(each, axis=2))
         every.append(face)
     apart = np.linalg.norm(every[0][:, None] - every[1], axis=2)

@@ -85,12 +85,10 @@ def on_edge_of_face() -> list[q.Body]:
 CASES = {
     "edges": on_edges, "vertex": on_vertex, "faces": on_faces, "rim": on_edge_of_face,
 }  # fmt: skip
-FACES = pytest.mark.parametrize("faces", ["points", "overlaps"])
 
 
-@FACES
 @pytest.mark.parametrize("case", CASES)
-def test_forces_are_the_gradient_of_the_energy(case: str, faces: str) -> None:
+def test_forces_are_the_gradient_of_the_energy(case: str) -> None:
     """``f dx = -dW`` along random motions of all vertices, by central differences.
 
     W is quadratic in a depth of some 1e-5 m; over 1e-9 m the differences are exact to rounding of
@@ -98,7 +96,7 @@ def test_forces_are_the_gradient_of_the_energy(case: str, faces: str) -> None:
     """
     bodies = CASES[case]()
     wall = q.ContactPlane((0, 0, bodies[0].nodes[:, 2].min() + 2e-5), (0, 0.001, 1))
-    run = touching(bodies, faces=faces, planes=[wall])
+    run = touching(bodies, planes=[wall])
     run.contacts.refresh()
     random = np.random.default_rng(0)
     force, energy = forces_at(run, np.zeros((len(run.contacts.nodes), 3)))
@@ -111,11 +109,10 @@ def test_forces_are_the_gradient_of_the_energy(case: str, faces: str) -> None:
         assert (behind - ahead) / 2 == pytest.approx(work, abs=2e-5 * scale)
 
 
-@FACES
 @pytest.mark.parametrize("case", CASES)
-def test_forces_are_balanced_in_force_and_moment(case: str, faces: str) -> None:
+def test_forces_are_balanced_in_force_and_moment(case: str) -> None:
     """To rounding; with friction the moment is that of the depth, which the springs lie apart."""
-    run = touching(CASES[case](), friction=0.5, faces=faces)
+    run = touching(CASES[case](), friction=0.5)
     run.contacts.refresh()
     c = run.contacts
     size = np.abs(c.kernel.force).max()
@@ -162,77 +159,15 @@ def test_faces_bear_the_pressure_of_their_depth() -> None:
         )
         run = touching([cube(below), inner])
         run.contacts.refresh()
-        count = len(run.contacts.outside[0].node)
+        count = run.contacts.first_vertex[1]
         lifted = run.contacts.kernel.force[count:, 2].sum()
         own = MODULUS / 2 * depth * (0.6 * SIDE) ** 2
         # the smaller face bears its half exactly; of the larger one the points beneath it do
         assert own < lifted < 2.5 * own
     wall = q.ContactPlane((0, 0, depth), (0, 0, 1), 0.0)
-    for faces in ("points", "overlaps"):
-        run = touching([cube(2)], planes=[wall], faces=faces)
-        pressed = -2 * MODULUS * depth * SIDE**2
-        assert run.contacts.plane_force(0)[2] == pytest.approx(pressed, rel=1e-9)
-
-
-def overlap_twin(a: Floats, b: Floats, cells: int = 400) -> float:
-    """Energy of two faces for a modulus of one: the weight, the mean normal, a sum over a grid."""
-    n_a, n_b = (np.cross(t[1] - t[0], t[2] - t[0]) for t in (a, b))
-    n_a, n_b = n_a / np.linalg.norm(n_a), n_b / np.linalg.norm(n_b)
-    share = (-n_a @ n_b - 0.5) / 0.5
-    n = (n_b - n_a) / np.linalg.norm(n_b - n_a)
-    frame = np.linalg.svd(n[None])[2][1:]
-    low = np.maximum(*((t @ frame.T).min(axis=0) for t in (a, b)))
-    high = np.minimum(*((t @ frame.T).max(axis=0) for t in (a, b)))
-    steps = (np.arange(cells) + 0.5) / cells
-    y = low + (high - low) * np.stack(np.meshgrid(steps, steps), -1).reshape(-1, 2)
-
-    def coordinates(t: Floats) -> Floats:
-        flat = t @ frame.T
-        two = np.linalg.solve((flat[1:] - flat[0]).T, (y - flat[0]).T).T
-        return np.column_stack([1 - two.sum(axis=1), two])
-
-    on_a, on_b = coordinates(a), coordinates(b)
-    ahead = on_b @ (b @ n) - on_a @ (a @ n)
-    both = (on_a.min(axis=1) > 0) & (on_b.min(axis=1) > 0) & (ahead > 0)
-    area = np.prod(high - low) / cells**2
-    return float(share**2 * (3 - 2 * share) * 0.5 * (ahead[both] ** 2).sum() * area)
-
-
-@pytest.mark.parametrize("case", ["faces", "rim"])
-def test_overlaps_are_their_twin(case: str) -> None:
-    """Energies of the pairs that bear most, and of some others: within the error of a grid, 1 %."""
-    run = touching(CASES[case](), faces="overlaps")
-    run.contacts.refresh()
-    kernel = run.contacts.kernel
-    energy = kernel.overlaps.account[:, 0]
-    for at in np.argsort(-energy)[[0, 1, 5, 9]]:
-        a, b = kernel.position[kernel.surface.face[kernel.overlaps.faces[at]]]
-        assert energy[at] == pytest.approx(MODULUS * overlap_twin(a, b), rel=1e-2)
-        assert energy[at] > 0
-
-
-@pytest.mark.parametrize("cells", [(1, 1), (3, 4), (5, 2)])
-def test_overlaps_load_both_meshes_as_a_uniform_pressure(cells: tuple[int, int]) -> None:
-    """Whatever the two meshes: ``p g`` times a third of the faces around every node, to g/side.
-
-    What the points do not give where meshes differ; with it, stress between two cubes is uniform.
-    """
-    depth = 1e-8
-    bodies = [cube(cells[0]), cube(cells[1], (0, 0, SIDE - depth), name="above")]
-    run = touching(bodies, faces="overlaps")
-    run.contacts.refresh()
-    c = run.contacts
-    place = c.kernel.position
-    for body, sign, height in ((0, -1, SIDE), (1, 1, SIDE - depth)):
-        own = (c.nodes >= run.first_node[body]) & (c.nodes < run.first_node[body + 1])
-        flat = own & (np.abs(place[:, 2] - height) < 1e-12)
-        face = c.kernel.surface.face[flat[c.kernel.surface.face].all(axis=1)]
-        area = np.linalg.norm(np.cross(*(place[face[:, 1:]] - place[face[:, :1]]).swapaxes(0, 1)),
-                              axis=1) / 2  # fmt: skip
-        expected = np.bincount(face.ravel(), np.repeat(area / 3, 3), len(place))[flat]
-        force = sign * c.kernel.force[flat, 2] / (MODULUS * depth)
-        assert force == pytest.approx(expected, rel=1e-6, abs=1e-6 * expected.max())
-        assert expected.sum() == pytest.approx(SIDE**2, rel=1e-9)
+    run = touching([cube(2)], planes=[wall])
+    pressed = -2 * MODULUS * depth * SIDE**2
+    assert run.contacts.plane_force(0)[2] == pytest.approx(pressed, rel=1e-9)
 
 
 def test_edges_are_looked_at_before_they_touch() -> None:
@@ -263,13 +198,12 @@ def test_edges_are_looked_at_before_they_touch() -> None:
         assert np.array_equal(*(run.assembly.field(field) for run in runs))
 
 
-@FACES
-def test_collision_keeps_momentum_moment_and_energy(faces: str) -> None:
+def test_collision_keeps_momentum_moment_and_energy() -> None:
     """Cube on cube edge to edge at 0.2 m/s with friction; the bounds of rounding and of dt^2."""
     bodies = on_edges()
     moved = bodies[1].nodes + np.array([0.001, 0.002, 2.1e-5])
     bodies[1] = q.Body((moved, bodies[1].elements), STONE)
-    run = touching(bodies, friction=0.3, faces=faces)
+    run = touching(bodies, friction=0.3)
     bodies[1].velocity = np.tile([0.05, 0.0, -0.2], (len(bodies[1].nodes), 1))
 
     def state() -> tuple[Floats, Floats, float]:
@@ -294,24 +228,21 @@ def test_collision_keeps_momentum_moment_and_energy(faces: str) -> None:
     assert np.abs(after[1] - before[1]).max() < 2e-3 * np.linalg.norm(before[1])
 
 
-@pytest.mark.parametrize(
-    ("model", "share"), [("surface", 0.99), ("surface", 1.01), ("overlaps", 0.99)]
-)
-def test_block_on_a_slope(model: str, share: float) -> None:
+@pytest.mark.parametrize("share", [0.99, 1.01])
+def test_block_on_a_slope(share: float) -> None:
     """``tan(alpha) = 1/2``, mu one per cent below: it slides as a rigid block; above: it rests."""
-    gain, rigid, way = slope_gain(share, model)
+    gain, rigid, way = slope_gain(share, "surface")
     if share < 1:
         assert gain == pytest.approx(rigid, rel=0.1)
     else:
         assert abs(way) < 1e-7
 
 
-@FACES
-def test_a_saved_run_goes_on_to_the_same_bits(tmp_path: Path, faces: str) -> None:
+def test_a_saved_run_goes_on_to_the_same_bits(tmp_path: Path) -> None:
     """Areas, springs and lists are in the checkpoint."""
 
     def made() -> q.Simulation:
-        run = touching(on_faces(), friction=0.1, faces=faces)
+        run = touching(on_faces(), friction=0.1)
         run.bodies[1].velocity = np.tile([0.5, 0.3, -0.1], (len(run.bodies[1].nodes), 1))
         return run
 
@@ -358,7 +289,5 @@ def test_wrong_options_and_depths_are_named() -> None:
         q.SurfaceContact(0.0, 0.5)
     with pytest.raises(ConditionError, match="points"):
         q.SurfaceContact(1e12, 0.5, points=0)
-    with pytest.raises(ConditionError, match="do not bear by 'lines'"):
-        q.SurfaceContact(1e12, 0.5, faces="lines")
     with pytest.raises(ContactTooDeep, match="inside another body"):
         touching([cube(2), cube(2, (0.001, 0.001, SIDE - 3e-3), name="above")]).advance(1e-7)

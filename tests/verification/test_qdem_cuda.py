@@ -94,8 +94,8 @@ def test_no_float_literal_in_single_precision_code() -> None:
     assert literals(inspect.getsource(stress)) == []
     for function in (cuda_step.edges, cuda_step.add_forces):
         assert literals(inspect.getsource(function.py_func)) == []
-    assert literals(inspect.getsource(cuda_step.element_forces_kernel.__wrapped__)) == []
-    assert literals(inspect.getsource(cuda_step.pulls_function)) == []
+    assert literals(inspect.getsource(cuda_step.build_element_forces.__wrapped__)) == []
+    assert literals(inspect.getsource(cuda_step.build_pulls_function)) == []
 
 
 def literals(source: str) -> list[float]:

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 
 from tests.cuda_marches import (
     lists_gpu_shuffled,
-    motion_summed,
     simulator_begin,
     steps_launched,
-    sums_before,
+    sum_before,
+    sum_motion,
     sums_gpu,
     sums_processor,
 )
@@ -99,7 +99,7 @@ def test_energy_and_momentum_are_summed(simulator: Executor, parts: int) -> None
     random = np.random.default_rng(parts)
     (u, v), mass = random.uniform(1.0, 2.0, (2, 23, 4)), random.uniform(1.0, 2.0, 23)
     expected = [(mass[:, None] * v[:, :3] ** 2).sum(), *mass @ u[:, :3], *mass @ v[:, :3]]
-    found = simulator.submit(motion_summed, u, v, mass, parts).result()
+    found = simulator.submit(sum_motion, u, v, mass, parts).result()
     np.testing.assert_allclose(found, expected, rtol=3 * 23 * EPS)
 
 
@@ -108,7 +108,7 @@ def test_sums_before_each(simulator: Executor, count: int) -> None:
     """One chunk, many, and chunks of chunks: the cumulative sum."""
     values = np.random.default_rng(count).integers(0, 5, count)
     expected = np.concatenate([[0], np.cumsum(values)])
-    found = simulator.submit(sums_before, values).result()
+    found = simulator.submit(sum_before, values).result()
     assert found.dtype == np.int64
     np.testing.assert_array_equal(found, expected)
 

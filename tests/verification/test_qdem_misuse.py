@@ -10,7 +10,6 @@ import pytest
 
 import qdem_fem as q
 from qdem_fem.files.errors import ConditionError, ElementInverted, QdemError, StepWarning, Unstable
-from qdem_fem.march.steps import gravity_work
 from qdem_fem.mesh.generation import make_box_mesh
 
 MESH = make_box_mesh((1.0, 0.5, 0.5), (4, 2, 2), "kuhn")
@@ -71,34 +70,13 @@ def test_all_held() -> None:
     np.testing.assert_allclose(body.displacement, expected, rtol=0, atol=1e-15)
 
 
-def test_an_inverted_element_is_named() -> None:
-    """The one whose volume is most negative, in a march and in a static answer."""
-    turned = np.zeros(X.shape)
-    corner = int(np.argmax(X.sum(axis=1)))
-    turned[corner] = -0.6 * np.array([0.25, 0.25, 0.25])
+def test_an_element_inverted_by_a_given_displacement_is_named() -> None:
+    """In a static answer: the one whose volume is most negative."""
+    turned, corner = np.zeros(X.shape), int(np.argmax(X.sum(axis=1)))
+    turned[corner] = -1.5 * np.array([0.25, 0.25, 0.25])
     body = block()
-    edges = X + turned
-    volume = np.einsum(
-        "ei,ei->e",
-        np.cross(
-            edges[body.elements[:, 1]] - edges[body.elements[:, 0]],
-            edges[body.elements[:, 2]] - edges[body.elements[:, 0]],
-        ),
-        edges[body.elements[:, 3]] - edges[body.elements[:, 0]],
-    )
-    turned[corner] *= 2.5
-    edges = X + turned
-    corners = edges[body.elements]
-    jacobian = np.linalg.det(corners[:, 1:] - corners[:, :1]) / (6 * body.gradients[1])
-    worst = int(np.argmin(jacobian))
-    assert volume.min() > 0 > jacobian[worst]
-    run = q.Simulation([body], threads=1)
-    body.displacement = turned
-    with pytest.raises(ElementInverted, match=f"element {worst} of block") as raised:
-        run.advance(run.step)
-    assert raised.value.element == worst
-
-    body = block()
+    corners = (X + turned)[body.elements]
+    worst = int(np.argmin(np.linalg.det(corners[:, 1:] - corners[:, :1]) / body.gradients[1]))
     run = q.Simulation([body], threads=1)
     run.fix(body, LEFT)
     for axis, value in zip("xyz", turned[corner], strict=True):
@@ -126,24 +104,6 @@ def test_bodies_of_one_name_are_numbered() -> None:
     bodies = [block("stone"), block("sleeper"), block("stone")]
     q.Simulation(bodies)
     assert [body.name for body in bodies] == ["stone 0", "sleeper", "stone 2"]
-
-
-@pytest.mark.parametrize("frequency", [0.0, 3.0, 40.0])
-def test_work_of_a_gravity_that_changes(frequency: float) -> None:
-    """Against the exact integral, for a free fall: ``u'' = g(t)``; error of second order."""
-    errors = []
-    for step in (2e-3, 1e-3):
-        n = 16
-        t = step * np.arange(n + 1)
-        g = np.cos(frequency * t)[:, None] * [1.0, 2.0, -9.81]
-        half = np.cumsum(np.concatenate([0.5 * step * g[:1], step * g[1:]]), axis=0)  # v(k+1/2)
-        place = np.concatenate([np.zeros((1, 3)), step * np.cumsum(half[:-1], axis=0)])
-        begun = half[0] - step * g[0]
-        work = gravity_work(g, (place[0], begun), (place[-1], half[-2]), step)
-        end = np.sin(frequency * t[-1]) / frequency if frequency else t[-1]
-        exact = 0.5 * (1 + 4 + 9.81**2) * end**2
-        errors.append(abs(work / exact - 1))
-    assert errors[1] < max(1e-12, errors[0] / 3.5)
 
 
 def test_a_force_by_node() -> None:
@@ -192,18 +152,3 @@ def test_wrong_types_get_a_sentence(name: str) -> None:
         call(run, body)
     assert word in str(raised.value)
     assert run.steps_done == 0
-
-
-def test_a_motion_that_starts_at_speed_is_paid_for() -> None:
-    """Kinetic + elastic - external from rest: second order in dt, as the scheme's energy is."""
-    left = []
-    for share in (0.8, 0.4, 0.2):
-        body = block()
-        run = q.Simulation([body], threads=1, strain="svk", safety=share)
-        run.fix(body, LEFT)
-        run.prescribe(body, RIGHT, "z", lambda t: 2.0 * t)
-        run.advance(0.02)
-        energy = run.energy()
-        left.append((energy.kinetic + energy.elastic) / energy.external - 1)
-    assert abs(left[0]) < 5e-3
-    assert abs(left[2]) < abs(left[0]) / 8

@@ -10,7 +10,7 @@ import pytest
 
 from qdem_fem import Body, Material, Simulation
 from qdem_fem.mesh.generation import jitter, make_box_mesh
-from tests.qdem_reference_forces import stress_cauchy, stress_finger
+from tests.qdem_reference_forces import compute_cauchy_stress, stress_finger
 
 SOFT = Material(young=1e6, poisson=0.25, density=1000.0)
 
@@ -25,7 +25,7 @@ def test_a_uniform_gradient_is_exact(seed: int) -> None:
     gradient = 0.1 * generator.standard_normal((3, 3))
     body.displacement = mesh.nodes @ gradient.T + generator.standard_normal(3)
     nominal = stress_finger(gradient[None], SOFT.lame_first, SOFT.lame_second)
-    expected = stress_cauchy(gradient[None], nominal, "finger")
+    expected = compute_cauchy_stress(gradient[None], nominal, "finger")
     assert np.abs(body.stress() - expected).max() < 1e-12 * np.abs(expected).max()
     run.advance(run.step)
     acceleration = np.linalg.norm(body.velocity, axis=1)

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from scipy.special import ellipj
 
 import qdem_fem as q
-from qdem_fem.bodies.rigid_mass import cross_matrix, rigid_mass
+from qdem_fem.bodies.rigid_mass import compute_rigid_mass, make_cross_matrix
 from qdem_fem.contact.bounds import bound_spring_network
 from qdem_fem.files.errors import (
     CheckpointError,
@@ -114,11 +114,11 @@ def test_lumped_inertia_is_that_of_the_deformable_mesh() -> None:
         body = q.Body(make_box_mesh(BRICK, (cells,) * 3), STONE, rigid="lumped")
         soft = q.Body(body.mesh, STONE)
         mass, own = q.Simulation([soft]).assembly.mass, body.rigid_mass
-        arm = cross_matrix(body.nodes - own.centre)
+        arm = make_cross_matrix(body.nodes - own.centre)
         tensor = np.einsum("n,nki,nkj->ij", mass, arm, arm)
         np.testing.assert_allclose(own.tensor, tensor, atol=1e-13 * tensor.max())
         weight = np.asarray(body.material.density) * body.gradients[1]
-        solid = rigid_mass(body.nodes, body.elements, weight)
+        solid = compute_rigid_mass(body.nodes, body.elements, weight)
         excess.append(own.inertia / solid.inertia - 1)
     np.testing.assert_allclose(np.log2(excess[0] / excess[1]), 2.0, atol=0.2)
 
@@ -168,7 +168,7 @@ def test_torque_free_top_against_the_closed_form() -> None:
     def rates(_: float, turn: Floats) -> Floats:
         turn = turn.reshape(3, 3)
         own = np.linalg.solve(tensor, turn.T @ spin)
-        return np.asarray(turn @ cross_matrix(own)).ravel()
+        return np.asarray(turn @ make_cross_matrix(own)).ravel()
 
     peer = solve_ivp(rates, (0, duration), np.eye(3).ravel(), "DOP853", rtol=1e-12, atol=1e-12)
     errors = []
@@ -373,7 +373,7 @@ def test_bound_on_frequencies_holds_with_rigid_bodies() -> None:
                 place[i, :, at] = np.eye(3)
                 continue
             at = slice(6 * rigid.body[row], 6 * rigid.body[row] + 6)
-            place[i, :, at] = np.hstack([np.eye(3), -cross_matrix(rigid.arm[row])])
+            place[i, :, at] = np.hstack([np.eye(3), -make_cross_matrix(rigid.arm[row])])
         for b, own in enumerate(rigid.own):
             at = slice(6 * b, 6 * b + 6)
             inertia[at, at] = np.diag([own.mass] * 3 + [0] * 3)

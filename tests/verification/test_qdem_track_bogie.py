@@ -175,7 +175,10 @@ def test_a_record_of_the_load_belongs_to_the_run(tmp_path: Path) -> None:
         ("track.bed=none/bed.npz", "track.bed: there is no folder"),
         ("contact.modulus=1e9", "contact.modulus: the model 'spheres' does not use it"),
         ("simulation.precision=float32", "contact is computed in double precision"),
-        ("absorb=[{ body = 'sleeper', nodes = { set = 'top' } }]", "absorb: .track. makes the"),
+        (
+            "roller=[{ body = 'sleeper', nodes = { set = 'top' }, normal = [0, 0, 1] }]",
+            "roller: .track. makes the",
+        ),
     ],
 )
 def test_a_track_that_can_not_be_as_asked_is_refused(

@@ -19,7 +19,7 @@ import pytest
 import qdem_fem as q
 from qdem_fem.contact.sphere_state import SphereContacts
 from qdem_fem.files.errors import NotConverged
-from qdem_fem.march.kinetic_damping import find_rest, masses
+from qdem_fem.march.kinetic_damping import compute_masses, find_rest
 from qdem_fem.mesh.generation import make_box_mesh
 from qdem_fem.scene.build import simulation_of
 from qdem_fem.scene.checks import load_scene
@@ -92,7 +92,7 @@ def test_a_bed_with_too_little_is_refused_and_remembered(
     assert stand.at_limit == 0.5  # the upper ones, which bear less
     run, bodies = begin_bed(SLOPING, bed, contact(0.15))
     before = bodies["sleeper"].displacement[:, 0].mean()
-    weight = float(masses(run)[1] * 9.81)
+    weight = float(compute_masses(run)[1] * 9.81)
     run.advance(TIME)
     way = bodies["sleeper"].displacement[:, 0].mean() - before
     tangential = STIFFNESS / (2 * 1.2)  # k_n/(2 (1 + nu))

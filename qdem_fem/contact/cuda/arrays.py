@@ -12,13 +12,12 @@ import numpy as np
 
 from qdem_fem.contact.cuda.law import (
     add_reactions,
-    forces_push,
-    pairs_forces_kernel,
-    spheres_move,
-    walls_forces,
+    build_pairs_forces,
+    compute_walls_forces,
+    move_spheres,
+    push_forces,
 )
 from qdem_fem.contact.cuda.pairs import renew_pairs
-from qdem_fem.contact.cuda.sums import bound_present, count_idle, find_gap, find_positions
 from qdem_fem.contact.search import Pairs, PeriodicWidth
 from qdem_fem.contact.spheres import GO_ON, LOOK_AGAIN, TOO_DEEP, Contact, Planes, Spheres
 from qdem_fem.kernel.cuda import AGAIN, DEEP, cuda, grid
@@ -58,7 +57,7 @@ class DeviceContact:
     def launch_push(self, forces: Any, status: Any, k: int) -> None:
         """Forces found in the step before reach the nodes."""
         c = self.on
-        forces_push[grid(self.acting)](
+        push_forces[grid(self.acting)](
             self.acting, c.pairs.acting, c.spheres.place, c.force, forces, status, k
         )
 
@@ -67,16 +66,16 @@ class DeviceContact:
     ) -> None:
         """Contact at the new displacement, as `qdem_fem.contact.spheres.advance_build`'s."""
         c, (s, p, w, *_), few = self.on, self.on, grid(self.acting)
-        spheres_move[grid(self.size)](
+        move_spheres[grid(self.size)](
             s.reference, s.place, displacement, c.start, c.half_skin, c.position, status, k
         )
-        pairs_forces_kernel(self.side is not None)[few](
+        build_pairs_forces(self.side is not None)[few](
             self.acting, p.acting, p.first, p.second, p.touching, p.spring, p.pull, p.image,
             c.position, s.radius, s.normal, s.tangential, s.place, velocity, c.friction, c.force,
             c.slid, status, step, k,
         )  # fmt: skip
         if self.walls:
-            walls_forces[few](
+            compute_walls_forces[few](
                 self.acting, p.acting, p.wall_first, p.wall, w.point, w.normal, w.friction,
                 w.spring, w.force, c.position, s.radius, s.normal, s.tangential, s.place, velocity,
                 c.force, c.slid, status, step, k,
@@ -98,22 +97,6 @@ class DeviceContact:
         return self.said
 
     # --- between windows -----------------------------------------------------------------------
-
-    def positions(self, displacement: Any) -> Any:
-        """The spheres of a displacement (c, 3) [m], on the GPU; None where one is no number."""
-        return self.on.position if find_positions(self.on, displacement) else None
-
-    def gap(self, position: Any) -> float:
-        """By how much what touched in the last step is apart at (c, 3) [m]."""
-        return find_gap(self.on, position, self.walls)
-
-    def idle(self) -> int:
-        """Pairs of the list that do not touch."""
-        return count_idle(self.on)
-
-    def bound(self, inverse_mass: Any) -> float:
-        """Bound on omega^2 of what touches [1/s^2]; ``inverse_mass`` (c,) [1/kg] on the GPU."""
-        return bound_present(self.on, self.walls, inverse_mass)
 
     def renew_lists(self, position: Any, skin: float, half_skin: float) -> None:
         """List what is within ``skin`` [m] at (c, 3) [m], good for ways of ``half_skin`` [m]."""

@@ -17,9 +17,9 @@ import numpy as np
 
 from qdem_fem.contact.search import PeriodicWidth
 from qdem_fem.contact.search import cells as contact_cells
-from qdem_fem.kernel.cuda import cuda, grid, sums_before
+from qdem_fem.kernel.cuda import cuda, grid, sum_before
 
-cell_bucket: Any = cuda.jit(device=True)(contact_cells.cell_bucket.py_func)
+find_cell_bucket: Any = cuda.jit(device=True)(contact_cells.find_cell_bucket.py_func)
 
 
 class Entries(NamedTuple):
@@ -85,7 +85,7 @@ def count_cells(at: Any, there: Any, size: Any, cell: Any, bucket: Any, counts: 
     if e < there.size and there[e] != 0:
         for c in range(3):
             cell[e, c] = floor(at[e, c] / size)
-        bucket[e] = cell_bucket(cell[e, 0], cell[e, 1], cell[e, 2], counts.size)
+        bucket[e] = find_cell_bucket(cell[e, 0], cell[e, 1], cell[e, 2], counts.size)
         cuda.atomic.add(counts, bucket[e], 1)
 
 
@@ -118,6 +118,6 @@ def find_cells(entries: Entries, size: float) -> Cells:
     counts = cuda.device_array(max(16, 1 << (2 * length - 1).bit_length()), np.int64)
     put_zeros[grid(counts.size)](counts)
     count_cells[grid(length)](entries.at, entries.there, size, cell, bucket, counts)
-    start, order = sums_before(counts, counts.size), cuda.device_array(length, np.int64)
+    start, order = sum_before(counts, counts.size), cuda.device_array(length, np.int64)
     fill_cells[grid(length)](entries.there, bucket, start, counts, order)
     return Cells(cell, start, order)

@@ -23,7 +23,7 @@ series: Any = cuda.jit(device=True)(contact_kernel.series.py_func)
 
 
 @cuda.jit
-def forces_push(
+def push_forces(
     count: Any, acting: Any, place: Any, force: Any, forces: Any, status: Any, k: Any
 ) -> None:
     """Add the force on each of the ``count`` acting spheres to its node's."""
@@ -35,7 +35,7 @@ def forces_push(
 
 
 @cuda.jit
-def spheres_move(
+def move_spheres(
     reference: Any, place: Any, displacement: Any, start: Any, half_skin: Any, position: Any,
     status: Any, k: Any,
 ) -> None:  # fmt: skip
@@ -53,16 +53,16 @@ def spheres_move(
 
 
 @cache
-def pairs_forces_kernel(periodic: bool) -> Any:
+def build_pairs_forces(periodic: bool) -> Any:
     """The kernel of the pairs; images are not in its code where nothing is periodic."""
 
     @cuda.jit
-    def pairs_forces(
+    def compute_pairs_forces(
         count: Any, acting: Any, first: Any, second: Any, touching: Any, spring: Any, pull: Any,
         image: Any, position: Any, radius: Any, normal: Any, tangential: Any, place: Any,
         velocity: Any, friction: Any, force: Any, slid: Any, status: Any, step: Any, k: Any,
     ) -> None:  # fmt: skip
-        """`qdem_fem.contact.spheres.pairs_forces`, of one sphere."""
+        """`qdem_fem.contact.spheres.compute_pairs_forces`, of one sphere."""
         q = cuda.grid(1)
         if q >= count or k >= status[LIMIT] or status[AGAIN] > 0:
             return
@@ -105,16 +105,16 @@ def pairs_forces_kernel(periodic: bool) -> Any:
             fx, fy, fz = fx + pull[p, 0], fy + pull[p, 1], fz + pull[p, 2]
         force[i, 0], force[i, 1], force[i, 2] = fx, fy, fz
 
-    return pairs_forces
+    return compute_pairs_forces
 
 
 @cuda.jit
-def walls_forces(
+def compute_walls_forces(
     count: Any, acting: Any, wall_first: Any, wall: Any, point: Any, across: Any, friction: Any,
     spring: Any, pull: Any, position: Any, radius: Any, normal: Any, tangential: Any, place: Any,
     velocity: Any, force: Any, slid: Any, status: Any, step: Any, k: Any,
 ) -> None:  # fmt: skip
-    """`qdem_fem.contact.spheres.planes_forces`, of one sphere."""
+    """`qdem_fem.contact.spheres.compute_planes_forces`, of one sphere."""
     q = cuda.grid(1)
     if q >= count or k >= status[LIMIT] or status[AGAIN] > 0:
         return

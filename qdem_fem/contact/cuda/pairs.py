@@ -15,14 +15,14 @@ from typing import Any
 
 import numpy as np
 
-from qdem_fem.contact.cuda.cells import cell_bucket, find_cells, find_entries, put_zeros
+from qdem_fem.contact.cuda.cells import find_cell_bucket, find_cells, find_entries, put_zeros
 from qdem_fem.contact.search import Pairs, PeriodicWidth
 from qdem_fem.contact.spheres import Contact
-from qdem_fem.kernel.cuda import cuda, grid, sums_before
+from qdem_fem.kernel.cuda import cuda, grid, sum_before
 
 
 @cuda.jit(device=True)
-def square_apart(at: Any, e: Any, f: Any) -> Any:
+def compute_square_apart(at: Any, e: Any, f: Any) -> Any:
     """Square of the distance of entries e and f [m^2].
 
     Fused by hand, here and for walls: a compiler is free to fuse one kernel in another way than the
@@ -33,7 +33,7 @@ def square_apart(at: Any, e: Any, f: Any) -> Any:
 
 
 @cache
-def rows_kernel(filling: bool) -> Any:
+def build_rows_kernel(filling: bool) -> Any:
     """The kernel that goes through the cells: it counts pairs, or, ``filling``, writes them."""
 
     @cuda.jit
@@ -59,7 +59,7 @@ def rows_kernel(filling: bool) -> Any:
                 x = cell[e, 0] + step // 9 - 1
                 y = cell[e, 1] + step // 3 % 3 - 1
                 z = cell[e, 2] + step % 3 - 1
-                b = cell_bucket(x, y, z, start.size - 1)
+                b = find_cell_bucket(x, y, z, start.size - 1)
                 for q in range(start[b], start[b + 1]):
                     f = order[q]
                     if cell[f, 0] != x or cell[f, 1] != y or cell[f, 2] != z:
@@ -70,7 +70,7 @@ def rows_kernel(filling: bool) -> Any:
                     if j <= i or body[j] == body[i]:
                         continue
                     reach = radius[i] + radius[j] + skin
-                    if square_apart(at, e, f) > reach * reach:
+                    if compute_square_apart(at, e, f) > reach * reach:
                         continue
                     if filling:
                         place = first[i] + found  # rows are short: sort by insertion
@@ -121,7 +121,9 @@ def sort_backs(back_first: Any, back_pair: Any) -> None:
 
 
 @cuda.jit(device=True)
-def wall_near(position: Any, radius: Any, point: Any, normal: Any, way: Any, i: Any, w: Any) -> Any:
+def is_wall_near(
+    position: Any, radius: Any, point: Any, normal: Any, way: Any, i: Any, w: Any
+) -> Any:
     """Whether sphere i touches wall w, or will on a ``way`` [m]."""
     apart = (position[i, 0] - point[w, 0]) * normal[w, 0]
     apart = cuda.fma(position[i, 1] - point[w, 1], normal[w, 1], apart)
@@ -140,7 +142,7 @@ def count_walls(
         return
     count = 0
     for w in range(walls):
-        if wall_near(position, radius, point, normal, way, i, w):
+        if is_wall_near(position, radius, point, normal, way, i, w):
             count += 1
     near[i] = count
     paired = first[i + 1] > first[i] or back_first[i + 1] > back_first[i]
@@ -158,7 +160,7 @@ def fill_walls(
         return
     place = wall_first[i]
     for w in range(walls):
-        if wall_near(position, radius, point, normal, way, i, w):
+        if is_wall_near(position, radius, point, normal, way, i, w):
             wall[place] = w
             place += 1
     if acting_first[i + 1] > acting_first[i]:
@@ -202,19 +204,21 @@ def renew_pairs(
     counts, backs = (cuda.device_array(count, np.int64) for _ in range(2))
     put_zeros[grid(count)](backs)
     looked = (*entries, *cells, radius, body, skin, axis, width, counts, backs)
-    rows_kernel(False)[grid(count)](*looked, old.first, old.second, entries.at)
-    first, back_first = sums_before(counts, count), sums_before(backs, count)
+    build_rows_kernel(False)[grid(count)](*looked, old.first, old.second, entries.at)
+    first, back_first = sum_before(counts, count), sum_before(backs, count)
     rows = max(1, int(first[count]))
     second, back_pair = (cuda.device_array(rows, np.int64) for _ in range(2))
     image = old.image if side is None else cuda.device_array((rows, 3))
-    rows_kernel(True)[grid(count)](*looked, first, second, entries.at if side is None else image)
+    build_rows_kernel(True)[grid(count)](
+        *looked, first, second, entries.at if side is None else image
+    )
     fill_backs[grid(count)](first, second, back_first, backs, back_pair)
     sort_backs[grid(count)](back_first, back_pair)
 
     planes = position, radius, c.planes.point, c.planes.normal, walls, skin
     near, acts = (cuda.device_array(count, np.int64) for _ in range(2))
     count_walls[grid(count)](*planes, first, back_first, near, acts)
-    wall_first, acting_first = sums_before(near, count), sums_before(acts, count)
+    wall_first, acting_first = sum_before(near, count), sum_before(acts, count)
     actors = int(acting_first[count])
     wall = cuda.device_array(max(1, int(wall_first[count])), np.int64)
     acting = cuda.device_array(max(1, actors), np.int64)

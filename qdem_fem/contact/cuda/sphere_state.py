@@ -10,11 +10,19 @@ from __future__ import annotations
 from functools import cached_property
 from typing import Any
 
-from qdem_fem.contact import PARTED, Floats, SphereContacts
+from qdem_fem.bodies import Given
+from qdem_fem.contact import PARTED, SphereContacts
 from qdem_fem.contact.cuda.arrays import DeviceContact
-from qdem_fem.contact.cuda.sums import find_device_extents
+from qdem_fem.contact.cuda.sums import (
+    bound_present,
+    count_idle,
+    find_device_extents,
+    find_gap,
+    find_positions,
+)
 from qdem_fem.contact.search import PeriodicWidth
 from qdem_fem.contact.spheres import Contact
+from qdem_fem.files import Floats
 from qdem_fem.kernel.cuda import CudaAssembly, cuda
 
 
@@ -45,53 +53,39 @@ class CudaSphereContacts(SphereContacts):
         return self._device
 
     @cached_property
-    def _constants(self) -> tuple[Any, Any, Any]:
-        """``inverse_mass``, ``own`` and ``first_vertex`` on the GPU."""
-        inverse_mass, own, first = (
-            cuda.to_device(a) for a in (self.inverse_mass, self.own, self.first_vertex)
-        )
-        return inverse_mass, own, first
+    def _constants(self) -> tuple[Any, Any]:
+        """``inverse_mass`` and ``first_vertex`` on the GPU."""
+        return cuda.to_device(self.inverse_mass), cuda.to_device(self.first_vertex)
 
     def forget(self) -> None:
-        """Let go of all springs."""
         self.changing.forget()
 
     def positions(self) -> Any:
-        """`Contacts.positions`, on the GPU."""
-        return self.changing.positions(self.run.assembly.state.displacement)
+        on = self.changing.on
+        return on.position if find_positions(on, self.run.assembly.state.displacement) else None
 
     def extents(self, position: Any, side: PeriodicWidth) -> Floats:
-        """`Contacts.extents` of positions on the GPU."""
-        found: Floats = find_device_extents(position, side.number, *self._constants[1:])
+        found: Floats = find_device_extents(position, side.number, self._constants[1])
         return found
 
     def parted(self, position: Any) -> float:
-        """`SphereContacts.parted` of positions on the GPU."""
-        return PARTED * self._device.gap(position)
+        return PARTED * find_gap(self._device.on, position, self._device.walls)
 
     def idle(self) -> int:
-        """`SphereContacts.idle`"""
-        return self._device.idle()
+        return count_idle(self._device.on)
 
-    def pairs_look(self, position: Any, skin: float) -> None:
-        """`SphereContacts.pairs_look` around positions on the GPU."""
+    def look_for_pairs(self, position: Any, skin: float) -> None:
         self.changing.renew_lists(position, skin, self.skin / 2)
 
     def step_contact(self, step: float) -> int:
-        """`Contacts.step_contact`"""
         state = self.run.assembly.state
         return self.changing.step_contact(state.displacement, state.velocity, step)
 
     def bound_present_stiffness(self) -> float:
-        """`SphereContacts.bound_present_stiffness`"""
-        return self._device.bound(self._constants[0])
+        return bound_present(self._device.on, self._device.walls, self._constants[0])
 
-    def march(self, steps: int, step: float, *given: Any) -> tuple[int, float, int]:
-        """`Contacts.march` on the GPU."""
+    def march(self, steps: int, step: float, given: Given, work: Floats) -> tuple[int, float, int]:
         assembly = self.run.assembly
         assert isinstance(assembly, CudaAssembly)
-        loads, held, probes, table, gravity, work = given
-        done, bad = assembly.run_kernel(
-            assembly.state, steps, step, loads, held, probes, table, gravity, work, self.changing
-        )
+        done, bad = assembly.run_kernel(assembly.state, steps, step, given, work, self.changing)
         return done, bad, self._device.said

@@ -30,20 +30,19 @@ def put_positions(
 
 
 @cuda.jit
-def put_extents(position: Any, axis: Any, own: Any, first: Any, size: Any) -> None:
+def put_extents(position: Any, axis: Any, first: Any, size: Any) -> None:
     """`qdem_fem.contact.search.extents`, a thread a body."""
     b = cuda.grid(1)
     if b >= size.size:
         return
     low, high = np.inf, -np.inf
     for i in range(first[b], first[b + 1]):
-        if own[i]:
-            low, high = min(low, position[i, axis]), max(high, position[i, axis])
+        low, high = min(low, position[i, axis]), max(high, position[i, axis])
     size[b] = max(high - low, 0.0)
 
 
 @cuda.jit
-def gap_greatest(
+def find_greatest_gap(
     position: Any, radius: Any, first: Any, second: Any, touching: Any, image: Any, periodic: Any,
     point: Any, normal: Any, force: Any, walls: Any, greatest: Any,
 ) -> None:  # fmt: skip
@@ -85,7 +84,7 @@ def add_idle(first: Any, touching: Any, count: Any) -> None:
 
 
 @cuda.jit
-def springs_sum(
+def sum_springs(
     first: Any, second: Any, touching: Any, stiffness: Any, force: Any, walls: Any, total: Any,
     walled: Any,
 ) -> None:  # fmt: skip
@@ -137,14 +136,14 @@ def find_positions(c: Contact, displacement: Any) -> bool:
     return not astray.copy_to_host()[0]
 
 
-def find_device_extents(position: Any, axis: int, own: Any, first: Any) -> Any:
+def find_device_extents(position: Any, axis: int, first: Any) -> Any:
     """`qdem_fem.contact.search.extents` of bodies along an axis [m], (bodies,), on the host.
 
-    ``position`` (c, 3) [m], ``own`` (c,) and ``first`` (bodies + 1,) on the GPU.
+    ``position`` (c, 3) [m] and ``first`` (bodies + 1,) on the GPU.
     """
     bodies = first.size - 1
     size = cuda.device_array(bodies)
-    put_extents[grid(bodies)](position, axis, own, first, size)
+    put_extents[grid(bodies)](position, axis, first, size)
     return size.copy_to_host()
 
 
@@ -154,7 +153,7 @@ def find_gap(c: Contact, position: Any, walls: int) -> float:
     pairs, planes = c.pairs, c.planes
     periodic = pairs.image.ndim > 1
     image = pairs.image if periodic else position  # not looked at
-    gap_greatest[grid(count)](
+    find_greatest_gap[grid(count)](
         position, c.spheres.radius, pairs.first, pairs.second, pairs.touching, image, periodic,
         planes.point, planes.normal, planes.force, walls, greatest,
     )  # fmt: skip
@@ -177,6 +176,6 @@ def bound_present(c: Contact, walls: int, inverse_mass: Any) -> float:
     greatest, total = cuda.to_device(np.zeros(1)), cuda.to_device(np.zeros(count))
     walled = cuda.device_array(count, np.uint8)
     listed = pairs.first, pairs.second, pairs.touching
-    springs_sum[grid(count)](*listed, c.spheres.normal, c.planes.force, walls, total, walled)
+    sum_springs[grid(count)](*listed, c.spheres.normal, c.planes.force, walls, total, walled)
     bound_greatest[grid(count)](*listed, total, walled, inverse_mass, greatest)
     return float(greatest.copy_to_host()[0])

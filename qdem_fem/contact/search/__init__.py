@@ -14,11 +14,11 @@ from qdem_fem.contact.search.periodic import (
     check_extents,
     check_joined,
     extents,
-    find_joined_twins,
+    find_outer_nodes,
     find_partners,
 )
 
 __all__ = [
     "NO_IMAGE", "Pairs", "PeriodicWidth", "cells", "check_extents", "check_joined", "choose_skin",
-    "extents", "find_joined_twins", "find_near_walls", "find_partners", "make_pairs", "renew_pairs",
+    "extents", "find_near_walls", "find_outer_nodes", "find_partners", "make_pairs", "renew_pairs",
 ]  # fmt: skip

@@ -36,7 +36,7 @@ def fill_cells(position: Any, size: float) -> tuple[Any, Any, Any]:  # pragma: n
     for i in range(count):
         for c in range(3):
             cell[i, c] = np.int64(np.floor(position[i, c] / size))
-        bucket[i] = cell_bucket(cell[i, 0], cell[i, 1], cell[i, 2], buckets)
+        bucket[i] = find_cell_bucket(cell[i, 0], cell[i, 1], cell[i, 2], buckets)
         start[bucket[i] + 1] += 1
     for b in range(buckets):
         start[b + 1] += start[b]
@@ -49,7 +49,7 @@ def fill_cells(position: Any, size: float) -> tuple[Any, Any, Any]:  # pragma: n
 
 
 @njit(cache=True)
-def cell_bucket(x: int, y: int, z: int, buckets: int) -> int:  # pragma: no cover
+def find_cell_bucket(x: int, y: int, z: int, buckets: int) -> int:  # pragma: no cover
     """Bucket of a cell; ``buckets`` is a power of two."""
     mixed = x * 73856093 ^ y * 19349663 ^ z * 83492791
     return (mixed ^ (mixed >> 17)) & (buckets - 1)
@@ -98,7 +98,7 @@ def make_patches(position: Any, body: Any, side: float) -> tuple[Any, Any]:  # p
 
 
 @njit(cache=True)
-def boxes_around(
+def make_boxes_around(
     position: Any, radius: Any, skin: float, first: Any, order: Any
 ) -> tuple[Any, Any]:  # pragma: no cover
     """Low and high corners (g, 3) [m] of boxes around patches: they meet where spheres may."""
@@ -107,7 +107,7 @@ def boxes_around(
     for g in range(patches):
         for q in range(first[g], first[g + 1]):
             i = order[q]
-            way = half_reach(radius[i], skin)
+            way = compute_half_reach(radius[i], skin)
             for c in range(3):
                 room = way + ROUNDING * abs(position[i, c])
                 low[g, c] = min(low[g, c], position[i, c] - room)
@@ -116,7 +116,7 @@ def boxes_around(
 
 
 @njit(cache=True, inline="always")
-def half_reach(radius: float, skin: float) -> float:  # pragma: no cover
+def compute_half_reach(radius: float, skin: float) -> float:  # pragma: no cover
     """What a sphere adds to the reach of a pair [m], with slack."""
     return (1.0 + SLACK) * (radius + 0.5 * skin)
 
@@ -128,7 +128,7 @@ def take_inside(
     """Put those of the spheres ``mine`` into ``found`` that reach into a box; how many."""
     count = 0
     for i in mine:
-        way = half_reach(radius[i], skin)
+        way = compute_half_reach(radius[i], skin)
         inside = True
         for c in range(3):
             room = way + ROUNDING * abs(position[i, c])
@@ -150,7 +150,7 @@ def find_pairs(
     if radius.size == 0:
         return np.empty(0, np.int64), np.empty(0, np.int64)
     first, order = make_patches(position, body, PATCH * (2 * radius.max() + skin))
-    low, high = boxes_around(position, radius, skin, first, order)
+    low, high = make_boxes_around(position, radius, skin, first, order)
     cell, start, boxes = fill_cells(0.5 * (low + high), (high - low).max())
     buckets, longest = start.size - 1, np.diff(first).max()
     here, there = np.empty(longest, np.int64), np.empty(longest, np.int64)
@@ -161,7 +161,7 @@ def find_pairs(
             x = cell[g, 0] + step // 9 - 1
             y = cell[g, 1] + step // 3 % 3 - 1
             z = cell[g, 2] + step % 3 - 1
-            bucket = cell_bucket(x, y, z, buckets)
+            bucket = find_cell_bucket(x, y, z, buckets)
             for entry in range(start[bucket], start[bucket + 1]):
                 h = boxes[entry]
                 if h <= g or body[order[first[h]]] == body[own[0]]:

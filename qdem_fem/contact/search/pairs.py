@@ -14,12 +14,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from qdem_fem.contact.search.cells import find_pairs, sort_rows
+from qdem_fem.files import Floats, Integers
 
 if TYPE_CHECKING:
     from qdem_fem.contact.search.periodic import PeriodicWidth
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 class Pairs(NamedTuple):

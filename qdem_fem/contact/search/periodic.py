@@ -23,13 +23,11 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from qdem_fem.files import ConditionError, is_real
+from qdem_fem.files import ConditionError, Floats, Integers, is_real
 
 if TYPE_CHECKING:
     from qdem_fem.bodies import Body
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 WHERE = "contact, periodic"
 NEAR = 1e-6
@@ -98,6 +96,21 @@ def find_partners(
     return a, b[place]
 
 
+def find_outer_nodes(
+    body: Body, master: Integers, side: PeriodicWidth | None
+) -> tuple[Integers, bool]:
+    """Nodes of a body that others may touch (k,), and whether it is one with its images.
+
+    Faces that `periodic` has joined across the width lie within the body and its images: of two
+    nodes that are one, the lower is taken where an outer face has it.  ``master`` (n,): the node
+    that each moves with.
+    """
+    none = np.zeros(0, np.int64)
+    low, high = (none, none) if side is None else find_joined_twins(body.nodes, master, side)
+    within = np.isin(body.surface, low).all(axis=1) | np.isin(body.surface, high).all(axis=1)
+    return np.setdiff1d(body.surface[~within], high), len(low) > 0
+
+
 def find_joined_twins(
     nodes: Floats, master: Integers, side: PeriodicWidth
 ) -> tuple[Integers, Integers]:
@@ -132,17 +145,17 @@ def check_joined(body: Body, master: Integers, side: PeriodicWidth, where: str) 
         )
 
 
-def extents(along: Floats, own: NDArray[np.bool_], first: Integers) -> Floats:
+def extents(along: Floats, first: Integers) -> Floats:
     """Extent of each body along an axis [m], (bodies,).
 
-    ``along`` (c,): coordinates of the vertices of all bodies [m]; ``own`` (c,): which of them
-    count; ``first`` (bodies + 1,): first vertex of each body, and the end.
+    ``along`` (c,): coordinates of the vertices of all bodies [m]; ``first`` (bodies + 1,): first
+    vertex of each body, and the end.
     """
-    low, high = np.where(own, along, np.inf), np.where(own, along, -np.inf)
     each = np.flatnonzero(np.diff(first))
     size = np.zeros(len(first) - 1)
-    size[each] = np.maximum.reduceat(high, first[each]) - np.minimum.reduceat(low, first[each])
-    return np.maximum(size, 0.0)
+    low, high = (extreme.reduceat(along, first[each]) for extreme in (np.minimum, np.maximum))
+    size[each] = high - low
+    return size
 
 
 def check_extents(

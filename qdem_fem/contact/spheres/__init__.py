@@ -11,10 +11,8 @@ from qdem_fem.contact.spheres.law import (
     Spheres,
     advance_one,
     advance_threads,
-    image_less,
     minus,
     put_row,
-    row,
     series,
     slider,
 )
@@ -26,16 +24,16 @@ from qdem_fem.contact.spheres.options import (
     check_contact_number,
     check_contact_planes,
     check_planes_along,
+    compute_pair_stiffness,
+    compute_tangential_stiffness,
     find_body_value,
     make_plane_arrays,
-    pair_stiffness,
-    tangential_stiffness,
 )
 
 __all__ = [
     "DEEPEST", "GO_ON", "LOOK_AGAIN", "NEAR", "SKIN_OF_SPHERES", "TOO_DEEP", "Contact",
     "ContactPlane", "Planes", "SphereContact", "Spheres", "advance_one", "advance_threads",
-    "check_contact_number", "check_contact_planes", "check_planes_along", "find_body_value",
-    "image_less", "law", "make_plane_arrays", "minus", "pair_stiffness", "put_row", "row", "series",
-    "slider", "tangential_stiffness",
+    "check_contact_number", "check_contact_planes", "check_planes_along", "compute_pair_stiffness",
+    "compute_tangential_stiffness", "find_body_value", "law", "make_plane_arrays", "minus",
+    "put_row", "series", "slider",
 ]  # fmt: skip

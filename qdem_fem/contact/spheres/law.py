@@ -15,8 +15,9 @@ import numpy as np
 from numba import njit, prange
 from numba.extending import overload
 
+from qdem_fem import kernel as compiling
 from qdem_fem.contact.search import Pairs
-from qdem_fem.kernel import exact, inlined
+from qdem_fem.kernel import digest_sources, exact, inlined, row
 
 SPHERES_AT_ONCE = 512
 """Spheres that one thread takes at a time."""
@@ -119,37 +120,31 @@ def minus(a: Any, i: int, b: Any, j: int) -> Any:  # pragma: no cover
 
 
 @inlined
-def row(a: Any, i: int) -> Any:  # pragma: no cover
-    """Row i of ``a``."""
-    return a[i, 0], a[i, 1], a[i, 2]
-
-
-@inlined
 def put_row(a: Any, i: int, values: Any) -> None:  # pragma: no cover
     """Row i of ``a`` becomes ``values``."""
     a[i, 0], a[i, 1], a[i, 2] = values
 
 
-def image_less(d: Any, image: Any, p: int) -> Any:
+def subtract_image(d: Any, image: Any, p: int) -> Any:
     """``d`` [m] less row p of ``image``; as it is where ``image`` is (0,): nothing is periodic."""
-    return d if image.ndim == 1 else less_row(d, image, p)
+    return d if image.ndim == 1 else subtract_row(d, image, p)
 
 
 @inlined
-def less_row(d: Any, image: Any, p: int) -> Any:  # pragma: no cover
+def subtract_row(d: Any, image: Any, p: int) -> Any:  # pragma: no cover
     """``d`` less row p of ``image``."""
     return d[0] - image[p, 0], d[1] - image[p, 1], d[2] - image[p, 2]
 
 
-@overload(image_less, strict=False, jit_options={"error_model": "numpy", "forceinline": True})
+@overload(subtract_image, strict=False, jit_options={"error_model": "numpy", "forceinline": True})
 def _image_less(d: Any, image: Any, p: int) -> Any:
     if image.ndim == 1:
         return lambda d, image, p: d
-    return lambda d, image, p: less_row(d, image, p)
+    return lambda d, image, p: subtract_row(d, image, p)
 
 
 @exact
-def spheres_move(c: Any, low: int, high: int, displacement: Any) -> float:  # pragma: no cover
+def move_spheres(c: Any, low: int, high: int, displacement: Any) -> float:  # pragma: no cover
     """Positions of the spheres ``low`` to ``high``; their greatest square way [m^2]."""
     far = 0.0
     for i in range(low, high):
@@ -162,7 +157,7 @@ def spheres_move(c: Any, low: int, high: int, displacement: Any) -> float:  # pr
 
 
 @exact
-def pairs_forces(
+def compute_pairs_forces(
     c: Any, low: int, high: int, velocity: Any, step: float
 ) -> float:  # pragma: no cover
     """Forces of the pairs of acting spheres on the first; deepest overlap over radius."""
@@ -172,7 +167,7 @@ def pairs_forces(
         fx, fy, fz = 0.0, 0.0, 0.0
         for p in range(pairs.first[i], pairs.first[i + 1]):
             j = pairs.second[p]
-            d = image_less(minus(c.position, i, c.position, j), pairs.image, p)
+            d = subtract_image(minus(c.position, i, c.position, j), pairs.image, p)
             square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
             reach = sphere.radius[i] + sphere.radius[j]
             open_now = square >= reach * reach
@@ -203,12 +198,12 @@ def pairs_forces(
 
 @inlined
 def series(one: float, other: float) -> float:  # pragma: no cover
-    """`qdem_fem.contact.spheres.pair_stiffness`"""
+    """`qdem_fem.contact.spheres.compute_pair_stiffness`"""
     return 2.0 * one * other / (one + other)
 
 
 @exact
-def planes_forces(
+def compute_planes_forces(
     c: Any, low: int, high: int, velocity: Any, step: float
 ) -> float:  # pragma: no cover
     """Add the forces of the walls on acting spheres near them; greatest overlap over radius."""
@@ -250,6 +245,7 @@ def add_reactions(c: Any, low: int, high: int) -> None:  # pragma: no cover
 
 def advance_build(threads: bool) -> Any:
     """A step of contact for one thread, or for as many as numba is set to."""
+    made_from = f"{threads} {digest_sources(compiling)}"
 
     @njit(error_model="numpy", cache=True, parallel=threads)
     def advance(c: Any, displacement: Any, velocity: Any, step: float) -> int:  # pragma: no cover
@@ -259,7 +255,7 @@ def advance_build(threads: bool) -> Any:
         of a state that no step led to.  Returns `GO_ON`, `TOO_DEEP`, or `LOOK_AGAIN` and has then
         moved the spheres and nothing else: it is to be called again with new pairs.
         """
-        stamp = threads  # noqa: F841  (makes it a part of the key: the two are one source)
+        stamp = made_from  # noqa: F841  (makes it a part of the key: the two are one source)
         # a parallel loop of numba takes arrays only: tuples are taken apart, and made again within
         (a0, a1, a2, a3, a4, a5, a6), pairs, (w0, w1, w2, w3, w4) = c[:3]
         p0, p1, p2, p3, p4, p5, p6, p7, p8, p9, p10 = pairs
@@ -277,11 +273,11 @@ def advance_build(threads: bool) -> Any:
                 size = count if stage == 0 else acting  # few act, or all: as many in every block
                 low, high = size * b // blocks, size * (b + 1) // blocks
                 if stage == 0:
-                    far[b] = spheres_move(own, low, high, displacement)
+                    far[b] = move_spheres(own, low, high, displacement)
                 elif stage == 1:
                     deep[b] = max(
-                        pairs_forces(own, low, high, velocity, step),
-                        planes_forces(own, low, high, velocity, step),
+                        compute_pairs_forces(own, low, high, velocity, step),
+                        compute_planes_forces(own, low, high, velocity, step),
                     )
                 else:
                     add_reactions(own, low, high)

@@ -26,12 +26,9 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from qdem_fem.contact.search import PeriodicWidth
-from qdem_fem.files import ConditionError, is_real
-
-Floats = NDArray[np.float64]
+from qdem_fem.files import ConditionError, Floats, is_real
 
 SKIN_OF_SPHERES = 0.1
 """Thickness of the skin of the neighbour list, over the smallest radius."""
@@ -43,12 +40,12 @@ NEAR: Literal["near"] = "near"
 """In place of their number: those it may have with what is within the skin now."""
 
 
-def tangential_stiffness(normal: Any, poisson: Any) -> Any:
+def compute_tangential_stiffness(normal: Any, poisson: Any) -> Any:
     """``k_t = k_n / (2 (1 + nu))`` [N/m]: Table 1 has it to four digits for both its materials."""
     return normal / (2 * (1 + poisson))
 
 
-def pair_stiffness(one: Any, other: Any) -> Any:
+def compute_pair_stiffness(one: Any, other: Any) -> Any:
     """Stiffness between two spheres [N/m]: ``2 a b/(a + b)``, ``a`` for two of one material.
 
     Each sphere brings a spring of ``2 a``, in series.  The paper gives springs of two materials
@@ -87,7 +84,7 @@ class SphereContact:
     """Of the neighbour list [m], which changes no force; a tenth of the radius by default."""
     contacts: int | Literal["near"] = CONTACTS
     """Contacts of a vertex at once that the time step allows for; or ``"near"``: those within the
-    skin when the march begins (`qdem_fem.contact.near`), for bodies that lie together.  A march
+    skin when the march begins (`qdem_fem.contact.bounds`), for bodies that lie together.  A march
     that meets more stops."""
     periodic: PeriodicWidth | None = field(default=None, repr=False)
     """Bodies touch across the sides of this width; not at all by default."""

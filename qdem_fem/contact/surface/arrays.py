@@ -21,8 +21,6 @@ class Surface(NamedTuple):
     """(f, 3) vertices, outward"""
     face_area: Any
     """(f,) [m^2]"""
-    face_body: Any
-    """(f,)"""
     fan_first: Any
     """(c + 1,) first entry of a vertex in ``fan_face``"""
     fan_face: Any
@@ -68,12 +66,8 @@ class Near(NamedTuple):
     """(n,) area as the contact sees it, kept while it lasts [m^2]; negative: does not touch"""
     spring: Any
     """(n, 3) [m]"""
-    image: Any
-    """(n, 3) from the body to the image that it is near to [m]; (0,) where nothing is periodic"""
     edges: Any
     """(m, 2) pairs of edges"""
-    edge_image: Any
-    """(m, 3) from the second edge to its image [m]; (0,) where nothing is periodic"""
     edge_free: Any
     """(m,) way of all vertices from ``start`` up to which the edges can not touch [m]"""
     edge_weight: Any
@@ -82,27 +76,6 @@ class Near(NamedTuple):
     """(m,) depth at which it began [m]"""
     edge_spring: Any
     """(m, 3) [m]"""
-
-
-class Overlaps(NamedTuple):
-    """Pairs of faces of two bodies that may overlap, and what they remember."""
-
-    faces: Any
-    """(m, 2)"""
-    free: Any
-    """(m,) way of all vertices from ``start`` up to which they can not overlap [m]"""
-    area: Any
-    """(m,) of the overlap, times its weight [m^2]; negative: they do not overlap"""
-    spring: Any
-    """(m, 3) [m]"""
-    share: Any
-    """(m, 6) coordinates of the centre of pressure in the two faces"""
-    pull: Any
-    """(m, 6, 3) forces on their corners [N]"""
-    account: Any
-    """(m, 3) energy, work of the slider in this step [J], depth [m]"""
-    image: Any
-    """(m, 3) from the second face to its image [m]; (0,) where nothing is periodic"""
 
 
 class Walls(NamedTuple):
@@ -115,9 +88,9 @@ class Walls(NamedTuple):
     friction: Any
     """(w,)"""
     weight: Any
-    """(w, q) [m^2] of points, or (w, q + f) and of faces; negative: does not touch"""
+    """(w, q) [m^2]; negative: does not touch"""
     spring: Any
-    """(w, q, 3) [m], or (w, q + f, 3)"""
+    """(w, q, 3) [m]"""
     force: Any
     """(w, 3) of the bodies on the wall [N]"""
 
@@ -127,9 +100,6 @@ class SurfaceTouch(NamedTuple):
 
     surface: Any
     near: Any
-    overlaps: Any
-    clipped: Any
-    """Whether faces bear by their overlaps, not by points within them."""
     walls: Any
     friction: Any
     half_skin: Any

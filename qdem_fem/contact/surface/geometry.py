@@ -9,15 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from qdem_fem.contact.spheres import minus, row
-from qdem_fem.kernel import exact, inlined
+from qdem_fem.contact.spheres import minus
+from qdem_fem.kernel import cross, dot, exact, inlined, row
 
 TIE = 1e-9
 """Relative difference of squared distances below which two faces are equally near."""
 
 
 @exact
-def face_closest(p: Any, a: Any, b: Any, c: Any) -> Any:  # pragma: no cover
+def find_closest_on_face(p: Any, a: Any, b: Any, c: Any) -> Any:  # pragma: no cover
     """Barycentric coordinates of the point of triangle abc nearest to p (Ericson 2005, 5.1.5)."""
     abx, aby, abz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     acx, acy, acz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
@@ -65,7 +65,7 @@ def blend(field: Any, nodes: Any, share: Any) -> Any:  # pragma: no cover
 
 
 @inlined
-def velocity_of(velocity: Any, place: Any, nodes: Any, share: Any) -> Any:  # pragma: no cover
+def blend_velocity(velocity: Any, place: Any, nodes: Any, share: Any) -> Any:  # pragma: no cover
     """Velocity at barycentric coordinates between three nodes [m/s]."""
     i, j, k = place[nodes[0]], place[nodes[1]], place[nodes[2]]
     a, b, c = share
@@ -74,18 +74,6 @@ def velocity_of(velocity: Any, place: Any, nodes: Any, share: Any) -> Any:  # pr
         a * velocity[i + 1] + b * velocity[j + 1] + c * velocity[k + 1],
         a * velocity[i + 2] + b * velocity[j + 2] + c * velocity[k + 2],
     )
-
-
-@inlined
-def dot(a: Any, b: Any) -> float:  # pragma: no cover
-    """Scalar product."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@inlined
-def cross(a: Any, b: Any) -> Any:  # pragma: no cover
-    """Vector product."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @inlined
@@ -101,7 +89,7 @@ def less(a: Any, b: Any) -> Any:  # pragma: no cover
 
 
 @exact
-def segments_apart(w: Any, u: Any, v: Any) -> float:  # pragma: no cover
+def compute_segments_apart(w: Any, u: Any, v: Any) -> float:  # pragma: no cover
     """Distance [m] of the segments ``w + s u`` and ``t v``, s and t from 0 to 1 (Ericson 2005)."""
     uu, uv, vv, uw, vw = dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w)
     determinant = uu * vv - uv * uv
@@ -118,7 +106,7 @@ def segments_apart(w: Any, u: Any, v: Any) -> float:  # pragma: no cover
 
 
 @exact
-def face_normal(position: Any, face: Any, f: int) -> Any:  # pragma: no cover
+def compute_face_normal(position: Any, face: Any, f: int) -> Any:  # pragma: no cover
     """Unit normal of a face."""
     i, j, k = face[f, 0], face[f, 1], face[f, 2]
     n = cross(minus(position, j, position, i), minus(position, k, position, i))
@@ -126,7 +114,7 @@ def face_normal(position: Any, face: Any, f: int) -> Any:  # pragma: no cover
 
 
 @exact
-def depth_of(p: Any, position: Any, face: Any, faces: Any) -> Any:  # pragma: no cover
+def find_depth(p: Any, position: Any, face: Any, faces: Any) -> Any:  # pragma: no cover
     """``(g, n, f, share)``: depth of p under the nearest of ``faces``, negative outside.
 
     Of faces equally near, as around an edge, the one whose plane is farthest tells the side.
@@ -134,19 +122,19 @@ def depth_of(p: Any, position: Any, face: Any, faces: Any) -> Any:  # pragma: no
     nearest, plane, found = np.inf, 0.0, -1
     for f in faces:
         i, j, k = face[f, 0], face[f, 1], face[f, 2]
-        share = face_closest(p, row(position, i), row(position, j), row(position, k))
+        share = find_closest_on_face(p, row(position, i), row(position, j), row(position, k))
         d = less(p, blend(position, (i, j, k), share))
         square = dot(d, d)
         if square > nearest * (1.0 + TIE):
             continue
-        height = dot(less(p, row(position, i)), face_normal(position, face, f))
+        height = dot(less(p, row(position, i)), compute_face_normal(position, face, f))
         if square < nearest * (1.0 - TIE) or abs(height) > abs(plane):
             nearest, plane, found = min(square, nearest), height, f
     if found < 0:
         return -np.inf, (0.0, 0.0, 0.0), -1, (0.0, 0.0, 0.0)
     i, j, k = face[found, 0], face[found, 1], face[found, 2]
-    share = face_closest(p, row(position, i), row(position, j), row(position, k))
-    n = face_normal(position, face, found)
+    share = find_closest_on_face(p, row(position, i), row(position, j), row(position, k))
+    n = compute_face_normal(position, face, found)
     away = less(blend(position, (i, j, k), share), p)
     length = np.sqrt(dot(away, away))
     if plane >= 0.0:

@@ -11,20 +11,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from qdem_fem.contact.surface.geometry import depth_of
-from qdem_fem.files import ContactTooDeep
+from qdem_fem.contact.surface.geometry import find_depth
+from qdem_fem.files import ContactTooDeep, Floats
 
 if TYPE_CHECKING:
     from qdem_fem.bodies import Body
     from qdem_fem.contact.search import PeriodicWidth
 
-Floats = NDArray[np.float64]
-
 
 @njit(cache=True)
-def first_inside(
+def find_first_inside(
     point: Any, first_point: Any, position: Any, face: Any, first_face: Any, low: Any, high: Any,
     depth: float, shift: Any,
 ) -> tuple[int, int, float]:  # fmt: skip  # pragma: no cover
@@ -49,7 +46,7 @@ def first_inside(
                 outside |= not low[b, 1] + depth < y < high[b, 1] - depth
                 outside |= not low[b, 2] + depth < z < high[b, 2] - depth
                 if not outside:
-                    g = depth_of((x, y, z), position, face, faces)[0]
+                    g = find_depth((x, y, z), position, face, faces)[0]
                     if g > depth:
                         return a, b, g
     return -1, -1, 0.0
@@ -81,7 +78,7 @@ def check_inside(
     low, high = np.array(boxes).transpose(1, 0, 2)
     counts = [np.cumsum([0, *(len(part) for part in parts)]) for parts in (points, faces)]
     for shift in shifts:
-        one, other, way = first_inside(
+        one, other, way = find_first_inside(
             np.concatenate(points), counts[0], position, np.concatenate(faces), counts[1],
             np.ascontiguousarray(low), np.ascontiguousarray(high), depth, shift,
         )  # fmt: skip

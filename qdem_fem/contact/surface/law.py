@@ -10,40 +10,34 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from qdem_fem import kernel as compiling
 from qdem_fem.contact.spheres import (
     GO_ON,
     LOOK_AGAIN,
     TOO_DEEP,
-    image_less,
     minus,
     put_row,
-    row,
     series,
     slider,
 )
 from qdem_fem.contact.spheres import law as contact_kernel
-from qdem_fem.contact.surface import clip as contact_surface_clip
 from qdem_fem.contact.surface import geometry as contact_surface_geometry
-from qdem_fem.contact.surface import overlaps as contact_surface_overlaps
 from qdem_fem.contact.surface.geometry import (
     blend,
-    cross,
-    depth_of,
-    dot,
-    face_normal,
+    blend_velocity,
+    compute_face_normal,
+    compute_segments_apart,
+    find_depth,
     less,
     scaled,
-    segments_apart,
-    velocity_of,
 )
-from qdem_fem.contact.surface.overlaps import overlaps_forces, wall_faces_forces
-from qdem_fem.kernel import digest_sources, exact, inlined
+from qdem_fem.kernel import cross, digest_sources, dot, exact, inlined, row
 
 FLATNESS_POWER = 50
 """Power of a cosine: a vertex or an edge 1 degree from flat bears under 1 %, 10 degrees, half."""
 PARALLEL_EDGES = 1e-6
 """Square of the sine of the angle between edges below which they do not cross."""
-SOURCES = contact_kernel, contact_surface_geometry, contact_surface_clip, contact_surface_overlaps
+SOURCES = compiling, contact_kernel, contact_surface_geometry
 
 
 @inlined
@@ -70,22 +64,24 @@ def law(
 
 
 @exact
-def point_weight(surface: Any, x: Any, q: int, n: Any) -> float:  # pragma: no cover
+def compute_point_weight(surface: Any, x: Any, q: int, n: Any) -> float:  # pragma: no cover
     """Area [m^2] with which point q begins to touch what has the normal n."""
     own = surface.point_face[q]
     if own >= 0:
-        return surface.point_area[q] * max(0.0, -dot(face_normal(x, surface.face, own), n))
+        return surface.point_area[q] * max(0.0, -dot(compute_face_normal(x, surface.face, own), n))
     vertex, area, flat = surface.point_node[q, 0], 0.0, 0.0
     for at in range(surface.fan_first[vertex], surface.fan_first[vertex + 1]):
         f = surface.fan_face[at]
-        against = max(0.0, -dot(face_normal(x, surface.face, f), n))
+        against = max(0.0, -dot(compute_face_normal(x, surface.face, f), n))
         area += surface.face_area[f] / 3.0 * against
         flat = max(flat, against)
     return area * (1.0 - flat**FLATNESS_POWER)
 
 
 @exact
-def edge_flatness(surface: Any, x: Any, e: int, n: Any, sign: float) -> float:  # pragma: no cover
+def compute_edge_flatness(
+    surface: Any, x: Any, e: int, n: Any, sign: float
+) -> float:  # pragma: no cover
     """Greatest ``sign n_f n`` of the two faces of a sharp edge."""
     i, j = surface.edge[e, 0], surface.edge[e, 1]
     flat = 0.0
@@ -99,7 +95,9 @@ def edge_flatness(surface: Any, x: Any, e: int, n: Any, sign: float) -> float:  
 
 
 @exact
-def points_forces(c: Any, velocity: Any, step: float, moved: float) -> float:  # pragma: no cover
+def compute_points_forces(
+    c: Any, velocity: Any, step: float, moved: float
+) -> float:  # pragma: no cover
     """Forces of points in other bodies; greatest depth.
 
     ``moved`` [m]: greatest way of a vertex from ``start``.  A point outside by ``g`` is not in
@@ -113,14 +111,14 @@ def points_forces(c: Any, velocity: Any, step: float, moved: float) -> float:  #
         q = near.point[at]
         nodes = surface.point_node[q, 0], surface.point_node[q, 1], surface.point_node[q, 2]
         share = row(surface.point_share, q)
-        p = image_less(blend(x, nodes, share), near.image, at)
+        p = blend(x, nodes, share)
         faces = near.face[near.first[at] : near.first[at + 1]]
-        g, n, f, below = depth_of(p, x, surface.face, faces)
+        g, n, f, below = find_depth(p, x, surface.face, faces)
         near.free[at] = -0.5 * g - moved if g > -np.inf else -1.0
         if g <= 0.0 and near.weight[at] < 0.0:
             continue
         if g > 0.0 and near.weight[at] < 0.0:
-            near.weight[at] = point_weight(surface, x, q, n)
+            near.weight[at] = compute_point_weight(surface, x, q, n)
         deepest = max(deepest, g if near.weight[at] > 0.0 else 0.0)
         other = near.body[at]
         half = 0.5 * max(near.weight[at], 0.0)
@@ -130,8 +128,8 @@ def points_forces(c: Any, velocity: Any, step: float, moved: float) -> float:  #
         way = scaled(
             step,
             less(
-                velocity_of(velocity, surface.place, nodes, share),
-                velocity_of(velocity, surface.place, under, below),
+                blend_velocity(velocity, surface.place, nodes, share),
+                blend_velocity(velocity, surface.place, under, below),
             ),
         )
         force = law(c, near.spring, at, n, g, way, k_n, k_t, c.friction)
@@ -143,10 +141,12 @@ def points_forces(c: Any, velocity: Any, step: float, moved: float) -> float:  #
 
 
 @exact
-def edges_forces(c: Any, velocity: Any, step: float, moved: float) -> None:  # pragma: no cover
+def compute_edges_forces(
+    c: Any, velocity: Any, step: float, moved: float
+) -> None:  # pragma: no cover
     """Forces of sharp edges across sharp edges of other bodies.
 
-    ``moved`` as of `points_forces`: edges that touch are no farther apart than the greatest depth.
+    ``moved`` as of `compute_points_forces`: what touches is no farther apart than the depth.
     """
     surface, near, x = c.surface, c.near, c.position
     for at in range(near.edges.shape[0]):
@@ -155,7 +155,7 @@ def edges_forces(c: Any, velocity: Any, step: float, moved: float) -> None:  # p
         a, b = near.edges[at, 0], near.edges[at, 1]
         i, j, k, m = surface.edge[a, 0], surface.edge[a, 1], surface.edge[b, 0], surface.edge[b, 1]
         u, v = minus(x, j, x, i), minus(x, m, x, k)
-        w = image_less(minus(x, i, x, k), near.edge_image, at)
+        w = minus(x, i, x, k)
         uu, uv, vv, uw, vw = dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w)
         determinant = uu * vv - uv * uv
         g, n, s, t = -1.0, (0.0, 0.0, 0.0), 0.0, 0.0
@@ -178,19 +178,21 @@ def edges_forces(c: Any, velocity: Any, step: float, moved: float) -> None:  # p
                         g = -1.0
         near.edge_free[at] = -1.0
         if g <= 0.0 and near.edge_weight[at] < 0.0:
-            near.edge_free[at] = 0.5 * (segments_apart(w, u, v) - c.depth) - moved
+            near.edge_free[at] = 0.5 * (compute_segments_apart(w, u, v) - c.depth) - moved
             continue
         one, two = (1.0 - s, s, 0.0), (1.0 - t, t, 0.0)
         nodes, under = (i, j, i), (k, m, k)
         way = scaled(
             step,
             less(
-                velocity_of(velocity, surface.place, nodes, one),
-                velocity_of(velocity, surface.place, under, two),
+                blend_velocity(velocity, surface.place, nodes, one),
+                blend_velocity(velocity, surface.place, under, two),
             ),
         )
         if near.edge_weight[at] < 0.0:  # the ends of an edge are its vertices': it fades to them
-            flat = edge_flatness(surface, x, a, n, -1.0) * edge_flatness(surface, x, b, n, 1.0)
+            flat = compute_edge_flatness(surface, x, a, n, -1.0) * compute_edge_flatness(
+                surface, x, b, n, 1.0
+            )
             fade = 16.0 * s * (1.0 - s) * t * (1.0 - t) * (1.0 - flat**FLATNESS_POWER)
             near.edge_weight[at] = fade * min(surface.edge_area[a], surface.edge_area[b])
             # what slides onto an edge begins without a force
@@ -207,7 +209,7 @@ def edges_forces(c: Any, velocity: Any, step: float, moved: float) -> None:  # p
 
 
 @exact
-def walls_forces(c: Any, velocity: Any, step: float) -> float:  # pragma: no cover
+def compute_walls_forces(c: Any, velocity: Any, step: float) -> float:  # pragma: no cover
     """Forces of the walls on points; greatest depth."""
     surface, walls, x = c.surface, c.walls, c.position
     deepest = 0.0
@@ -221,12 +223,12 @@ def walls_forces(c: Any, velocity: Any, step: float) -> float:  # pragma: no cov
             if g <= 0.0 and walls.weight[w, q] < 0.0:
                 continue
             if g > 0.0 and walls.weight[w, q] < 0.0:
-                walls.weight[w, q] = point_weight(surface, x, q, n)
+                walls.weight[w, q] = compute_point_weight(surface, x, q, n)
             deepest = max(deepest, g if walls.weight[w, q] > 0.0 else 0.0)
             weight = 2.0 * max(walls.weight[w, q], 0.0)
             k_n = weight * surface.modulus[surface.point_body[q]]
             k_t = weight * surface.shear[surface.point_body[q]]
-            way = scaled(step, velocity_of(velocity, surface.place, nodes, share))
+            way = scaled(step, blend_velocity(velocity, surface.place, nodes, share))
             force = law(c, walls.spring[w], q, n, g, way, k_n, k_t, walls.friction[w])
             add_force(c.force, nodes, share, force, 1.0)
             total = less(total, force)
@@ -257,17 +259,13 @@ def build_surface_step(made_from: str) -> Any:
             return LOOK_AGAIN
         c.account[0] = 0.0
         moved = np.sqrt(far)
-        deepest = max(points_forces(c, velocity, step, moved), walls_forces(c, velocity, step))
-        edges_forces(c, velocity, step, moved)
-        if c.clipped:
-            deepest = max(
-                deepest,
-                overlaps_forces(c, velocity, step, moved),
-                wall_faces_forces(c, velocity, step),
-            )
+        deepest = max(
+            compute_points_forces(c, velocity, step, moved), compute_walls_forces(c, velocity, step)
+        )
+        compute_edges_forces(c, velocity, step, moved)
         return TOO_DEEP if deepest > c.depth else GO_ON
 
     return advance_surface
 
 
-surface_step: Any = build_surface_step(digest_sources(__file__, *SOURCES))
+advance_surfaces: Any = build_surface_step(digest_sources(__file__, *SOURCES))

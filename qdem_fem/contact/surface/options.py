@@ -16,37 +16,27 @@ the depth, and a force acts on the nodes of the face beneath as its gradient say
 momentum and moment.  Friction is a spring with a slider, as of spheres, of
 ``p_t = p / (2 (1 + nu))`` for the same area.
 
-With ``faces="overlaps"`` the sum becomes an integral: pairs of faces bear by the exact polygon
-of their overlap (`qdem_fem.contact.surface.clip`).  Pressure between flat faces is then exact on
-any two meshes.  Pointed vertices and sharp edges bear as before.
-
 Not for bodies thinner than ``depth``, or faces that bend back on themselves within it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from qdem_fem.contact.search import PeriodicWidth
 from qdem_fem.contact.spheres import (
     ContactPlane,
     check_contact_number,
     check_contact_planes,
-    check_planes_along,
     find_body_value,
 )
-from qdem_fem.files import ConditionError
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from qdem_fem.files import Floats, Integers
 
 DEPTH = 0.1
 """Greatest depth, over the median edge of the surfaces."""
-FACES = "points", "overlaps"
 SHARP = 0.9
 """Cosine between the normals of two faces below which their edge is one that may cross others."""
 
@@ -67,12 +57,10 @@ class SurfaceContact:
     """A face has that many points squared within it."""
     depth: float | None = None
     """Greatest depth [m]; a tenth of the median edge by default."""
-    faces: str = "points"
-    """What of a face bears: ``"points"`` within it, or its exact ``"overlaps"`` with others."""
     contacts: int = 2
     """Coverings of a vertex's area by contact that the time step allows for."""
-    periodic: PeriodicWidth | None = field(default=None, repr=False)
-    """Bodies touch across the sides of this width; not at all by default."""
+    periodic: ClassVar[None] = None
+    """Surfaces touch within a width, not across its sides; spheres do."""
 
     def __post_init__(self) -> None:
         values = self.modulus.values() if isinstance(self.modulus, Mapping) else [self.modulus]
@@ -83,14 +71,7 @@ class SurfaceContact:
         check_contact_number(self.friction, "friction", above=False)
         check_contact_number(self.contacts, "contacts", above=True)
         check_contact_number(self.points, "points", above=True)
-        if self.faces not in FACES:
-            raise ConditionError(
-                f"faces do not bear by {self.faces!r}",
-                where="contact, faces",
-                remedy=f"take one of {', '.join(FACES)}",
-            )
         check_contact_planes(self.planes)
-        check_planes_along(self.periodic, self.planes)
 
     def of_body(self, name: str, quantity: str) -> float:
         """``modulus`` of a body; `ConditionError` where it has none."""
@@ -109,7 +90,7 @@ def place_face_points(parts: int) -> Floats:
             thirds.append((3 * i + 1, 3 * j + 1))
             if j < parts - i - 1:
                 thirds.append((3 * i + 2, 3 * j + 2))
-    first, second = np.array(thirds, dtype=float).reshape(-1, 2).T / max(1, 3 * parts)
+    first, second = np.array(thirds, dtype=float).reshape(-1, 2).T / (3 * parts)
     return np.column_stack([1 - first - second, first, second])
 
 

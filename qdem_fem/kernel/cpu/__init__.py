@@ -3,9 +3,9 @@
 from qdem_fem.kernel.cpu import lanes, step
 from qdem_fem.kernel.cpu.arrays import Constraints, Fields, Loads, Probes
 from qdem_fem.kernel.cpu.lanes import count_lane
-from qdem_fem.kernel.cpu.layout import Packed, aligned_zeros, build_layout
+from qdem_fem.kernel.cpu.layout import Packed, build_layout, make_aligned_zeros
 
 __all__ = [
-    "Constraints", "Fields", "Loads", "Packed", "Probes", "aligned_zeros", "build_layout",
-    "count_lane", "lanes", "step",
+    "Constraints", "Fields", "Loads", "Packed", "Probes", "build_layout", "count_lane", "lanes",
+    "make_aligned_zeros", "step",
 ]  # fmt: skip

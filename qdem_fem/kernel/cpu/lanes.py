@@ -1,7 +1,7 @@
 """SIMD lanes as a numba type: the element functions, written for one number, run on several.
 
 ``Lanes(float64, 4)`` is a vector register of four numbers, one of each of four tetrahedra.
-It knows ``+ - * /``, the test `lanes_not_positive`, and the two moves of memory that an element
+It knows ``+ - * /``, the test `mark_not_positive`, and the two moves of memory that an element
 needs: `gather_edges` reads the nodal vectors of a block of elements, `scatter_pulls` subtracts
 their forces from the nodes.  So nothing is left to the good will of a loop vectoriser, and one
 source serves vectors, plain numbers and, in `qdem_fem.kernel.cuda.step`, the threads of a GPU.
@@ -124,7 +124,7 @@ class LanesNegative(AbstractTemplate):
 
 
 @lower_builtin(operator.neg, Lanes)
-def lanes_negative(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+def negate_lanes(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     """``-lanes``."""
     return builder.fneg(args[0])
 
@@ -277,7 +277,7 @@ def clear_row(typingctx: Any, array: Any, offset: Any) -> Any:
 
 
 @intrinsic
-def lanes_zero(typingctx: Any, array: Any) -> Any:
+def make_zero_lanes(typingctx: Any, array: Any) -> Any:
     """Zero in every lane, in the precision of ``array``."""
     lanes = Lanes(array.dtype, count_lane(array.dtype))
 
@@ -349,7 +349,7 @@ def scatter_pulls(
 
 
 @intrinsic
-def lanes_not_positive(typingctx: Any, values: Any) -> Any:
+def mark_not_positive(typingctx: Any, values: Any) -> Any:
     """1 in every lane whose value is not above zero (NaN is not), else 0."""
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -361,7 +361,7 @@ def lanes_not_positive(typingctx: Any, values: Any) -> Any:
 
 
 @intrinsic
-def lanes_sum(typingctx: Any, values: Any) -> Any:
+def sum_lanes(typingctx: Any, values: Any) -> Any:
     """Sum over the lanes, in double precision."""
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:

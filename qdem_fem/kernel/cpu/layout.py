@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from qdem_fem.files import Integers
 from qdem_fem.kernel.cpu.arrays import Layout
 from qdem_fem.kernel.cpu.lanes import count_lane
 from qdem_fem.kernel.cpu.ordering import order_for_locality
@@ -24,10 +25,9 @@ INTERLEAVE = 16
 """Elements of a block stand this far apart in the order, so that few of them share a node."""
 
 Floats = NDArray[np.floating]
-Integers = NDArray[np.int64]
 
 
-def aligned_zeros(count: int, dtype: DTypeLike) -> Floats:
+def make_aligned_zeros(count: int, dtype: DTypeLike) -> Floats:
     """Zeros that begin on a cache line, or, if there are many, on a large page.
 
     NumPy asks the system for large pages where it does not clear the memory itself; they spare
@@ -97,7 +97,7 @@ def build_layout(
 
     corners = node_place[elements[filled]].reshape(blocks, lanes, 4)
     width = element_rows.shape[1]
-    rows = aligned_zeros(blocks * width * lanes, dtype)
+    rows = make_aligned_zeros(blocks * width * lanes, dtype)
     by_block = rows.reshape(blocks, width, lanes)
     by_block[:] = element_rows[filled].reshape(blocks, lanes, width).transpose(0, 2, 1)
     by_block[-1, 9:, lanes - (blocks * lanes - m) :] = 0.0

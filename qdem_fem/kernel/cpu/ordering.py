@@ -6,10 +6,10 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from qdem_fem.mesh import IntArray
+from qdem_fem.files import Integers
 
 
-def order_for_locality(elements: IntArray, n_nodes: int) -> tuple[IntArray, IntArray]:
+def order_for_locality(elements: Integers, n_nodes: int) -> tuple[Integers, Integers]:
     """Reverse Cuthill-McKee numbering of the nodes, and the elements in the order they need them.
 
     ``elements`` (m, 4).  Returns ``node_order`` (n,) and ``element_order`` (m,): old numbers in

@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 from numba import config, njit, prange
-from numba.core import types
 from numba.extending import overload
 
 from qdem_fem.element import MEASURES, stress
@@ -26,14 +25,14 @@ from qdem_fem.kernel.cpu.lanes import (
     clear_row,
     count_lane,
     gather_edges,
-    lanes_not_positive,
-    lanes_sum,
-    lanes_zero,
     load_lanes,
     load_row,
+    make_zero_lanes,
+    mark_not_positive,
     scatter_pulls,
     stack_align,
     store_row,
+    sum_lanes,
 )
 
 MATHEMATICS: Any = {"error_model": "numpy", "fastmath": {"contract", "nsz", "arcp", "reassoc"}}
@@ -53,17 +52,17 @@ ROWS_ELASTIC, ROWS_VISCOUS = 11, 13
 
 LAWS: dict[str, type] = {name: measure.MEASURE for name, measure in MEASURES.items()}
 BY_LAW = {measure.MEASURE: measure for measure in MEASURES.values()}
-element_gradient = inlined(stress.element_gradient)
-element_pulls = inlined(stress.element_pulls)
-matrix_product = inlined(stress.matrix_product)
+compute_element_gradient = inlined(stress.compute_element_gradient)
+compute_element_pulls = inlined(stress.compute_element_pulls)
+compute_matrix_product = inlined(stress.compute_matrix_product)
 
 
-def elastic_stress(law: Any, h: Any, lame_first: Any, lame_second: Any) -> Any:
+def compute_elastic_stress(law: Any, h: Any, lame_first: Any, lame_second: Any) -> Any:
     """``(P V, J)`` of the strain measure that the type of ``law`` names."""
-    return BY_LAW[type(law)].stress_numbers(h, lame_first, lame_second, law.half)
+    return BY_LAW[type(law)].compute_stress_numbers(h, lame_first, lame_second, law.half)
 
 
-def viscous_pulls(
+def compute_viscous_pulls(
     law: Any, h: Any, w: Any, g: Any, lame_first: Any, lame_second: Any, first: Any, second: Any
 ) -> Any:
     """``(pulls, J, power)`` with viscosity, linear beside ``small``, else current (eq. 7).
@@ -71,41 +70,46 @@ def viscous_pulls(
     The power is what viscosity takes of the motion [W].
     """
     measure = BY_LAW[type(law)]
-    if hasattr(measure, "pulls_viscous"):
-        return measure.pulls_viscous(h, w, g, lame_first, lame_second, first, second, law.half)
-    p, jacobian = elastic_stress(law, h, lame_first, lame_second)
-    rate = stress.element_gradient(w, g)
-    q = measure.viscous_numbers(h, rate, first, second, law.half)
-    pulls = stress.element_pulls(tuple(a + b for a, b in zip(p, q, strict=True)), g)
-    return pulls, jacobian, stress.matrix_product(q, rate)
+    if hasattr(measure, "compute_fused_pulls"):
+        return measure.compute_fused_pulls(
+            h, w, g, lame_first, lame_second, first, second, law.half
+        )
+    p, jacobian = compute_elastic_stress(law, h, lame_first, lame_second)
+    rate = stress.compute_element_gradient(w, g)
+    q = measure.compute_viscous_numbers(h, rate, first, second, law.half)
+    pulls = stress.compute_element_pulls(tuple(a + b for a, b in zip(p, q, strict=True)), g)
+    return pulls, jacobian, stress.compute_matrix_product(q, rate)
 
 
-@overload(elastic_stress, strict=False, jit_options=INLINED)
+@overload(compute_elastic_stress, strict=False, jit_options=INLINED)
 def _elastic_stress(law: Any, h: Any, lame_first: Any, lame_second: Any) -> Any:
-    chosen = inlined(BY_LAW[law.instance_class].stress_numbers)
+    chosen = inlined(BY_LAW[law.instance_class].compute_stress_numbers)
     return lambda law, h, lame_first, lame_second: chosen(h, lame_first, lame_second, law.half)
 
 
-@overload(viscous_pulls, strict=False, jit_options=INLINED)
+@overload(compute_viscous_pulls, strict=False, jit_options=INLINED)
 def _viscous_pulls(
     law: Any, h: Any, w: Any, g: Any, lame_first: Any, lame_second: Any, first: Any, second: Any
 ) -> Any:
     measure = BY_LAW[law.instance_class]
-    if hasattr(measure, "pulls_viscous"):
-        fused = inlined(measure.pulls_viscous)
+    if hasattr(measure, "compute_fused_pulls"):
+        fused = inlined(measure.compute_fused_pulls)
         return lambda law, h, w, g, lame_first, lame_second, first, second: fused(
             h, w, g, lame_first, lame_second, first, second, law.half
         )
-    elastic, viscous = inlined(measure.stress_numbers), inlined(measure.viscous_numbers)
+    elastic, viscous = (
+        inlined(measure.compute_stress_numbers),
+        inlined(measure.compute_viscous_numbers),
+    )
 
     def composed(
         law: Any, h: Any, w: Any, g: Any, lame_first: Any, lame_second: Any, first: Any,
         second: Any,
     ) -> Any:  # fmt: skip
         p, jacobian = elastic(h, lame_first, lame_second, law.half)
-        rate = element_gradient(w, g)
+        rate = compute_element_gradient(w, g)
         q = viscous(h, rate, first, second, law.half)
-        return element_pulls(add(p, q), g), jacobian, matrix_product(q, rate)
+        return compute_element_pulls(add(p, q), g), jacobian, compute_matrix_product(q, rate)
 
     return composed
 
@@ -120,7 +124,7 @@ def add(p: Any, q: Any) -> Any:
 
 
 @compiled()
-def chunk_forces(
+def add_chunk_forces(
     law: Any, viscous: Any, corners: Any, rows: Any, first_block: int, stop_block: int,
     displacement: Any, velocity: Any, forces: Any, shift: int,
 ) -> tuple[float, float]:  # fmt: skip
@@ -131,58 +135,53 @@ def chunk_forces(
     takes [W].
     """
     stack_align()
-    width = lane_count_of(rows)
-    bad: Any = lanes_zero(rows)
-    taken: Any = lanes_zero(rows)
+    width = count_lanes_of(rows)
+    bad: Any = make_zero_lanes(rows)
+    taken: Any = make_zero_lanes(rows)
     for block in range(first_block, stop_block):
-        at = block * block_size(viscous) * width
+        at = block * count_block_rows(viscous) * width
         g = (
             load_lanes(rows, at), load_lanes(rows, at + width), load_lanes(rows, at + 2 * width),
             load_lanes(rows, at + 3 * width), load_lanes(rows, at + 4 * width),
             load_lanes(rows, at + 5 * width), load_lanes(rows, at + 6 * width),
             load_lanes(rows, at + 7 * width), load_lanes(rows, at + 8 * width),
         )  # fmt: skip
-        h = element_gradient(gather_edges(displacement, corners, block), g)
+        h = compute_element_gradient(gather_edges(displacement, corners, block), g)
         first, second = load_lanes(rows, at + 9 * width), load_lanes(rows, at + 10 * width)
         if viscous is None:
-            p, jacobian = elastic_stress(law, h, first, second)
-            pulls = element_pulls(p, g)
+            p, jacobian = compute_elastic_stress(law, h, first, second)
+            pulls = compute_element_pulls(p, g)
         else:
             rate = gather_edges(velocity, corners, block)
-            pulls, jacobian, power = viscous_pulls(
+            pulls, jacobian, power = compute_viscous_pulls(
                 law, h, rate, g, first, second, load_lanes(rows, at + 11 * width),
                 load_lanes(rows, at + 12 * width),
             )  # fmt: skip
             taken = taken + power
-        bad = bad + lanes_not_positive(jacobian)
+        bad = bad + mark_not_positive(jacobian)
         scatter_pulls(forces, corners, block, shift, pulls, viscous)
-    return lanes_sum(bad), lanes_sum(taken)
+    return sum_lanes(bad), sum_lanes(taken)
 
 
-def lane_count_of(rows: Any) -> int:
+def count_lanes_of(rows: Any) -> int:
     """Lanes of a block of this array."""
     return count_lane(rows.dtype)
 
 
-@overload(lane_count_of, strict=False)
+@overload(count_lanes_of, strict=False)
 def _lane_count_of(rows: Any) -> Any:
     width = count_lane(rows.dtype)
     return lambda rows: width
 
 
-def block_size(viscous: Any) -> int:
+@inlined()
+def count_block_rows(viscous: Any) -> int:
     """Rows of a block."""
     return ROWS_ELASTIC if viscous is None else ROWS_VISCOUS
 
 
-@overload(block_size, strict=False)
-def _block_size(viscous: Any) -> Any:
-    size = ROWS_ELASTIC if isinstance(viscous, types.NoneType) else ROWS_VISCOUS
-    return lambda viscous: size
-
-
 @compiled()
-def piece_motion(
+def move_piece(
     start: int, stop: int, shifts: Any, first: int, last: int, forces: Any, inverse_mass: Any,
     displacement: Any, velocity: Any, step: Any, gravity: Any, k: int,
 ) -> None:  # fmt: skip
@@ -216,7 +215,7 @@ def apply_loads(loads: Any, table_row: Any, forces: Any) -> None:
 
 
 @compiled()
-def loads_power(loads: Any, table_row: Any, velocity: Any) -> float:
+def compute_loads_power(loads: Any, table_row: Any, velocity: Any) -> float:
     """Power of the loads [W]."""
     power = 0.0
     for i in range(loads.node_at.size):
@@ -290,21 +289,21 @@ def build_window(variant: str) -> Any:
         shared = chunk_piece[-1]
         for k in range(steps):
             apply_loads(loads, table[k], forces)
-            work[0] += 0.5 * step * loads_power(loads, table[k], velocity)
+            work[0] += 0.5 * step * compute_loads_power(loads, table[k], velocity)
             for c in prange(chunk_shift.size):
-                bad[c], taken[c] = chunk_forces(
+                bad[c], taken[c] = add_chunk_forces(
                     law, viscous, corners, rows, chunk_block[c], chunk_block[c + 1], displacement,
                     velocity, forces, chunk_shift[c],
                 )  # fmt: skip
                 # no other chunk needs these nodes; while they are in the cache, they move
                 for p in range(chunk_piece[c], chunk_piece[c + 1]):
-                    piece_motion(
+                    move_piece(
                         piece_first[p], piece_stop[p], window_shift, piece_window[p],
                         piece_window[p + 1], forces, inverse_mass, displacement, velocity, step,
                         gravity, k,
                     )  # fmt: skip
             for s in prange(piece_first.size - shared):
-                piece_motion(
+                move_piece(
                     piece_first[shared + s], piece_stop[shared + s], window_shift,
                     piece_window[shared + s], piece_window[shared + s + 1], forces, inverse_mass,
                     displacement, velocity, step, gravity, k,
@@ -312,7 +311,7 @@ def build_window(variant: str) -> Any:
             work[1] += apply_constraints(held, table[k + 1], state, step)
             if viscous is not None:
                 work[2] += step * taken.sum()
-            work[0] += 0.5 * step * loads_power(loads, table[k], velocity)
+            work[0] += 0.5 * step * compute_loads_power(loads, table[k], velocity)
             take_probes(probes, k + 1, displacement)
             inverted = bad.sum()
             if inverted > 0.0:

@@ -15,17 +15,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from qdem_fem.bodies import EVERY, Assembly, Body
+from qdem_fem.bodies import EVERY, Assembly, Body, Given
 from qdem_fem.element import Strain
-from qdem_fem.files import LibraryMissing
+from qdem_fem.files import Floats, Integers, LibraryMissing
 from qdem_fem.kernel.cpu import Constraints, Fields, Loads, Probes, count_lane
 from qdem_fem.kernel.cpu import step as kernel
 from qdem_fem.kernel.cuda import step as cuda_step
 from qdem_fem.kernel.cuda.step import NO_CUDA, cuda
-from qdem_fem.kernel.cuda.sums import motion_summed
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from qdem_fem.kernel.cuda.sums import sum_motion
 
 
 def require_gpu() -> None:
@@ -138,7 +135,7 @@ class CudaAssembly(Assembly):
         self._rows, self._corners = cuda.to_device(by_row), cuda.to_device(by_corner)
         self._element_blocks = -(-by_row.shape[1] // cuda_step.THREADS_A_BLOCK)
         self._node_blocks = -(-self.n_nodes // cuda_step.THREADS_A_BLOCK)
-        self._forces_kernel = cuda_step.element_forces_kernel(strain, bool(self.viscous))
+        self._forces_kernel = cuda_step.build_element_forces(strain, bool(self.viscous))
 
         by_node = np.bincount(self.place, weights=self.mass, minlength=self.n_nodes)
         self._mass = cuda.to_device(by_node)
@@ -155,7 +152,7 @@ class CudaAssembly(Assembly):
         return found[1:4], found[4:]
 
     def _sums(self) -> Floats:
-        return motion_summed(self.state.displacement, self.state.velocity, self._mass)
+        return sum_motion(self.state.displacement, self.state.velocity, self._mass)
 
     def _state(self, inverse_mass: Floats) -> Fields:
         def zeros() -> Any:
@@ -173,25 +170,17 @@ class CudaAssembly(Assembly):
         flat.copy_to_device(rows.ravel())
 
     def run_kernel(
-        self,
-        state: Fields,
-        steps: int,
-        step: float,
-        loads: Loads,
-        held: Constraints,
-        probes: Probes,
-        table: Floats,
-        gravity: Floats | None,
-        work: Floats,
+        self, state: Fields, steps: int, step: float, given: Given, work: Floats,
         contact: Any = None,
-    ) -> tuple[int, float]:
+    ) -> tuple[int, float]:  # fmt: skip
         """Launch the steps and wait once, at the end; arguments as of `Assembly.run_kernel`.
 
         ``contact``: a `qdem_fem.contact.cuda.arrays.DeviceContact`, whose steps follow those of the
         bodies; its ``said`` is set.  Its list may end the window early: then the host waits
         every `LOOK` steps.
         """
-        acted = sort_node_actions(self.n_nodes, loads, held, probes)
+        probes, gravity = given.probes, given.gravity
+        acted = sort_node_actions(self.n_nodes, given.loads, given.held, probes)
         samples = number_samples(steps, probes)
         taken = int(samples.max(initial=-1)) + 1
         memory = cuda.to_device(acted.memory)
@@ -202,22 +191,15 @@ class CudaAssembly(Assembly):
             np.zeros(self._rows.shape[1] if self.viscous else 1)  # an empty array had better not be
         )
         half, dt = self.dtype.type(0.5), self.dtype.type(step)
-        of_elements = (
-            self._corners,
-            self._rows,
-            state.displacement,
-            state.velocity,
-            state.forces,
-            status,
-            taken_by_viscosity,
-        )
+        fields = state.displacement, state.velocity, state.forces
+        of_elements = self._corners, self._rows, *fields, status, taken_by_viscosity
         of_nodes = (
             cuda.to_device(acted.first), cuda.to_device(acted.actions),
-            cuda.to_device(acted.weights), memory, cuda.to_device(np.ascontiguousarray(table)),
-            record, state.displacement, state.velocity, state.forces, state.inverse_mass,
+            cuda.to_device(acted.weights), memory,
+            cuda.to_device(np.ascontiguousarray(given.table)), record, *fields, state.inverse_mass,
             cuda.to_device(accelerations.astype(self.dtype)), status, dt,
         )  # fmt: skip
-        motion = cuda_step.node_motion_kernel(gravity is not None)
+        motion = cuda_step.build_node_motion(gravity is not None)
         launch_forces = self._forces_kernel[self._element_blocks, cuda_step.THREADS_A_BLOCK]
         launch_motion = motion[self._node_blocks, cuda_step.THREADS_A_BLOCK]
         for k, sample in enumerate(samples.tolist()):
@@ -238,7 +220,7 @@ class CudaAssembly(Assembly):
             work[total] += remembered[acted.of_kind(kind)[0], 0].sum()
         work[2] += taken_by_viscosity.copy_to_host().sum()
         place, slot = acted.of_kind(cuda_step.HELD)
-        held.previous[slot] = remembered[place, 1]
+        given.held.previous[slot] = remembered[place, 1]
         if taken:
             kept = int(samples[:done].max(initial=-1)) + 1
             probes.record[:kept] = record.copy_to_host()[:kept, : len(probes.node_at)]

@@ -1,7 +1,7 @@
 """The time step on a GPU: the twin of `qdem_fem.kernel.cpu.step`, from the same element functions.
 
-A step is two launches.  `element_forces_kernel`: one thread an element, forces of eqs. 1-10 added
-to the nodes by atomics.  `node_motion_kernel`: one thread a node, which does all that happens to
+A step is two launches.  `build_element_forces`: one thread an element, forces of eqs. 1-10 added
+to the nodes by atomics.  `build_node_motion`: one thread a node, which does all that happens to
 it, loads, velocity Verlet, rollers, given displacements and probes, each written once below.  The
 launches of a window follow each other in the order of the stream; nothing waits for the host.
 CUDA graphs are not used: a launch still costs the host its arguments, which is what a small mesh
@@ -52,9 +52,9 @@ BAD, LIMIT, AGAIN, DEEP = range(4)
 a vertex has left the skin of its pairs; whether two spheres are too deep in each other."""
 
 
-element_gradient = cuda.jit(device=True)(stress.element_gradient)
-element_pulls = cuda.jit(device=True)(stress.element_pulls)
-matrix_product = cuda.jit(device=True)(stress.matrix_product)
+compute_element_gradient = cuda.jit(device=True)(stress.compute_element_gradient)
+compute_element_pulls = cuda.jit(device=True)(stress.compute_element_pulls)
+compute_matrix_product = cuda.jit(device=True)(stress.compute_matrix_product)
 
 
 def grid(count: int) -> tuple[int, int]:
@@ -81,25 +81,25 @@ def add_forces(forces: Any, at: Any, x: Any, y: Any, z: Any) -> None:
     cuda.atomic.add(forces, at + 2, z)
 
 
-def pulls_function(strain: Strain, viscous: bool) -> Any:
+def build_pulls_function(strain: Strain, viscous: bool) -> Any:
     """The device function ``(h, w, g, rows, e, half) -> (pulls, J, power)`` of a strain measure.
 
-    The same composition as `qdem_fem.kernel.cpu.elastic_stress` and
-    `qdem_fem.kernel.cpu.viscous_pulls`.
+    The same composition as `qdem_fem.kernel.cpu.compute_elastic_stress` and
+    `qdem_fem.kernel.cpu.compute_viscous_pulls`.
     """
     measure = MEASURES[strain]
-    elastic = cuda.jit(device=True)(measure.stress_numbers)
+    elastic = cuda.jit(device=True)(measure.compute_stress_numbers)
     if not viscous:
 
         @cuda.jit(device=True)
         def pulls_elastic(h: Any, w: Any, g: Any, rows: Any, e: Any, half: Any) -> Any:
             p, jacobian = elastic(h, rows[9, e], rows[10, e], half)
-            return element_pulls(p, g), jacobian, half - half
+            return compute_element_pulls(p, g), jacobian, half - half
 
         return pulls_elastic
 
-    if hasattr(measure, "pulls_viscous"):
-        fused = cuda.jit(device=True)(measure.pulls_viscous)
+    if hasattr(measure, "compute_fused_pulls"):
+        fused = cuda.jit(device=True)(measure.compute_fused_pulls)
 
         @cuda.jit(device=True)
         def pulls_fused(h: Any, w: Any, g: Any, rows: Any, e: Any, half: Any) -> Any:
@@ -107,26 +107,26 @@ def pulls_function(strain: Strain, viscous: bool) -> Any:
 
         return pulls_fused
 
-    dashpot = cuda.jit(device=True)(measure.viscous_numbers)
+    dashpot = cuda.jit(device=True)(measure.compute_viscous_numbers)
 
     @cuda.jit(device=True)
     def pulls_composed(h: Any, w: Any, g: Any, rows: Any, e: Any, half: Any) -> Any:
         p, jacobian = elastic(h, rows[9, e], rows[10, e], half)
-        rate = element_gradient(w, g)
+        rate = compute_element_gradient(w, g)
         q = dashpot(h, rate, rows[11, e], rows[12, e], half)
         total = (
             p[0] + q[0], p[1] + q[1], p[2] + q[2], p[3] + q[3], p[4] + q[4], p[5] + q[5],
             p[6] + q[6], p[7] + q[7], p[8] + q[8],
         )  # fmt: skip
-        return element_pulls(total, g), jacobian, matrix_product(q, rate)
+        return compute_element_pulls(total, g), jacobian, compute_matrix_product(q, rate)
 
     return pulls_composed
 
 
 @cache
-def element_forces_kernel(strain: Strain, viscous: bool) -> Any:
+def build_element_forces(strain: Strain, viscous: bool) -> Any:
     """The kernel of the elements, compiled when first launched."""
-    pulls_of = pulls_function(strain, viscous)
+    pulls_of = build_pulls_function(strain, viscous)
 
     @cuda.jit
     def element_forces(
@@ -150,7 +150,7 @@ def element_forces_kernel(strain: Strain, viscous: bool) -> Any:
         )  # fmt: skip
         u = edges(displacement, n0, n1, n2, n3)
         w = edges(velocity, n0, n1, n2, n3) if viscous else u
-        f, jacobian, power = pulls_of(element_gradient(u, g), w, g, rows, e, half)
+        f, jacobian, power = pulls_of(compute_element_gradient(u, g), w, g, rows, e, half)
         if not jacobian > half - half:  # NaN is bad too
             cuda.atomic.add(status, BAD, 1)
         if viscous:
@@ -167,7 +167,7 @@ def element_forces_kernel(strain: Strain, viscous: bool) -> Any:
 
 
 @cuda.jit(device=True)
-def loads_work(
+def add_loads_work(
     begin: Any, end: Any, actions: Any, weights: Any, memory: Any, amplitudes: Any, k: Any,
     velocity: Any, at: Any, step: Any,
 ) -> None:  # fmt: skip
@@ -237,7 +237,7 @@ def take_probes(
 
 
 @cache
-def node_motion_kernel(gravity: bool) -> Any:
+def build_node_motion(gravity: bool) -> Any:
     """The kernel of the nodes; what a simulation does not have is not in its code."""
 
     @cuda.jit
@@ -260,7 +260,9 @@ def node_motion_kernel(gravity: bool) -> Any:
             begin, end = first[node], first[node + 1]
             inverse_mass = inverse_masses[node]
             if begin < end:
-                loads_work(begin, end, actions, weights, memory, amplitudes, k, velocity, at, step)
+                add_loads_work(
+                    begin, end, actions, weights, memory, amplitudes, k, velocity, at, step
+                )
                 apply_loads(begin, end, actions, weights, amplitudes, k, forces, at)
             for c in range(3):
                 change = forces[at + c] * (step * inverse_mass)
@@ -275,7 +277,9 @@ def node_motion_kernel(gravity: bool) -> Any:
                     begin, end, actions, weights, memory, amplitudes, k, displacement, velocity,
                     inverse_mass, at, step,
                 )  # fmt: skip
-                loads_work(begin, end, actions, weights, memory, amplitudes, k, velocity, at, step)
+                add_loads_work(
+                    begin, end, actions, weights, memory, amplitudes, k, velocity, at, step
+                )
                 if sample >= 0:
                     take_probes(begin, end, actions, record, sample, displacement, at)
         if node == 0 and status[BAD] > 0:

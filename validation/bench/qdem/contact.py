@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 SIDE = 0.03
 STONE = q.Material(30e9, 0.2, 2700.0)
 GRAVITY = 9.81
-MODELS = ("spheres", "surface", "overlaps")
+MODELS = ("spheres", "surface")
 
 
 def cube(
@@ -34,10 +34,6 @@ def cube(
     return q.Body(
         make_box_mesh((SIDE,) * 3, (cells,) * 3, "five", tuple(place)), material, name=name
     )
-
-
-FACES_OF = {"surface": "points", "overlaps": "overlaps"}
-"""What of a face bears, by the name of the model here."""
 
 
 Case = Callable[[str], tuple[q.Simulation, float]]
@@ -51,7 +47,7 @@ def contact(
     if model == "spheres":
         return q.SphereContact(0.4 * edge, stiffness, friction, **words)
     modulus = stiffness / edge**2
-    return q.SurfaceContact(modulus, friction, faces=FACES_OF[model], depth=0.2 * edge, **words)
+    return q.SurfaceContact(modulus, friction, depth=0.2 * edge, **words)
 
 
 def reach(model: str, *shift: float) -> float:

@@ -94,11 +94,11 @@ def sliver_checks(altitude: float = 0.01) -> list[Check]:
         reported(f"{name}: steps, times those of the even mesh", even / critical),
         reported(f"{name}: critical step over that of the fastest element alone",
                  critical / find_element_step(body).min()),
-        motion_check(name, problem),
+        check_motion(name, problem),
     ]  # fmt: skip
 
 
-def motion_check(name: str, problem: Problem) -> Check:
+def check_motion(name: str, problem: Problem) -> Check:
     """Two first periods from the static shape at 0.9 of the step, to the sum over all modes."""
     node = tip_node(problem.mesh)
     exact = exact_motion(problem, problem.static, node)

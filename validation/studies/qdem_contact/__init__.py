@@ -1,7 +1,7 @@
 """Which model of contact between deformable bodies gives the right stress, and at what cost?
 
-Three models: spheres at the vertices of the surface (the paper's), points on the faces,
-overlaps of faces.  They are asked four things: the stress between two cubes that are pressed on
+Two models: spheres at the vertices of the surface (the paper's), and points on the faces.
+They are asked four things: the stress between two cubes that are pressed on
 each other, on meshes that match and that do not (exact: uniform); Hertz's force and radius on
 three meshes, beside linear tetrahedra of scikit-fem with an active set; the account of energies
 in six hard cases (deep start, stiffness 1 : 1000, meshes 1 : 100, a spinning grain, a stack, a

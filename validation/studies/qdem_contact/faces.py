@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import qdem_fem as q
-from validation.bench.qdem.contact import FACES_OF, SIDE, cube
+from validation.bench.qdem.contact import SIDE, cube
 from validation.case import Check
 
 Floats = NDArray[np.float64]
@@ -19,7 +19,6 @@ FACES = (  # cells below and above, radius of spheres [m] or points of a face's 
     ("spheres", 2, 2, 0.006), ("spheres", 4, 4, 0.006), ("spheres", 3, 4, 0.012),
     ("surface", 2, 2, 2), ("surface", 4, 4, 2),
     ("surface", 3, 4, 1), ("surface", 3, 4, 2), ("surface", 3, 4, 4), ("surface", 3, 4, 6),
-    ("overlaps", 2, 2, 1), ("overlaps", 4, 4, 1), ("overlaps", 3, 4, 1),
 )  # fmt: skip
 
 
@@ -27,7 +26,7 @@ def contact_made(model: str, detail: float, friction: float) -> q.SphereContact 
     """Spheres of radius ``detail`` [m], or surfaces of ``detail`` squared points a face."""
     if model == "spheres":
         return q.SphereContact(detail, STIFFNESS, friction)
-    return q.SurfaceContact(MODULUS, friction, points=int(detail), faces=FACES_OF[model])
+    return q.SurfaceContact(MODULUS, friction, points=int(detail))
 
 
 def faces_stress(model: str, below: int, above: int, detail: float) -> tuple[Floats, float, float]:
@@ -60,7 +59,6 @@ def faces_name(model: str, below: int, above: int, detail: float) -> str:
     words = {
         "spheres": f"spheres of {2000 * detail:.0f} mm",
         "surface": f"surface, {detail:.0f} squared points",
-        "overlaps": "overlaps",
     }[model]
     return f"faces, {below} on {above} cells, {words}"
 
@@ -71,7 +69,7 @@ def faces_checks() -> list[Check]:
     for model, below, above, detail in FACES:
         stress, carried, seconds = faces_stress(model, below, above, detail)
         name, worst = faces_name(model, below, above, detail), float(np.abs(stress - 1).max())
-        same = model == "overlaps" or (model == "surface" and below == above)
+        same = model == "surface" and below == above
         checks += [
             Check(f"{name}: force carried less load", abs(carried - 1), "<= 0.001",
                   abs(carried - 1) <= 1e-3),

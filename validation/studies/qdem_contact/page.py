@@ -16,8 +16,7 @@ from validation.studies.qdem_contact.hertz import MODELS as HERTZ_MODELS
 from validation.study import Row, format_table
 
 COLOURS = {
-    "spheres": "#b0413e", "surface": "#2a6f97", "points": "#2a6f97", "overlaps": "#3a7d44",
-    "rival": "#555555",
+    "spheres": "#b0413e", "surface": "#2a6f97", "points": "#2a6f97", "rival": "#555555"
 }  # fmt: skip
 POINTS = {
     "**Pressed**: force carried less load, worst of all": "faces, *force carried",
