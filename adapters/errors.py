@@ -12,18 +12,9 @@ from trackbed.errors import (
 )
 
 __all__ = [
-    "DumpError",
-    "EngineFailed",
-    "EngineMissing",
-    "Interrupted",
-    "JumpRefused",
-    "NotConverged",
-    "NotCredible",
-    "SceneError",
-    "SweepIncomplete",
-    "TrackbedError",
-    "UsageError",
-]
+    "DumpError", "EngineFailed", "EngineMissing", "Interrupted", "JumpRefused", "NotConverged",
+    "NotCredible", "SceneError", "SweepIncomplete", "TrackbedError", "UsageError",
+]  # fmt: skip
 
 
 class EngineMissing(TrackbedError):

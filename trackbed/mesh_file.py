@@ -1,4 +1,4 @@
-"""Mesh files of any format that meshio reads: units, groups, and surfaces in their parts.
+"""Mesh files of any format that meshio reads, and their groups.
 
 meshio is loaded only to read a file.
 """
@@ -10,86 +10,12 @@ import io
 import os
 import sys
 import warnings
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from trackbed.errors import LibraryMissing, MeshError
-
-LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
-"""Units that coordinates may be in, and their length [m]."""
-
-
-@dataclass(frozen=True, eq=False)
-class Surface:
-    """Triangles of a file, checked for nothing but numbers."""
-
-    nodes: NDArray[np.float64]
-    """[m], (n, 3), none twice."""
-    faces: NDArray[np.int64]
-    """(k, 3), of three different nodes each."""
-
-    def split_parts(self) -> list[Surface]:
-        """The parts that hang together by nodes, greatest first: one a stone."""
-        from scipy.sparse import coo_matrix
-        from scipy.sparse.csgraph import connected_components
-
-        a, b, c = self.faces.T
-        pairs = np.concatenate([a, b]), np.concatenate([b, c])
-        size = len(self.nodes)
-        graph = coo_matrix((np.ones(len(pairs[0])), pairs), shape=(size, size))
-        _, label = connected_components(graph, directed=False)
-        of_face = label[a]
-        numbers, counts = np.unique(of_face, return_counts=True)
-        parts = []
-        for number in numbers[np.argsort(-counts, kind="stable")]:
-            used, faces = np.unique(self.faces[of_face == number], return_inverse=True)
-            parts.append(Surface(self.nodes[used], faces.reshape(-1, 3).astype(np.int64)))
-        return parts
-
-
-def find_scale(unit: float | str, where: str) -> float:
-    """Length [m] of a unit, a name of `LENGTHS` or a number; raises `MeshError`."""
-    scale = LENGTHS.get(unit, 0.0) if isinstance(unit, str) else float(unit)
-    if not (np.isfinite(scale) and scale > 0):
-        raise MeshError(
-            f"a unit of {unit} m" if not isinstance(unit, str) else f"{unit} is no unit of length",
-            where=where,
-            remedy=f"give 1e-3 for a mesh in mm, or one of {', '.join(LENGTHS)}",
-        )
-    return scale
-
-
-def read_surface(
-    path: str | os.PathLike[str], unit: float | str = 1.0, *, where: str = ""
-) -> Surface:
-    """The triangles of a file (STL, PLY, OBJ, ...); ``unit`` as for `find_scale`.
-
-    Corners of the same coordinates become one node, as STL repeats them, and triangles that lose a
-    corner by that are left out.  Raises `MeshError` for a file that can not be read, has no
-    triangles, or coordinates that are not finite.
-    """
-    where = where or f"mesh {os.fspath(path)!r}"
-    scale = find_scale(unit, where)
-    mesh = read_mesh_file(path, where)
-    blocks = [np.asarray(block.data) for block in mesh.cells if block.type == "triangle"]
-    if not sum(map(len, blocks)):
-        raise MeshError(
-            "there are no triangles", where=where, remedy="export the surface as triangles"
-        )
-    points = np.asarray(mesh.points, dtype=float)
-    if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
-        raise MeshError(
-            f"coordinates of shape {points.shape}, or not finite", where=where,
-            remedy="give three finite coordinates for each node",
-        )  # fmt: skip
-    nodes, place = np.unique(points, axis=0, return_inverse=True)
-    faces = place.reshape(-1)[np.concatenate(blocks)].astype(np.int64)
-    a, b, c = faces.T
-    return Surface(nodes * scale, faces[(a != b) & (b != c) & (c != a)])
 
 
 def list_groups(mesh: Any, kind: str) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -140,12 +66,8 @@ def read_mesh_file(path: str | os.PathLike[str], where: str) -> Any:
             where=where,
             remedy="give the path of a mesh file that meshio reads (.msh, .vtu, .inp, .mesh, ...)",
         )
-    try:
-        import meshio
-    except ImportError as error:
-        raise LibraryMissing(
-            "reading a mesh file needs meshio", where=where, remedy="pip install meshio"
-        ) from error
+    import meshio
+
     said = io.StringIO()
     try:
         with (

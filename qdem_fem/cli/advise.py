@@ -1,10 +1,9 @@
-"""The verb ``trackbed advise SCENE``: which bodies may be rigid, and a run that tells."""
+"""The verb ``trackbed advise SCENE``: which bodies may be rigid."""
 
 from __future__ import annotations
 
 import argparse
 import json
-import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -26,31 +25,21 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
         "--tolerance", type=float, default=0.01, metavar="SHARE",
         help="error that a rigid body may make, of the compliance of its contacts; default 0.01",
     )  # fmt: skip
-    parser.add_argument(
-        "--check", action="store_true",
-        help="run the scene twice, all deformable and as advised (of a track: all grains rigid), "
-        "and compare: for small scenes",
-    )  # fmt: skip
     parser.add_argument("--json", type=Path, metavar="FILE", help="write what is said as JSON")
     parser.set_defaults(command=advise_command)
 
 
 def advise_command(arguments: argparse.Namespace) -> int:
-    """Tell what may be rigid; with ``--check``, what two runs say to that."""
+    """Tell what may be rigid."""
     from qdem_fem.files import UsageError
-    from qdem_fem.scene import (
-        advise_scene,
-        check_advice,
-        error_together,
-        load_scene,
-        mark_checked,
-    )
+    from qdem_fem.scene import advise, error_together, load_scene, simulation_of
 
     if not 0 < arguments.tolerance < 1:
         raise UsageError(
             f"{arguments.tolerance:g} is no share", where="--tolerance", remedy="give 0.01 or so"
         )
-    advice = advise_scene(arguments.scene, arguments.overrides, arguments.tolerance)
+    run, _ = simulation_of(load_scene(arguments.scene, arguments.overrides))
+    advice = advise(run, arguments.tolerance)
     answer: dict[str, Any] = {
         "scene": str(arguments.scene),
         "tolerance": arguments.tolerance,
@@ -58,20 +47,6 @@ def advise_command(arguments: argparse.Namespace) -> int:
         "predicted": error_together(advice),
     }
     print("\n".join(_lines(advice, answer["predicted"])))
-    if arguments.check:
-        prepared = load_scene(arguments.scene, arguments.overrides)
-        as_run = mark_checked(prepared, advice)[1]
-        if not any(one.rigid for one in as_run):
-            print("nothing to check: no body may be rigid", file=sys.stderr)
-        else:
-            checked = check_advice(arguments.scene, arguments.overrides, advice)
-            answer["check"] = {**asdict(checked), "measured": checked.measured}
-            print(
-                f"two runs, {sum(one.rigid for one in as_run)} bodies rigid in one: error "
-                f"{checked.measured:.2g} measured, {checked.predicted:.2g} predicted at most; "
-                f"{checked.cost[0]:.2f} s and {checked.cost[1]:.2f} s"
-            )
-            print("\n".join(f"  {name}: {one:.2g}" for name, one in checked.probes.items()))
     if arguments.json is not None:
         from trackbed.run_files import write_whole
 

@@ -50,37 +50,33 @@ def qdem_command(arguments: argparse.Namespace) -> int:
 def _run(prepared: Prepared, path: Path, arguments: argparse.Namespace) -> dict[str, Any]:
     """The whole run with its report; its summary."""
     from qdem_fem.scene import (
-        RESULT,
         RunFolder,
-        make_manifest,
         run_dynamic,
         run_static,
         simulation_of,
         summary_of,
         write_report,
     )
-    from trackbed.run_files import write_whole
+    from trackbed.run_files import RESULT, record_provenance, write_whole
 
     run, bodies = simulation_of(prepared)  # what it refuses must not leave a folder behind
     folder = RunFolder(path)
-    manifest = make_manifest(
-        prepared.scene.parameters(),
-        prepared.files,
-        arguments.overrides,
-        ["trackbed", *sys.argv[1:]],
-    )
+    manifest = {
+        "scene": prepared.scene.parameters(),
+        "files": prepared.files,
+        "overrides": arguments.overrides,
+        **record_provenance(["trackbed", *sys.argv[1:]]),
+    }
     with folder.locked():
         goes_on = folder.settle(
             manifest, prepared.text.text, resume=arguments.resume, force=arguments.force
         )
-        if goes_on and folder.finished:
-            summary = json.loads((path / RESULT).read_text(encoding="utf-8"))
-            return dict(summary) | {"folder": str(path)}
+        if goes_on and (summary := folder.summary):
+            return summary | {"folder": str(path)}
         if prepared.scene.simulation.method == "static":
             done = run_static(prepared, run, bodies, folder)
         else:
-            with Progress() as progress:
-                done = run_dynamic(prepared, run, bodies, folder, resume=goes_on, progress=progress)
+            done = run_dynamic(prepared, run, bodies, folder, resume=goes_on, progress=Progress())
         summary = summary_of(prepared, done, folder)
         more: Iterable[tuple[Path, str]] = ()
         if "track" in prepared.text.data:  # other scenes do not pay for its import
@@ -164,19 +160,6 @@ def _seconds_a_step(run: Any, most: int) -> float:
         steps *= 2
 
 
-def _print_step(content: dict[str, Any], critical: dict[str, Any]) -> None:
-    """The critical step, and the one taken."""
-    if critical["value"] is not None:
-        print(f"critical step {critical['value']:.4g} s, governed by {critical['governor']}")
-    if critical["remark"]:
-        print(f"warning: {critical['remark']}")
-    if content["method"] == "dynamic":
-        print(
-            f"{content['steps']} steps of {content['step']:.4g} s, "
-            f"{100 * critical['share_used']:.1f} % of the critical one"
-        )
-
-
 def _print(content: dict[str, Any], as_json: bool) -> None:
     """A summary on standard output, as JSON or as lines a reader takes in."""
     if as_json:
@@ -189,7 +172,13 @@ def _print(content: dict[str, Any], as_json: bool) -> None:
             f"{body['flipped']} turned right-handed, {body['unused_nodes']} unused nodes"
         )
     if critical := content.get("critical_step"):
-        _print_step(content, critical)
+        if critical["value"] is not None:
+            print(f"critical step {critical['value']:.4g} s, governed by {critical['governor']}")
+        if critical["remark"]:
+            print(f"warning: {critical['remark']}")
+        if content["method"] == "dynamic":
+            share = f"{100 * critical['share_used']:.1f} % of the critical one"
+            print(f"{content['steps']} steps of {content['step']:.4g} s, {share}")
     if scaled := content.get("mass_scaling"):
         print(
             f"mass scaling adds {scaled['added_mass']:.4g} kg, "
@@ -215,42 +204,15 @@ def _print(content: dict[str, Any], as_json: bool) -> None:
 
 
 class Progress:
-    """How far a run is, on standard error: a bar on a terminal, a line every 10 s elsewhere."""
+    """How far a run is, on standard error: a line every 10 s."""
 
     def __init__(self) -> None:
-        self._bar: Any = None
-        self._task: Any = None
         self._printed = time.monotonic()
         self._first: tuple[float, int] | None = None
-
-    def __enter__(self) -> Progress:
-        if sys.stderr.isatty():
-            from rich import progress
-            from rich.console import Console
-
-            self._bar = progress.Progress(
-                progress.TextColumn("{task.description}"),
-                progress.BarColumn(),
-                progress.TaskProgressColumn(),
-                progress.TimeRemainingColumn(),
-                console=Console(stderr=True),
-            )
-            self._bar.start()
-            self._task = self._bar.add_task("t = 0 s")
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._bar is not None:
-            self._bar.stop()
 
     def at(self, steps: int, total: int, when: float) -> None:
         """So many of all steps are done; ``when`` is the simulated time [s]."""
         now = time.monotonic()
-        if self._bar is not None:
-            self._bar.update(
-                self._task, completed=steps, total=total, description=f"t = {when:.4g} s"
-            )
-            return
         first = self._first = self._first or (now, steps)
         if now - self._printed >= 10 and steps > first[1]:
             self._printed = now

@@ -25,7 +25,7 @@ def _register_grains(parser: argparse.ArgumentParser) -> None:
         "--shape", default="hulls", choices=find_choices("qdem_fem.grains", "SHAPE"),
         help="default: %(default)s",
     )  # fmt: skip
-    for wish in ("sphericity", "roundness", "concavity"):
+    for wish in ("sphericity", "roundness"):
         parser.add_argument(f"--{wish}", type=float, help="of every grain, 0 to 1; of hulls only")
     parser.add_argument(
         "--sizes", type=float, nargs=2, metavar=("LEAST", "GREATEST"),
@@ -49,10 +49,6 @@ def _register_train(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument("--modulus", type=float, help="of the track's foundation, N/m^2")
     parser.add_argument(
-        "--roughness", choices=["smooth", "average"], help="of a rail that is not even"
-    )
-    parser.add_argument("--seed", type=int, help="of the roughness (default: 1)")
-    parser.add_argument(
         "--area", type=float, default=SEAT_AREA, help="of a rail seat, m^2 (default: %(default)g)"
     )
     parser.set_defaults(command=train_command)
@@ -65,7 +61,7 @@ def grains_command(arguments: argparse.Namespace) -> int:
     from qdem_fem.grains import BALLAST, Grading, GrainRecipe, make_grains, save_grains
 
     _refuse_no_folder(arguments.out)
-    recipe = GrainRecipe(**_given(arguments, "sphericity", "roundness", "concavity"))
+    recipe = GrainRecipe(**_given(arguments, "sphericity", "roundness"))
     grading = BALLAST
     if arguments.sizes is not None:
         grading = Grading(np.array(arguments.sizes), np.array([0.0, 1.0]))
@@ -79,25 +75,13 @@ def grains_command(arguments: argparse.Namespace) -> int:
 
 def train_command(arguments: argparse.Namespace) -> int:
     """Write the made-up record of a passing train."""
-    from qdem_fem.files import UsageError
-    from qdem_fem.track.loads import (
-        Roughness,
-        Track,
-        Train,
-        WheelFlat,
-        make_train_record,
-        write_load_record,
-    )
+    from qdem_fem.track.loads import Track, Train, WheelFlat, make_train_record, write_load_record
 
     _refuse_no_folder(arguments.out)
     train = Train(**_given(arguments, "cars", "speed", "axle_load", "first_share"))
-    track, rough = Track(**_given(arguments, "modulus")), None
-    if arguments.roughness is not None:
-        rough = Roughness(arguments.roughness, **_given(arguments, "seed"))
-    elif arguments.seed is not None:
-        raise UsageError("--seed is that of a roughness", remedy="give --roughness, too")
+    track = Track(**_given(arguments, "modulus"))
     flats = [WheelFlat(axle, peak, duration) for axle, peak, duration in arguments.flat]
-    record = make_train_record(train, track, arguments.area, flats, roughness=rough)
+    record = make_train_record(train, track, arguments.area, flats)
     write_load_record(arguments.out, record)
     print(f"{arguments.out}: {record.time[-1]:.3f} s at {record.rate:g} Hz")
     return 0

@@ -15,23 +15,10 @@ from trackbed.errors import (
 )
 
 __all__ = [
-    "CheckpointError",
-    "ConditionError",
-    "ContactTooDeep",
-    "DiskFull",
-    "ElementInverted",
-    "EnergyLost",
-    "Interrupted",
-    "LibraryMissing",
-    "MaterialError",
-    "MeshError",
-    "NotConverged",
-    "QdemError",
-    "SceneError",
-    "StepWarning",
-    "Unstable",
-    "UsageError",
-]
+    "CheckpointError", "ConditionError", "ContactTooDeep", "DiskFull", "ElementInverted",
+    "EnergyLost", "Interrupted", "LibraryMissing", "MaterialError", "MeshError", "NotConverged",
+    "QdemError", "SceneError", "StepWarning", "Unstable", "UsageError",
+]  # fmt: skip
 
 QdemError = TrackbedError
 """Base of all errors that `qdem_fem` raises."""

@@ -1,4 +1,4 @@
-"""Files of a run: VTU fields and their PVD series, tables that are appended to, whole texts.
+"""Files of a run: VTU fields and their PVD series, and tables that are appended to.
 
 Nothing is ever half-written: whole files go to a temporary name first, and a table that a killed
 writer cut short is cut back to its last sound row (`Table.cut`).
@@ -7,7 +7,7 @@ writer cut short is cut back to its last sound row (`Table.cut`).
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
@@ -16,120 +16,34 @@ import numpy as np
 import numpy.typing as npt
 
 from qdem_fem.files.errors import UsageError
-from trackbed.run_files import open_unlinked, refuse_writing, write_whole
+from trackbed.run_files import open_unlinked, refuse_writing, whole_file, write_whole
 
 FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
-
-TETRAHEDRON = 10
-"""VTK's number of the linear tetrahedron."""
-VTK_TYPES = {"float64": "Float64", "float32": "Float32", "int64": "Int64", "uint8": "UInt8"}
 
 
-def write_vtu(
-    path: Path,
-    nodes: FloatArray,
-    elements: IntArray,
-    point_data: Mapping[str, npt.NDArray[Any]],
-    cell_data: Mapping[str, npt.NDArray[Any]],
-) -> None:
-    """Write tetrahedra and their fields as a VTU file, binary, appended raw; atomically.
+def write_bodies_vtu(path: Path, bodies: Sequence[Any]) -> None:
+    """Write all bodies of a simulation into one VTU file, atomically.
 
-    ``nodes`` (n, 3) are reference coordinates [m], ``elements`` (m, 4).  Fields are (n,), (n, 3)
-    or (m,), (m, 3), of float64, float32, int64 or uint8, in SI units; ParaView's filter "Warp
-    By Vector" deforms the mesh by the displacement.  Raises `UsageError` for a field of another
-    length.
+    Nodes are at their reference places; ParaView's filter "Warp By Vector" deforms the mesh by the
+    displacement.  Fields: displacement [m] and velocity [m/s] of nodes, von_mises [Pa] and body
+    (its number from 0) of elements.  ``bodies`` are `qdem_fem.Body`.
     """
-    for name, field, count in (
-        *((name, field, len(nodes)) for name, field in point_data.items()),
-        *((name, field, len(elements)) for name, field in cell_data.items()),
-    ):
-        if len(field) != count:
-            raise UsageError(f"field {name!r} has {len(field)} rows, not {count}", where=str(path))
-    blocks: list[npt.NDArray[Any]] = []
-    place = 0
+    import meshio
 
-    def array(name: str, values: npt.NDArray[Any]) -> str:
-        nonlocal place
-        values = np.ascontiguousarray(values)
-        values = values.astype(values.dtype.newbyteorder("<"), copy=False)
-        width = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else ""
-        entry = (
-            f'<DataArray type="{VTK_TYPES[values.dtype.name]}" Name={quoteattr(name)}{width} '
-            f'format="appended" offset="{place}"/>'
-        )
-        blocks.append(values)
-        place += 8 + values.nbytes
-        return entry
-
-    head = "\n".join(
-        [
-            '<?xml version="1.0"?>',
-            '<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" '
-            'header_type="UInt64">',
-            "<UnstructuredGrid>",
-            f'<Piece NumberOfPoints="{len(nodes)}" NumberOfCells="{len(elements)}">',
-            "<Points>",
-            array("Points", nodes),
-            "</Points>",
-            "<Cells>",
-            array("connectivity", elements.reshape(-1).astype(np.int64)),
-            array("offsets", 4 * np.arange(1, len(elements) + 1, dtype=np.int64)),
-            array("types", np.full(len(elements), TETRAHEDRON, np.uint8)),
-            "</Cells>",
-            "<PointData>",
-            *(array(name, values) for name, values in point_data.items()),
-            "</PointData>",
-            "<CellData>",
-            *(array(name, values) for name, values in cell_data.items()),
-            "</CellData>",
-            "</Piece>",
-            "</UnstructuredGrid>",
-            '<AppendedData encoding="raw">',
-            "_",
-        ]
-    )
-
-    def parts() -> Iterable[bytes]:
-        yield head.encode()
-        for block in blocks:
-            yield np.uint64(block.nbytes).astype("<u8").tobytes()
-            yield block.tobytes()
-        yield b"\n</AppendedData>\n</VTKFile>\n"
-
-    write_whole(path, parts())
-
-
-def write_bodies_vtu(
-    path: Path, bodies: Sequence[Any], bearing: npt.NDArray[np.int64] | None = None
-) -> None:
-    """Write all bodies of a simulation into one VTU file.
-
-    Fields: displacement [m] and velocity [m/s] of nodes, von_mises [Pa] and body (its number from
-    0) of elements.  ``bodies`` are `qdem_fem.Body`.  ``bearing``: nodes, in the numbers of all
-    bodies, whose sphere bears a force; where given, a field bears of nodes is 1 there and 0 else.
-    """
     counts = [len(body.nodes) for body in bodies]
     first = np.concatenate([[0], np.cumsum(counts)[:-1]])
     number = np.repeat(np.arange(len(bodies)), [len(body.elements) for body in bodies])
-    bears = {}
-    if bearing is not None:
-        bears["bears"] = np.zeros(sum(counts), np.uint8)
-        bears["bears"][bearing] = 1
-    write_vtu(
-        path,
+    mesh = meshio.Mesh(
         np.concatenate([body.nodes for body in bodies]),
-        np.concatenate([body.elements + start for body, start in zip(bodies, first, strict=True)]),
+        [("tetra", np.concatenate([b.elements + n for b, n in zip(bodies, first, strict=True)]))],
         {
             "displacement": np.concatenate([body.displacement for body in bodies]),
             "velocity": velocities_of(bodies),
-            **bears,
         },
-        {
-            "von_mises": np.concatenate([body.von_mises() for body in bodies]),
-            "body": number.astype(np.int64),
-        },
+        {"von_mises": [np.concatenate([body.von_mises() for body in bodies])], "body": [number]},
     )
+    with whole_file(path) as temporary:
+        mesh.write(temporary, file_format="vtu", compression=None)
 
 
 def velocities_of(bodies: Sequence[Any]) -> Any:

@@ -29,16 +29,12 @@ class Series:
             self.values = np.array(values, dtype=float)
         except (TypeError, ValueError) as error:
             raise ConditionError(f"not a table of numbers: {error}", where="series") from None
-        if self.times.ndim != 1 or not len(self.times) or self.values.ndim not in (1, 2):
+        sound = self.times.ndim == 1 and self.values.ndim in (1, 2) and len(self.times) > 0
+        if not (sound and len(self.times) == len(self.values)):
             raise ConditionError(
                 f"times of shape {self.times.shape} and values of shape {self.values.shape}",
-                where="series",
-                remedy="give times (k,) and values (k,) or (k, 3)",
-            )
-        if len(self.times) != len(self.values):
-            raise ConditionError(
-                f"{len(self.times)} times, but {len(self.values)} values", where="series"
-            )
+                where="series", remedy="give times (k,) and values (k,) or (k, 3)",
+            )  # fmt: skip
         for name, array in (("time", self.times), ("value", self.values)):
             bad = np.flatnonzero(~np.isfinite(array.reshape(len(array), -1)).all(axis=1))
             if bad.size:
@@ -115,20 +111,17 @@ class Driver:
             return np.broadcast_to(self.constant, (len(times), self.components))
         if isinstance(self.varying, Series):
             return self._columns(self.varying.at(times), len(times), None)
-        rows = [self._columns(self._called(float(t)), 1, float(t)) for t in times]
+        rows = []
+        for time in map(float, times):
+            try:
+                value = self.varying(time)
+            except Exception as error:
+                raise ConditionError(
+                    f"the function failed at t = {time:g} s ({type(error).__name__}: {error})",
+                    where=self.where, remedy="give a function of one number, the time in s",
+                ) from error  # fmt: skip
+            rows.append(self._columns(value, 1, time))
         return np.concatenate(rows)
-
-    def _called(self, time: float) -> Any:
-        """Value of a function at one time [s]; an error names the time."""
-        assert callable(self.varying)
-        try:
-            return self.varying(time)
-        except Exception as error:
-            raise ConditionError(
-                f"the function failed at t = {time:g} s ({type(error).__name__}: {error})",
-                where=self.where,
-                remedy="give a function of one number, the time in s",
-            ) from error
 
     def _columns(self, value: Any, rows: int, time: float | None) -> Floats:
         when = "" if time is None else f" at t = {time:g} s"

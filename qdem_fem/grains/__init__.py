@@ -1,4 +1,4 @@
-"""Ballast grains: random hulls, gradings, sieves, scans, their meshes."""
+"""Ballast grains: random hulls, gradings, sieves, their meshes."""
 
 from qdem_fem.grains.grading import BALLAST, Grading
 from qdem_fem.grains.hulls import GrainRecipe

@@ -1,4 +1,4 @@
-"""Random grains: a hull of corners, its edges bent outward or inward, stretched along three axes.
+"""Random grains: a hull of corners, its edges bent outward, stretched along three axes.
 
 The corners lie on the unit sphere, far from one another; each edge of their hull has a node in the
 middle, which is lifted from the flat faces (lift 0: a polyhedron of flat faces) towards the sphere
@@ -25,12 +25,12 @@ from qdem_fem.grains.measures import (
     sphericity_true,
     surface_area,
 )
-from qdem_fem.grains.meshing import make_grain_elements, place_apex_and_spokes, signed_radius_ratios
+from qdem_fem.grains.meshing import make_grain_elements, place_apex_and_spokes, radius_ratios
 from qdem_fem.mesh import FloatArray, IntArray
 
 CANDIDATES = 10
 """Random points of which the one farthest from the corners so far becomes a corner."""
-LIFT_LEAST, LIFT_MOST = -0.2, 1.05
+LIFT_MOST = 1.05
 LIFT_STEPS = 6
 """Lifts that are tried, evenly, before a bracket is halved."""
 STRETCH_MOST = 1.2
@@ -39,9 +39,7 @@ ROUNDNESS_WITHIN = 0.01
 """How near the asked roundness counts as met; it jumps where a node ceases to be a ridge."""
 HALVINGS_MOST = 8
 BENT_INWARD = 1e-9
-"""Angle between normals below which an edge of a convex grain may not be bent inward [rad]."""
-BENT_MOST = 0.6
-"""Most that an edge of a dented grain may be bent inward [rad]; others are drawn again."""
+"""Angle between normals below which an edge may not be bent inward [rad]."""
 LOWERED = 0.9
 """Factor on the lift of a node whose neighbour's edge is bent inward."""
 DRAWS_MOST = 60
@@ -64,8 +62,6 @@ class GrainRecipe:
     roundness: float = 0.68
     """`qdem_fem.grains.roundness_wadell` [-], about 0.62 to 0.85 at this mesh size."""
     roundness_scatter: float = 0.03
-    concavity: float = 0.0
-    """Depth of random dents in the middle of edges, in lifts, to 0.4 [-]; 0: convex grains."""
     corners: tuple[int, int] = (8, 9)
     """Fewest and most corners M; a grain has 8 (2 M - 4) tetrahedra and 5 M - 5 nodes."""
 
@@ -79,7 +75,6 @@ class GrainRecipe:
             (f"roundness {self.roundness} +- {spread[1]}",
              spread[1] >= 0 and self.roundness - spread[1] >= 0.3
              and self.roundness + spread[1] <= 1),
-            (f"concavity {self.concavity}", 0 <= self.concavity <= 0.4),
             (f"corners {self.corners}", 6 <= low <= high <= 40),
         ):  # fmt: skip
             if not sound:
@@ -87,7 +82,7 @@ class GrainRecipe:
                     f"no grain has {what}",
                     where="grain recipe",
                     remedy="use sphericity 0.4 to 0.97, roundness 0.3 to 1, scatters of 0 or more "
-                    "within them, concavity 0 to 0.4, 6 to 40 corners",
+                    "within them, 6 to 40 corners",
                 )
 
 
@@ -136,14 +131,14 @@ def draw_grain(generator: np.random.Generator, recipe: GrainRecipe) -> GrainForm
     reached: list[float] = []
     for _ in range(DRAWS_MOST):
         count = int(generator.integers(recipe.corners[0], recipe.corners[1] + 1))
-        drawn = _Drawn(generator, count, recipe.concavity)
+        drawn = _Drawn(generator, count)
         form = drawn.solved(psi, roundness, reached)
         if form is not None:
             return form
     got = f"roundness {min(reached):.2f} to {max(reached):.2f}" if reached else "less sphericity"
     raise MeshError(
         f"none of {DRAWS_MOST} random grains has sphericity {psi:.3f} and roundness "
-        f"{roundness:.3f} without a sliver or a deep dent; reached was {got}",
+        f"{roundness:.3f} without a sliver; reached was {got}",
         where="grain recipe",
         remedy="ask for a roundness well within that range, more sphericity, or other corners",
     )
@@ -165,7 +160,7 @@ def make_flat_form(points: FloatArray) -> GrainForm:
     faces = quarter_faces(corner_faces, edges)
     inner = place_apex_and_spokes(surface, faces, count)
     nodes = np.vstack([surface, inner]) - inner[0]
-    worst = signed_radius_ratios(nodes, make_grain_elements(nodes, corner_faces)).min()
+    worst = radius_ratios(nodes, make_grain_elements(nodes, corner_faces)).min()
     if worst < RATIO_LEAST:
         raise MeshError(
             f"its flattest tetrahedron has a radius ratio of {worst:.2g}", where="grain shape",
@@ -177,15 +172,17 @@ def make_flat_form(points: FloatArray) -> GrainForm:
 
 
 class _Drawn:
-    """Random corners, dents, direction and kind of stretch of one grain; lift and stretch open."""
+    """Random corners, direction and kind of stretch of one grain; lift and stretch open."""
 
-    def __init__(self, generator: np.random.Generator, count: int, concavity: float) -> None:
+    def __init__(self, generator: np.random.Generator, count: int) -> None:
         points = corners_apart(generator, count)
         self.corner_faces = find_hull_faces(points)
         edges = find_surface_edges(self.corner_faces)
         middles = points[edges.nodes].mean(axis=1)
-        self.count, self.concavity = count, concavity
-        self.dents = concavity * generator.random(len(middles))
+        self.count = count
+        generator.random(
+            len(middles)
+        )  # of no use since grains have no dents; seeds keep their grains
         self.flat = np.vstack([points, middles])
         self.outward = middles / np.linalg.norm(middles, axis=1)[:, None] - middles
         self.faces = quarter_faces(self.corner_faces, edges)
@@ -196,13 +193,11 @@ class _Drawn:
         self.turn *= np.sign(np.linalg.det(self.turn))
 
     def lifted(self, lift: float) -> FloatArray:
-        """Nodes on the unit sphere (n, 3); lifts of a convex grain are lowered until it is."""
-        lifts = lift - self.dents
+        """Nodes within the unit sphere (n, 3); lifts are lowered until the grain is convex."""
+        lifts = np.full(len(self.outward), lift)
         for _ in range(1000):
             nodes = self.flat.copy()
             nodes[self.count :] += lifts[:, None] * self.outward
-            if self.concavity > 0:
-                break
             _, angle = edge_angles(nodes, self.faces, self.edges)
             inward = np.unique(self.edges.opposite[angle < -BENT_INWARD])
             inward = inward[inward >= self.count] - self.count
@@ -240,9 +235,8 @@ class _Drawn:
             reached.append(roundness_wadell(nodes, self.faces, self.edges))
             return reached[-1] - roundness, nodes
 
-        least = LIFT_LEAST if self.concavity > 0 else 0.0
         below: float | None = None
-        for lift in np.linspace(least, LIFT_MOST, LIFT_STEPS):
+        for lift in np.linspace(0.0, LIFT_MOST, LIFT_STEPS):
             found = tried(float(lift))
             if found is None:
                 below = None
@@ -269,14 +263,11 @@ class _Drawn:
         return None
 
     def _form(self, surface: FloatArray, psi: float, roundness: float) -> GrainForm | None:
-        """The grain of a solved surface, None where a dent is deep or its mesh has a sliver."""
-        _, angle = edge_angles(surface, self.faces, self.edges)
-        if angle.min() < -BENT_MOST:
-            return None
+        """The grain of a solved surface, None where its mesh has a sliver."""
         turned = surface @ self.turn.T
         inner = place_apex_and_spokes(turned, self.faces, self.count)
         nodes = np.vstack([turned, inner]) - inner[0]
-        worst = signed_radius_ratios(nodes, make_grain_elements(nodes, self.corner_faces)).min()
+        worst = radius_ratios(nodes, make_grain_elements(nodes, self.corner_faces)).min()
         return GrainForm(self.corner_faces, nodes, psi, roundness) if worst >= RATIO_LEAST else None
 
 

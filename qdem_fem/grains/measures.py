@@ -1,8 +1,7 @@
-"""What a closed surface of triangles encloses: volume, inertia, sphericity, roundness of corners.
+"""What a closed surface of triangles encloses: volume, sphericity, roundness of corners.
 
-``nodes`` (n, 3) [m] and ``faces`` (k, 3), each seen counter-clockwise from outside, throughout;
-`qdem_fem.grains.check_surface` refuses what is no such surface.  Volume, centroid and inertia
-are exact for the polyhedron, to rounding.
+``nodes`` (n, 3) [m] and ``faces`` (k, 3), each seen counter-clockwise from outside, throughout.
+Volume and centroid are exact for the polyhedron, to rounding.
 """
 
 from __future__ import annotations
@@ -28,26 +27,19 @@ class Solid:
     """V = integral dV [m^3]; negative where the faces are seen clockwise from outside."""
     centroid: FloatArray
     """integral x dV / V [m], (3,)."""
-    inertia: FloatArray
-    """integral ((r.r) 1 - r r^T) dV about the centroid [m^5], (3, 3); times density: kg m^2."""
 
 
 def polyhedron_integrals(nodes: FloatArray, faces: IntArray) -> Solid:
     """Integrals over the cones from one node to every face, which is exact.
 
-    With D = det(a, b, c) of a cone's face: volume D/6, first moment D (a + b + c)/24, second
-    moments D ((a + b + c)(a + b + c)^T + a a^T + b b^T + c c^T)/120.
+    With D = det(a, b, c) of a cone's face: volume D/6, first moment D (a + b + c)/24.
     """
     origin = nodes[0]
     a, b, c = (nodes[faces] - origin).transpose(1, 0, 2)
     sixfold = np.einsum("fi,fi->f", a, np.cross(b, c))
-    total = a + b + c
     volume = sixfold.sum() / 6
-    first = sixfold @ total / 24
-    second = sum(np.einsum("f,fi,fj->ij", sixfold, v, v) for v in (a, b, c, total)) / 120
-    centre = first / volume
-    central = second - volume * np.outer(centre, centre)
-    return Solid(float(volume), origin + centre, np.trace(central) * np.eye(3) - central)
+    first = sixfold @ (a + b + c) / 24
+    return Solid(float(volume), origin + first / volume)
 
 
 def surface_area(nodes: FloatArray, faces: IntArray) -> float:

@@ -15,7 +15,6 @@ from qdem_fem.grains.measures import (
     find_surface_edges,
     number_edges,
     polyhedron_integrals,
-    quarter_faces,
 )
 from qdem_fem.mesh import FloatArray, IntArray, TetMesh, named
 
@@ -35,11 +34,12 @@ DIAGONALS = np.array([
 def radius_ratios(nodes: FloatArray, elements: IntArray) -> FloatArray:
     """Three times the radius of the inscribed over that of the circumscribed sphere, (m,).
 
-    1 for a regular tetrahedron, 0 for a flat one; ``nodes`` (n, 3) [m], ``elements`` (m, 4).
+    1 for a regular tetrahedron, 0 for a flat one, negative where left-handed; ``nodes`` (n, 3) [m],
+    ``elements`` (m, 4).
     """
     x = nodes[elements]
     e = x[:, 1:] - x[:, :1]
-    sixfold = np.abs(np.einsum("mi,mi->m", e[:, 0], np.cross(e[:, 1], e[:, 2])))
+    sixfold = np.einsum("mi,mi->m", e[:, 0], np.cross(e[:, 1], e[:, 2]))
     faces = [(0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3)]
     twice = sum(
         np.linalg.norm(np.cross(x[:, b] - x[:, a], x[:, c] - x[:, a]), axis=1) for a, b, c in faces
@@ -51,18 +51,14 @@ def radius_ratios(nodes: FloatArray, elements: IntArray) -> FloatArray:
         + squares[:, 2:] * np.cross(e[:, 0], e[:, 1])
     )
     # inscribed: 3 V/A = sixfold/twice; circumscribed: |centre|/(12 V)
-    return np.asarray(6 * sixfold**2 / (twice * np.linalg.norm(centre, axis=1)))
+    size = 6 * sixfold**2 / (twice * np.linalg.norm(centre, axis=1))
+    return np.asarray(size * np.sign(sixfold))
 
 
 def place_apex_and_spokes(nodes: FloatArray, faces: IntArray, corners: int) -> FloatArray:
     """The inner nodes (M + 1, 3) [m] of a surface: its centroid, and one on each spoke."""
     apex = polyhedron_integrals(nodes, faces).centroid
     return np.vstack([apex, apex + SPOKE * (nodes[:corners] - apex)])
-
-
-def make_grain_faces(corner_faces: IntArray) -> IntArray:
-    """Triangles of the surface (4 (2 M - 4), 3), outward; the middle of edge e is node M + e."""
-    return quarter_faces(corner_faces, find_surface_edges(corner_faces))
 
 
 def make_grain_elements(nodes: FloatArray, corner_faces: IntArray) -> IntArray:
@@ -78,17 +74,9 @@ def make_grain_elements(nodes: FloatArray, corner_faces: IntArray) -> IntArray:
         [corner_faces, middle, apex + 1 + corner_faces, np.full(len(corner_faces), apex)]
     )
     choices = local[:, DIAGONALS]
-    worst = (
-        signed_radius_ratios(nodes, choices.reshape(-1, 4)).reshape(*choices.shape[:3]).min(axis=2)
-    )
+    worst = radius_ratios(nodes, choices.reshape(-1, 4)).reshape(*choices.shape[:3]).min(axis=2)
     best = choices[np.arange(len(local)), worst.argmax(axis=1)]
     return np.concatenate([local[:, CORNERS], best], axis=1).reshape(-1, 4)
-
-
-def signed_radius_ratios(nodes: FloatArray, elements: IntArray) -> FloatArray:
-    """`radius_ratios`, negative where left-handed."""
-    e = nodes[elements[:, 1:]] - nodes[elements[:, :1]]
-    return radius_ratios(nodes, elements) * np.sign(np.linalg.det(e))
 
 
 def make_grain_tetrahedra(nodes: FloatArray, corner_faces: IntArray) -> TetMesh:
@@ -98,11 +86,11 @@ def make_grain_tetrahedra(nodes: FloatArray, corner_faces: IntArray) -> TetMesh:
     """
     corners = int(corner_faces.max()) + 1
     elements = make_grain_elements(nodes, corner_faces)
-    bad = np.flatnonzero(signed_radius_ratios(nodes, elements) <= 0)
+    bad = np.flatnonzero(radius_ratios(nodes, elements) <= 0)
     if len(bad):
         raise MeshError(
             f"the surface is not seen from its centroid: {named('element', bad)} inside out",
             where="grain",
-            remedy="use less concavity",
+            remedy="draw another shape",
         )
     return TetMesh(nodes, elements, node_sets={"surface": np.arange(4 * corners - 6)})

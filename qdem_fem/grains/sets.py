@@ -19,8 +19,7 @@ import numpy as np
 from qdem_fem.files import MeshError
 from qdem_fem.grains.grading import BALLAST, Grading, draw_sizes
 from qdem_fem.grains.hulls import GrainForm, GrainRecipe
-from qdem_fem.grains.measures import Solid, polyhedron_integrals
-from qdem_fem.grains.meshing import make_grain_faces, make_grain_tetrahedra
+from qdem_fem.grains.meshing import make_grain_tetrahedra
 from qdem_fem.grains.sieve import find_sieve_size
 from qdem_fem.mesh import FloatArray, IntArray, TetMesh
 from trackbed.choices import find_choice
@@ -62,11 +61,6 @@ class GrainSet:
         """Its tetrahedra, for `qdem_fem.Body`."""
         return make_grain_tetrahedra(*self.parts(grain))
 
-    def solid(self, grain: int) -> Solid:
-        """Volume and inertia of its polyhedron, for unit density."""
-        nodes, corner_faces = self.parts(grain)
-        return polyhedron_integrals(nodes, make_grain_faces(corner_faces))
-
     @property
     def tetrahedra(self) -> IntArray:
         """How many each grain has, (g,)."""
@@ -106,28 +100,25 @@ def make_grains(
     else:
         with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
             made = list(pool.map(make, batches))
-    forms = [form for batch in made for form in batch]
-    scales = sizes / np.array([form[2] for form in forms])
+    forms, own = zip(*(one for batch in made for one in batch), strict=True)
+    scales = sizes / np.array(own)
     return GrainSet(
-        corners=np.array([form[1].max() + 1 for form in forms]),
-        nodes=np.concatenate([s * form[0] for s, form in zip(scales, forms, strict=True)]),
-        corner_faces=np.concatenate([form[1] for form in forms]),
+        corners=np.array([form.corner_faces.max() + 1 for form in forms]),
+        nodes=np.concatenate([s * form.nodes for s, form in zip(scales, forms, strict=True)]),
+        corner_faces=np.concatenate([form.corner_faces for form in forms]),
         sizes=sizes,
-        sphericity=np.array([form[3] for form in forms]),
-        roundness=np.array([form[4] for form in forms]),
+        sphericity=np.array([form.sphericity for form in forms]),
+        roundness=np.array([form.roundness for form in forms]),
     )
 
 
 def _make_batch(
     grains: range, recipe: GrainRecipe, seed: int, shape: str
-) -> list[tuple[FloatArray, IntArray, float, float, float]]:
-    """Nodes, corner faces, sieve size, sphericity and roundness of grains of no set size."""
-    made, draw = [], get_shape(shape)
-    for grain in grains:
-        form = draw(np.random.default_rng([seed, grain, GRAINS_FORMAT]), recipe)
-        size = find_sieve_size(form.nodes)
-        made.append((form.nodes, form.corner_faces, size, form.sphericity, form.roundness))
-    return made
+) -> list[tuple[GrainForm, float]]:
+    """Grains of no set size, and the sieve size that each has."""
+    draw = get_shape(shape)
+    forms = [draw(np.random.default_rng([seed, one, GRAINS_FORMAT]), recipe) for one in grains]
+    return [(form, find_sieve_size(form.nodes)) for form in forms]
 
 
 def save_grains(path: str | os.PathLike[str], grains: GrainSet) -> None:

@@ -32,8 +32,8 @@ def find_sieve_size(nodes: FloatArray) -> float:
     by shrinking random turns, the same for every grain.
     """
     x = nodes - nodes.mean(axis=0)
-    frames, turns = _rotations()
-    frames = _best(x, frames)
+    starts, turns = _rotations()
+    frames = starts[np.argsort(_hole(x, starts), kind="stable")[:KEPT]]
     for turn in turns:
         tries = np.einsum("kil,tlj->ktij", frames, turn)
         tries[:, 0] = frames
@@ -58,8 +58,3 @@ def _hole(x: FloatArray, frames: FloatArray) -> FloatArray:
     """max(w(a), w(b)) [m] of frames (..., 2, 3)."""
     along = frames @ x.T
     return np.asarray((along.max(axis=-1) - along.min(axis=-1)).max(axis=-1))
-
-
-def _best(x: FloatArray, frames: FloatArray) -> FloatArray:
-    """The `KEPT` frames with the smallest holes."""
-    return frames[np.argsort(_hole(x, frames), kind="stable")[:KEPT]]

@@ -47,29 +47,36 @@ def raise_problems(problems: list[Problem], where: str) -> None:
     )
 
 
+def take_array(raw: Any, what: str, kinds: str, of: str, remedy: str) -> Any:
+    """An array of one of the ``kinds`` of numpy's types, or the `Problem` with what it is."""
+    try:
+        array = np.asarray(raw)
+    except (ValueError, TypeError, OverflowError) as error:
+        return Problem(f"{what} no array ({error})", remedy)
+    if array.size and array.dtype.kind not in kinds:
+        return Problem(f"{what} no {of} numbers but of type {array.dtype}", remedy)
+    return array
+
+
 def take_nodes(raw: Any) -> tuple[FloatArray, list[Problem]]:
     """Coordinates (n, 3) [m] as float64, a copy; every other shape or type is a problem."""
     remedy = "give nodes as an array (n, 3) of coordinates in metres"
     none = np.zeros((0, 3))
-    try:
-        array = np.asarray(raw)
-    except (ValueError, TypeError, OverflowError) as error:
-        return none, [Problem(f"the nodes are no array ({error})", remedy)]
-    if array.dtype.kind not in "iuf":
-        return none, [Problem(f"the nodes are no real numbers but of type {array.dtype}", remedy)]
+    array = take_array(raw, "the nodes are", "iuf", "real", remedy)
+    if isinstance(array, Problem):
+        return none, [array]
     if array.ndim != 2 or array.shape[1] != 3:
         hint = "give nodes.T" if array.ndim == 2 and array.shape[0] == 3 else remedy
         return none, [Problem(f"the nodes have the shape {array.shape}, not (n, 3)", hint)]
-    with np.errstate(over="ignore"):
+    with np.errstate(over="ignore", invalid="ignore"):
         nodes = np.array(array, dtype=np.float64, order="C")
+        extent = float(np.ptp(nodes, axis=0).max()) if len(nodes) else 1.0
     bad = np.flatnonzero(~np.isfinite(nodes).all(axis=1))
     if len(bad):
         at = f"{named('node', bad)}; node {bad[0]} is at {nodes[bad[0]].tolist()}"
         return nodes, [
             Problem(f"coordinates that are not finite: {at}", "mend or remove these nodes")
         ]
-    with np.errstate(over="ignore"):
-        extent = float(np.ptp(nodes, axis=0).max()) if len(nodes) else 1.0
     if extent > EXTENT_MOST or 0 < extent < 1 / EXTENT_MOST:
         what = f"the nodes span {extent:.3g} m, of which no volume can be computed"
         return none, [Problem(what, "check the unit of length: coordinates are in metres")]
@@ -80,15 +87,11 @@ def take_elements(raw: Any) -> tuple[IntArray, list[Problem]]:
     """Elements (m, 4) as int64, a copy; whole numbers held as float are accepted."""
     remedy = "give elements as an array (m, 4) of whole numbers, the nodes of each, counted from 0"
     none = np.zeros((0, 4), np.int64)
-    try:
-        array = np.asarray(raw)
-    except (ValueError, TypeError, OverflowError) as error:
-        return none, [Problem(f"the elements are no array ({error})", remedy)]
+    array = take_array(raw, "the elements are", "iuf", "whole", remedy)
+    if isinstance(array, Problem):
+        return none, [array]
     if array.size == 0:
         return none, [Problem("there are no tetrahedra", remedy)]
-    if array.dtype.kind not in "iuf":
-        text = f"the elements are no whole numbers but of type {array.dtype}"
-        return none, [Problem(text, remedy)]
     if array.ndim != 2 or array.shape[1] != 4:
         hint = "give elements.T" if array.ndim == 2 and array.shape[0] == 4 else remedy
         if array.ndim == 2 and array.shape[1] == 10:
@@ -105,26 +108,29 @@ def take_elements(raw: Any) -> tuple[IntArray, list[Problem]]:
     return np.array(array, dtype=np.int64, order="C"), []
 
 
-def take_set(raw: Any, kind: str, name: str, count: int) -> tuple[IntArray, list[Problem]]:
-    """A set of nodes or elements as sorted int64 without repeats; a bool mask is accepted."""
+def take_sets(
+    sets: dict[str, Any], kind: str, count: int
+) -> tuple[dict[str, IntArray], list[Problem]]:
+    """Sets of nodes or elements as sorted int64 without repeats; a bool mask is accepted."""
     remedy = f"name each {kind} of the set by its number, counted from 0"
-    none = np.zeros(0, np.int64)
-    try:
-        array = np.asarray(raw)
-    except (ValueError, TypeError, OverflowError) as error:
-        return none, [Problem(f"the {kind} set '{name}' is no array ({error})", remedy)]
-    if array.size == 0:
-        return none, []
-    if array.dtype.kind == "b" and array.shape == (count,):
-        return np.flatnonzero(array).astype(np.int64), []
-    if array.dtype.kind not in "iu" or array.ndim != 1:
-        text = f"the {kind} set '{name}' is {array.dtype} of shape {array.shape}"
-        return none, [Problem(text, remedy)]
-    out = (array < 0) | (array >= count)
-    if out.any():
-        text = f"the {kind} set '{name}' names {kind} {array[out][0]}, but there are {count}"
-        return none, [Problem(text, remedy)]
-    return np.unique(array).astype(np.int64), []
+    taken: dict[str, IntArray] = {}
+    problems: list[Problem] = []
+    for name, raw in sets.items():
+        array = take_array(raw, f"the {kind} set '{name}' is", "iub", "whole", remedy)
+        if not isinstance(array, Problem) and array.dtype.kind == "b" and array.shape == (count,):
+            array = np.flatnonzero(array)
+        if isinstance(array, Problem):
+            problems.append(array)
+        elif array.size and (array.ndim != 1 or array.dtype.kind == "b"):
+            text = f"the {kind} set '{name}' is {array.dtype} of shape {array.shape}"
+            problems.append(Problem(text, remedy))
+        elif ((array < 0) | (array >= count)).any():
+            out = array[(array < 0) | (array >= count)][0]
+            text = f"the {kind} set '{name}' names {kind} {out}, but there are {count}"
+            problems.append(Problem(text, remedy))
+        else:
+            taken[str(name)] = np.unique(array).astype(np.int64)
+    return taken, problems
 
 
 def indices_problems(elements: IntArray, n_nodes: int) -> tuple[BoolArray, list[Problem]]:
@@ -155,29 +161,19 @@ def indices_problems(elements: IntArray, n_nodes: int) -> tuple[BoolArray, list[
     return ~(out | twice), problems
 
 
-def duplicates_problems(elements: IntArray, usable: BoolArray, n_nodes: int) -> list[Problem]:
+def duplicates_problems(elements: IntArray, usable: BoolArray) -> list[Problem]:
     """Usable elements of the same four nodes, in whatever order they name them."""
     numbers = np.flatnonzero(usable)
-    if len(numbers) < len(elements):
-        elements = elements[numbers]
-    # The sum of a random number per node does not depend on the order of the four; elements
-    # that agree in it are compared exactly.
-    table = np.random.default_rng(0).integers(0, 2**64, n_nodes, dtype=np.uint64)
-    key = table[elements[:, 0]]
-    for corner in range(1, 4):
-        key += table[elements[:, corner]]
-    ordered = np.sort(key)
-    repeated = ordered[1:][ordered[1:] == ordered[:-1]]
-    if len(repeated) == 0:
+    rows = np.sort(elements[numbers], axis=1)
+    order = np.lexsort(rows.T)  # stable: of elements that agree the first one leads
+    agree = (rows[order[1:]] == rows[order[:-1]]).all(axis=1)
+    if not agree.any():
         return []
-    candidates = np.flatnonzero(np.isin(key, repeated))
-    rows = np.sort(elements[candidates], axis=1)
-    _, first, inverse = np.unique(rows, axis=0, return_index=True, return_inverse=True)
-    twin = candidates[first[inverse.reshape(-1)]]
-    bad = numbers[candidates[twin != candidates]]
-    if len(bad) == 0:
-        return []
-    same = numbers[twin[twin != candidates][0]]
+    first = np.concatenate([[True], ~agree])
+    lead = np.maximum.accumulate(np.where(first, np.arange(len(order)), 0))
+    again = np.flatnonzero(~first)
+    again = again[np.argsort(order[again])]
+    bad, same = numbers[order[again]], numbers[order[lead[again[0]]]]
     text = (
         f"the same four nodes as an earlier element: {named('element', bad)}; "
         f"element {bad[0]} repeats element {same}"

@@ -21,7 +21,7 @@ from qdem_fem.mesh.checks import (
     raise_problems,
     take_elements,
     take_nodes,
-    take_set,
+    take_sets,
 )
 from qdem_fem.mesh.sources import MeshParts, read_mesh_parts
 
@@ -98,15 +98,15 @@ def read_mesh(source: Any, *, where: str = "") -> TetMesh:
 
     sound, found = indices_problems(elements, len(nodes))
     problems += found
-    problems += duplicates_problems(elements, sound, len(nodes))
+    problems += duplicates_problems(elements, sound)
     lost = np.flatnonzero(~np.isfinite(nodes).all(axis=1))
     if len(lost):
         sound &= ~np.isin(elements, lost).any(axis=1)
     volume, found = flat_problems(nodes, elements, sound)
     problems += found
-    node_sets, found = _sets_taken(parts.node_sets, "node", len(nodes))
+    node_sets, found = take_sets(parts.node_sets, "node", len(nodes))
     problems += found
-    element_sets, found = _sets_taken(parts.element_sets, "element", len(elements))
+    element_sets, found = take_sets(parts.element_sets, "element", len(elements))
     raise_problems(problems + found, where)
 
     flipped = np.flatnonzero(volume < 0)
@@ -151,7 +151,7 @@ def element_gradients(nodes: FloatArray, elements: IntArray) -> tuple[FloatArray
             f"no positive volume: {named('element', bad)}; "
             f"element {bad[0]} has {volumes[bad[0]]:.3g} m^3",
             where="mesh",
-            remedy="pass the mesh through mesh_read first",
+            remedy="pass the mesh through read_mesh first",
         )
     return gradients, volumes
 
@@ -177,12 +177,9 @@ def altitudes(gradients: FloatArray) -> FloatArray:
 
     The altitude over the face opposite node a is 1 / |grad N_a|.
     """
-    smallest = np.empty(len(gradients))
-    for start in range(0, len(gradients), _GRADIENTS_AT_ONCE):
-        g = np.ascontiguousarray(gradients[start : start + _GRADIENTS_AT_ONCE].transpose(1, 2, 0))
-        squares = [(row * row).sum(axis=0) for row in (*g, g.sum(axis=0))]
-        smallest[start : start + _GRADIENTS_AT_ONCE] = 1 / np.sqrt(np.max(squares, axis=0))
-    return smallest
+    g = np.ascontiguousarray(gradients.transpose(1, 2, 0))
+    squares = [(row * row).sum(axis=0) for row in (*g, g.sum(axis=0))]
+    return np.asarray(1 / np.sqrt(np.max(squares, axis=0)))
 
 
 def lumped_mass(
@@ -198,14 +195,3 @@ def lumped_mass(
     for corner in elements.T:
         mass += np.bincount(corner, weights=quarter, minlength=n_nodes)
     return mass
-
-
-def _sets_taken(
-    sets: dict[str, Any], kind: str, count: int
-) -> tuple[dict[str, IntArray], list[Problem]]:
-    taken: dict[str, IntArray] = {}
-    problems: list[Problem] = []
-    for name, raw in sets.items():
-        taken[str(name)], found = take_set(raw, kind, str(name), count)
-        problems += found
-    return taken, problems

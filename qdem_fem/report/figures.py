@@ -6,8 +6,9 @@ multiple (um, mm; kPa, MPa) that leaves few digits.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from itertools import cycle
 from math import floor, log10
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -26,54 +27,42 @@ FloatArray = npt.NDArray[np.float64]
 Curve = tuple[FloatArray, FloatArray]
 """Times [s] and values."""
 
-OURS, RIVAL = "#0b5fa5", "#e07b00"
-COLOURS = (OURS, "#2a9d6f", "#7a4fa3", "#b02020", "#6b6b6b", "#00838f")
+COLOURS = ("#0b5fa5", "#2a9d6f", "#7a4fa3", "#b02020", "#6b6b6b", "#00838f")
 PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 LINES = {"lines.linewidth": 1.3}
 """What is thinner here than in other reports."""
 
 
-def picture_history(
+def draw_history(
     path: Path,
     curves: Mapping[str, Curve],
     *,
     quantity: str = "displacement",
     unit: str = "m",
-    rivals: Mapping[str, Curve] | None = None,
     against: str = "time (s)",
     logarithmic: bool = False,
 ) -> None:
-    """Draw histories by name against time, or spectra; ``rivals`` dashed, on top, to compare with.
+    """Draw histories by name against time, or spectra.
 
     ``against``: what the first of each curve's arrays is; ``logarithmic``: of the values."""
-    every = [values for _, values in (*curves.values(), *(rivals or {}).values())]
-    scale, name = unit_of(max(float(np.nanmax(np.abs(v), initial=0.0)) for v in every), unit)
+    greatest = max(float(np.nanmax(np.abs(v), initial=0.0)) for _, v in curves.values())
+    scale, name = unit_of(greatest, unit)
     with write_figure(path, (7.2, 3.2)) as figure:
         panel = figure.subplots()
-        for (label, (time, values)), colour in zip(curves.items(), _colours(), strict=False):
+        for (label, (time, values)), colour in zip(curves.items(), cycle(COLOURS), strict=False):
             panel.plot(time, values / scale, color=colour, label=label)
-        for label, (time, values) in (rivals or {}).items():
-            panel.plot(time, values / scale, color=RIVAL, ls="--", lw=1.1, label=label)
         panel.set(xlabel=against, ylabel=f"{quantity} ({name})")
         if logarithmic:
             panel.set_yscale("log")
         panel.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=4)
 
 
-def draw_spectrum(
-    path: Path,
-    curves: Mapping[str, Curve],
-    modes: Iterable[Mode] = (),
-    *,
-    quantity: str = "displacement",
-    unit: str = "m",
-) -> None:
-    """Draw the amplitude spectra (Hann) of records, and lines at the frequencies of modes."""
-    modes = list(modes)
+def draw_spectrum(path: Path, curves: Mapping[str, Curve], modes: Sequence[Mode] = ()) -> None:
+    """Draw the amplitude spectra (Hann) of displacements, and lines at the frequencies of modes."""
     with write_figure(path, (7.2, 3.2)) as figure:
         panel = figure.subplots()
         highest = 0.0
-        for (label, (time, values)), colour in zip(curves.items(), _colours(), strict=False):
+        for (label, (time, values)), colour in zip(curves.items(), cycle(COLOURS), strict=False):
             frequency, amplitude = amplitude_spectrum(time, values)
             panel.plot(frequency[1:], amplitude[1:], color=colour, label=label)
             highest = max(highest, float(frequency[-1]))
@@ -88,7 +77,7 @@ def draw_spectrum(
         top = max(float(np.max(line.get_ydata())) for line in panel.lines[: len(curves)])
         if top > 0:
             panel.set_ylim(1e-7 * top, 3 * top)
-        panel.set(xlabel="frequency (Hz)", ylabel=f"amplitude of {quantity} ({unit})")
+        panel.set(xlabel="frequency (Hz)", ylabel="amplitude of displacement (m)")
         panel.legend(loc="upper right")
 
 
@@ -99,7 +88,7 @@ def draw_energy(path: Path, energy: Mapping[str, FloatArray]) -> None:
     scale, unit = unit_of(max(float(np.abs(energy[n]).max(initial=0.0)) for n in names), "J")
     with write_figure(path, (7.2, 2.8)) as figure:
         panel = figure.subplots()
-        for number, (name, colour) in enumerate(zip(names, _colours(), strict=False)):
+        for number, (name, colour) in enumerate(zip(names, cycle(COLOURS), strict=False)):
             line = "-" if number < len(COLOURS) else "-."
             panel.plot(time, energy[name] / scale, color=colour, ls=line, label=name)
         total = (energy["kinetic"] + energy["elastic"]) / scale
@@ -120,11 +109,6 @@ def round_below(value: float) -> float:
     """The greatest of 1, 2, 5 times a power of ten that is not above ``value``."""
     power = 10.0 ** floor(log10(value))
     return float(max(digit for digit in (1, 2, 5) if digit * power <= value * (1 + 1e-9)) * power)
-
-
-def _colours() -> Iterator[str]:
-    while True:
-        yield from COLOURS
 
 
 @contextmanager

@@ -42,29 +42,25 @@ class Mode:
     """[rad]"""
 
 
-def amplitude_spectrum(
-    time: FloatArray, values: FloatArray, window: str = "hann"
-) -> tuple[FloatArray, FloatArray]:
+def amplitude_spectrum(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Frequencies [Hz] and amplitudes [unit of values], (k // 2 + 1,) each, of a record (k,).
 
-    The mean is taken off.  ``window``: ``hann``, or ``none`` for records that die out or hold whole
-    periods.  A cosine of amplitude A peaks at A when its frequency is one of those returned, and up
-    to 15 % below (hann; none: 36 %) between two of them; `find_peak_frequencies` has no such error.
-    Raises `UsageError` for a record that is no even, finite series.
+    The mean is taken off; the window is Hann's.  A cosine of amplitude A peaks at A when its
+    frequency is one of those returned, and up to 15 % below between two of them;
+    `find_peak_frequencies` has no such error.  Raises `UsageError` for a record that is no even,
+    finite series.
     """
     step, values = _record(time, values)
-    if window not in ("hann", "none"):
-        raise UsageError(f"there is no window {window!r}", remedy="use hann or none")
-    weight = _hann(len(values)) if window == "hann" else np.ones(len(values))
+    weight = _hann(len(values))
     centred = values - np.average(values, weights=weight)
     amplitude = 2 * np.abs(np.fft.rfft(weight * centred)) / weight.sum()
-    return _frequencies(values, step), amplitude
+    return np.asarray(np.fft.rfftfreq(len(values), step), float), amplitude
 
 
 def fourier_spectrum(time: FloatArray, values: FloatArray) -> tuple[FloatArray, ComplexArray]:
     """Frequencies [Hz] and the Fourier spectrum X(f) [unit s] of a record, mean left in."""
     step, values = _record(time, values)
-    frequency = _frequencies(values, step)
+    frequency = np.asarray(np.fft.rfftfreq(len(values), step), float)
     return frequency, step * np.fft.rfft(values) * np.exp(-2j * pi * frequency * time[0])
 
 
@@ -90,20 +86,20 @@ def parzen_smoothed(
 
 
 def frequency_response(
-    time: FloatArray, force: FloatArray, velocity: FloatArray, bandwidth: float | None = 20.0
+    time: FloatArray, force: FloatArray, velocity: FloatArray, bandwidth: float = 20.0
 ) -> tuple[FloatArray, FloatArray]:
     """Frequencies [Hz] and mobility |H| = |V| / |F| [m/(s N)] (Fig. 12 of the paper).
 
     Linear spectra of ``velocity`` [m/s] and ``force`` [N] over the same ``time`` [s], each
-    smoothed by a Parzen window of ``bandwidth`` [Hz]; None leaves them as they are.  Nan where
-    the force holds less than 1e-9 of its greatest amplitude: there it says nothing.
+    smoothed by a Parzen window of ``bandwidth`` [Hz].  Nan where the force holds less than 1e-9 of
+    its greatest amplitude: there it says nothing.
     """
     frequency, force_spectrum = fourier_spectrum(time, force)
     _, velocity_spectrum = fourier_spectrum(time, velocity)
-    of_force, of_velocity = np.abs(force_spectrum), np.abs(velocity_spectrum)
-    if bandwidth is not None:
-        of_force = parzen_smoothed(frequency, of_force, bandwidth)
-        of_velocity = parzen_smoothed(frequency, of_velocity, bandwidth)
+    of_force, of_velocity = (
+        parzen_smoothed(frequency, np.abs(one), bandwidth)
+        for one in (force_spectrum, velocity_spectrum)
+    )
     silent = of_force <= 1e-9 * of_force.max(initial=0.0)
     return frequency, np.where(silent, np.nan, of_velocity / np.where(silent, 1.0, of_force))
 
@@ -207,10 +203,6 @@ def _modes(
         )
         for i, (cycles, decay) in enumerate(pairs)
     ]
-
-
-def _frequencies(values: FloatArray, step: float) -> FloatArray:
-    return np.asarray(np.fft.rfftfreq(len(values), step), np.float64)
 
 
 def _hann(length: int) -> FloatArray:

@@ -16,17 +16,15 @@ from typing import Any
 
 import numpy as np
 
-from qdem_fem.files import read_table
+from qdem_fem.files import Series, read_table
 from qdem_fem.mesh import FloatArray
 from qdem_fem.report import figures as pictures
 from qdem_fem.report.spectra import fourier_spectrum, frequency_response, parzen_smoothed
-from qdem_fem.tables import TimeSeries
 
 GRAINS = ("B1", "B2", "B3", "B2a")
 SENSORS = ("S1", "S2", "S3")
 BANDWIDTH = 20.0
 """Of the Parzen window [Hz], as in Figs. 9 to 12."""
-FREQUENCY = "frequency (Hz)"
 HIGHEST = 1000.0
 """Frequency up to which the paper reads its spectra [Hz]."""
 FEWEST_SAMPLES = 5
@@ -60,9 +58,7 @@ def acceleration_spectrum(time: FloatArray, values: FloatArray) -> tuple[FloatAr
     return frequency[seen], parzen_smoothed(frequency, size, BANDWIDTH)[seen]
 
 
-def mobility(
-    time: FloatArray, values: FloatArray, load: TimeSeries
-) -> tuple[FloatArray, FloatArray]:
+def mobility(time: FloatArray, values: FloatArray, load: Series) -> tuple[FloatArray, FloatArray]:
     """Frequencies [Hz] and |V|/|F| [m/(s N)] of a grain displaced by ``values`` [m] under a load
     (k, 3) [N] (Fig. 12), smoothed as spectra are; nan where the load is silent."""
     when, velocity = velocities(time, values)
@@ -93,7 +89,7 @@ def peaks_of(frequency: FloatArray, size: FloatArray, count: int = 5) -> list[fl
     return [float(frequency[i]) for i in sorted(at, key=lambda i: -float(size[i]))[:count]]
 
 
-def list_track_facts(path: Path, load: TimeSeries) -> dict[str, Any]:
+def list_track_facts(path: Path, load: Series) -> dict[str, Any]:
     """Figures of the run in a folder: greatest and final displacement of each point [m] since the
     prepared state, along y and down; peaks of spectra and mobility [Hz], of a record
     of `FEWEST_SAMPLES` samples or more."""
@@ -119,7 +115,7 @@ def list_track_facts(path: Path, load: TimeSeries) -> dict[str, Any]:
     return facts
 
 
-def draw_track_pictures(path: Path, load: TimeSeries) -> Iterator[tuple[Path, str]]:
+def draw_track_pictures(path: Path, load: Series) -> Iterator[tuple[Path, str]]:
     """Draw what a track run shows; file and caption of each picture."""
     rows = read_table(path / "probes.csv")
     time = rows["time"]
@@ -131,7 +127,7 @@ def draw_track_pictures(path: Path, load: TimeSeries) -> Iterator[tuple[Path, st
     for axis, word in (("z", "Vertical"), ("y", "Lateral")):
         target = path / f"picture-track-{axis}.png"
         names = [f"{name} {axis}" for name in (*GRAINS, "sleeper")]
-        pictures.picture_history(target, {n: (time, moved[n]) for n in names})
+        pictures.draw_history(target, {n: (time, moved[n]) for n in names})
         yield (
             target,
             f"{word} displacement of grains and sleeper since the prepared state (Fig. 8).",
@@ -140,26 +136,25 @@ def draw_track_pictures(path: Path, load: TimeSeries) -> Iterator[tuple[Path, st
         return
     target = path / "picture-track-acceleration.png"
     curves = {s: accelerations(time, moved[f"{s} z"]) for s in SENSORS}
-    pictures.picture_history(target, curves, quantity="acceleration", unit="m/s²")
+    pictures.draw_history(target, curves, quantity="acceleration", unit="m/s²")
     yield target, "Vertical acceleration of the sleeper, sampled at the output's rate (Fig. 9a)."
-    target = path / "picture-track-spectra.png"
-    curves = {s: acceleration_spectrum(time, moved[f"{s} z"]) for s in SENSORS}
-    pictures.picture_history(
-        target, curves, quantity="spectrum", unit="m/s", against=FREQUENCY, logarithmic=True
-    )
-    yield target, f"Linear spectra of these, {smoothing(time)} (Figs. 9b, 10)."
-    target = path / "picture-track-grains.png"
-    curves = {g: acceleration_spectrum(time, moved[f"{g} z"]) for g in GRAINS}
-    pictures.picture_history(
-        target, curves, quantity="spectrum", unit="m/s", against=FREQUENCY, logarithmic=True
-    )
-    yield target, f"The same of grains, {smoothing(time)} (Fig. 11b)."
-    target = path / "picture-track-mobility.png"
-    curves = {g: mobility(time, moved[f"{g} z"], load) for g in GRAINS}
-    pictures.picture_history(
-        target, curves, quantity="mobility", unit="m/(s N)", against=FREQUENCY, logarithmic=True
-    )
-    yield target, f"Mobility of grains: velocity over load, {smoothing(time)} (Fig. 12)."
+    smooth = smoothing(time)
+    spectra = {name: acceleration_spectrum(time, moved[f"{name} z"]) for name in SENSORS + GRAINS}
+    mobilities = {g: mobility(time, moved[f"{g} z"], load) for g in GRAINS}
+    for name, curves, quantity, unit, caption in (
+        ("spectra", {s: spectra[s] for s in SENSORS}, "spectrum", "m/s",
+         f"Linear spectra of these, {smooth} (Figs. 9b, 10)."),
+        ("grains", {g: spectra[g] for g in GRAINS}, "spectrum", "m/s",
+         f"The same of grains, {smooth} (Fig. 11b)."),
+        ("mobility", mobilities, "mobility", "m/(s N)",
+         f"Mobility of grains: velocity over load, {smooth} (Fig. 12)."),
+    ):  # fmt: skip
+        target = path / f"picture-track-{name}.png"
+        pictures.draw_history(
+            target, curves, quantity=quantity, unit=unit, against="frequency (Hz)",
+            logarithmic=True,
+        )  # fmt: skip
+        yield target, caption
 
 
 def smoothing(time: FloatArray) -> str:

@@ -1,12 +1,10 @@
 """A scene run from its file: build, march, report, advice."""
 
-from qdem_fem.scene.advise import Advice, error_together
-from qdem_fem.scene.advise_check import advise_scene, check_advice, mark_checked
+from qdem_fem.scene.advise import Advice, advise, error_together
 from qdem_fem.scene.build import simulation_of
 from qdem_fem.scene.checks import load_scene
 from qdem_fem.scene.page import write_report
-from qdem_fem.scene.run import make_plan, run_dynamic, run_static
-from qdem_fem.scene.run_folder import RESULT, RunFolder, make_manifest
+from qdem_fem.scene.run import RunFolder, make_plan, run_dynamic, run_static
 from qdem_fem.scene.summary import (
     describe_critical_step,
     list_body_facts,
@@ -15,8 +13,7 @@ from qdem_fem.scene.summary import (
 )
 
 __all__ = [
-    "RESULT", "Advice", "RunFolder", "advise_scene", "check_advice", "describe_critical_step",
-    "error_together", "list_body_facts", "list_mass_scaling_facts", "load_scene", "make_manifest",
-    "make_plan", "mark_checked", "run_dynamic", "run_static", "simulation_of", "summary_of",
-    "write_report",
+    "Advice", "RunFolder", "advise", "describe_critical_step", "error_together", "list_body_facts",
+    "list_mass_scaling_facts", "load_scene", "make_plan", "run_dynamic", "run_static",
+    "simulation_of", "summary_of", "write_report",
 ]  # fmt: skip

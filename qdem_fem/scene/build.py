@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from qdem_fem.files import ConditionError, QdemError
-from qdem_fem.tables import BodyTable, TimeSeries, contact_of
+from qdem_fem.files import ConditionError, QdemError, Series
+from qdem_fem.tables import BodyTable, contact_of
 from trackbed.scene_files import Problem, describe_error
 
 if TYPE_CHECKING:
@@ -92,14 +92,9 @@ def begin_motion(body: Body, table: BodyTable) -> None:
 
 
 def _argument(value: Any, method: str) -> Any:
-    """What the simulation takes for an argument: a series becomes its own kind of series."""
-    from qdem_fem.files import Series
-
-    if not isinstance(value, TimeSeries):
-        return value
-    if method == "static" or len(value.times) == 1:
-        return value.end()
-    return Series(value.times, value.values)
+    """What the simulation takes for an argument: the last value of a series that does not vary."""
+    constant = isinstance(value, Series) and (method == "static" or len(value.times) == 1)
+    return value.values[-1] if constant else value
 
 
 def _material(body: BodyTable, mesh: TetMesh) -> Any:

@@ -17,29 +17,22 @@ from qdem_fem.tables import (
     BodyTable,
     Condition,
     ContactTable,
-    Fix,
-    Load,
     Mesh,
     Nodes,
-    NoNodes,
     Output,
     Periodic,
     Prepared,
-    Prescribe,
-    Pressure,
-    Probe,
-    Roller,
     Scene,
     SimulationTable,
     Step,
-    WrongSeries,
+    WrongKey,
     contact_faults,
     find_named_nodes,
     find_output_faults,
     list_named_files,
     list_tables,
     make_body_mesh,
-    scene_read,
+    read_tables,
     series_of,
     unit_vector,
 )
@@ -57,7 +50,7 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Prepared:
     Raises `SceneError` with all that is wrong (file, line, key and sentence of each), `UsageError`
     when the scene or an override can not be read.
     """
-    text = scene_read(path, overrides, model_of)
+    text = read_tables(path, overrides, choose_model)
     if "track" in text.data:
         from qdem_fem.track import track_load
 
@@ -92,7 +85,7 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Prepared:
     return Prepared(scene, text, meshes, conditions, probes, dict(list_named_files(text, folder)))
 
 
-def model_of(data: Mapping[str, Any]) -> type[Scene]:
+def choose_model(data: Mapping[str, Any]) -> type[Scene]:
     """The tables that a scene may have: those of a track where it names one."""
     if "track" not in data:
         return Scene
@@ -122,7 +115,7 @@ def _meshes(text: SceneText, folder: Path) -> tuple[dict[str, TetMesh], list[Pro
         seen[name] = key
         try:
             mesh = make_body_mesh(table, folder, f"{key}.mesh")
-        except NoNodes as wrong:
+        except WrongKey as wrong:
             problems.append(wrong.problem)
             continue
         except MeshError as error:
@@ -159,38 +152,23 @@ def _condition(
 ) -> Iterator[Step | Problem]:
     """The call that a condition stands for, or everything that is wrong with it."""
     found: list[Problem] = []
-    arguments: list[Any] = []
-
-    def take(make: Any, *words: Any, **named: Any) -> None:
+    arguments: list[Any] = []  # of the method, in the order of the table's keys
+    for name, value in dict(table).items():
+        where = f"{key}.{name}"
         try:
-            arguments.append(make(*words, **named))
-        except (NoNodes, WrongSeries) as wrong:
+            if isinstance(value, Nodes):
+                value = None if mesh is None else find_named_nodes(value, mesh, where)
+            elif name == "normal":
+                value = unit_vector(value, where)
+            elif name in ("force", "pressure", "value"):
+                value = series_of(value, where, folder, vector=name == "force")
+        except WrongKey as wrong:
             found.append(wrong.problem)
-
-    def select(name: str, nodes: Nodes) -> None:
-        if mesh is not None:
-            take(find_named_nodes, nodes, mesh, f"{key}.{name}")
-
-    verb = type(table).__name__.lower()
-    if isinstance(table, Periodic):
-        select("nodes_a", table.nodes_a)
-        select("nodes_b", table.nodes_b)
-    else:
-        select("nodes", table.nodes)
-    if isinstance(table, Fix):
-        arguments.append(table.components)
-    elif isinstance(table, Prescribe):
-        arguments.append(table.component)
-        take(series_of, table.value, f"{key}.value", folder, vector=False)
-    elif isinstance(table, Roller):
-        take(unit_vector, table.normal, f"{key}.normal")
-    elif isinstance(table, Load):
-        take(series_of, table.force, f"{key}.force", folder, vector=True)
-    elif isinstance(table, Pressure):
-        take(series_of, table.pressure, f"{key}.pressure", folder, vector=False)
+        if name != "body":
+            arguments.append(value)
     yield from found
     if not found and mesh is not None:
-        yield Step(key, verb, table.body, tuple(arguments))
+        yield Step(key, type(table).__name__.lower(), table.body, tuple(arguments))
 
 
 def _probes(
@@ -212,13 +190,9 @@ def _probes(
                 yield Problem(f"{key}.body", f"there is no body {body!r}{near}")
         elif body in meshes:
             try:
-                probes[name] = (body, find_named_nodes(_without_body(probe), meshes[body], key))
-            except NoNodes as wrong:
+                probes[name] = (body, find_named_nodes(probe, meshes[body], key))
+            except WrongKey as wrong:
                 yield wrong.problem
-
-
-def _without_body(probe: Probe) -> Nodes:
-    return Nodes(**probe.model_dump(exclude={"body"}))
 
 
 def find_motion_faults(text: SceneText) -> Iterator[Problem]:

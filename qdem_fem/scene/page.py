@@ -11,10 +11,9 @@ from typing import Any
 from qdem_fem.files import read_table
 from qdem_fem.report import Mode
 from qdem_fem.scene.energy_account import STORED
-from qdem_fem.scene.run import Done
-from qdem_fem.scene.run_folder import RunFolder
+from qdem_fem.scene.run import Done, RunFolder
 from qdem_fem.scene.summary import find_moving_components
-from trackbed.report import bullets, page, picture, table
+from trackbed.report import bullets, folded, page, paragraph, picture, section, table
 from trackbed.run_files import write_whole
 
 
@@ -25,7 +24,7 @@ def write_report(
     """Write the report of a finished run, and its pictures unless ``done`` is None; its path.
 
     ``more``: files and captions of further pictures."""
-    pictures = [] if done is None else [*more, *_pictures(folder.path, summary, done)]
+    pictures = [] if done is None else [*more, *_pictures(folder.path, manifest, summary, done)]
     title = summary["title"] or "QDEM run"
     body = [
         f"<h1>{escape(title)}</h1>",
@@ -34,26 +33,29 @@ def write_report(
         *_bed(summary),
         *_probes(summary),
         *_modes(summary),
-        *_meshes(summary),
-        *_step(summary),
-        *_energy(summary),
-        *_left_out(summary),
-        *_cost(summary),
-        *_again(manifest),
+        _meshes(summary),
+        _step(summary),
+        _energy(summary),
+        section("What is not in this run", bullets(map(escape, summary["left_out"]))),
+        _cost(summary),
+        _again(manifest),
     ]
     path = folder.path / "report.html"
     write_whole(path, page(title, body))
     return path
 
 
-def _pictures(path: Path, summary: dict[str, Any], done: Done) -> Iterator[tuple[Path, str]]:
+def _pictures(
+    path: Path, manifest: dict[str, Any], summary: dict[str, Any], done: Done
+) -> Iterator[tuple[Path, str]]:
     """Draw what there is to draw; file and caption of each picture."""
-    from qdem_fem.report import OUTLINED, draw_deformed, find_bearing_spheres
+    from qdem_fem.report import OUTLINED, draw_deformed
     from qdem_fem.report import figures as pictures
 
     deformed = path / "picture-deformed.png"
     bodies = list(done.bodies.values())
-    factor = draw_deformed(deformed, bodies, bearing=find_bearing_spheres(done.run))
+    asked = manifest["scene"].get("output", {}).get("magnification")
+    factor = draw_deformed(deformed, bodies, asked)
     when = "at rest" if done.plan is None else f"at t = {summary['time']:.6g} s"
     lines = "; thin lines: undeformed" * (len(bodies) <= OUTLINED)
     yield deformed, f"Bodies {when}, displacement magnified {factor:g} times{lines}."
@@ -64,7 +66,7 @@ def _pictures(path: Path, summary: dict[str, Any], done: Done) -> Iterator[tuple
     moving = {name: (time, rows[name]) for name in find_moving_components(rows)}
     if moving:
         history = path / "picture-history.png"
-        pictures.picture_history(history, moving)
+        pictures.draw_history(history, moving)
         yield history, "Mean displacement of the probes; components that hardly move are left out."
     modes = summary["modes"]
     seen = {name: curve for name, curve in moving.items() if name in modes}
@@ -94,58 +96,50 @@ def _claim(summary: dict[str, Any]) -> str:
             f"{summary['time']:.6g} s of motion in {summary['steps']:,} steps of "
             f"{summary['step']:.4g} s, {mesh}."
         )
-    return f'<p class="claim">{escape(text)}</p>'
+    return paragraph(escape(text), "claim")
 
 
 def _probes(summary: dict[str, Any]) -> Iterator[str]:
-    if not summary["probes"]:
-        return
-    yield "<h2>Displacement of the probes</h2>"
     rows = [
         (name, axis, *(f"{1e6 * facts[what][i]:.6g}" for what in ("end", "least", "greatest")))
         for name, facts in summary["probes"].items()
         for i, axis in enumerate("xyz")
     ]
-    yield _table(("probe", "component", "end (um)", "least (um)", "greatest (um)"), rows)
+    header = ("probe", "component", "end (um)", "least (um)", "greatest (um)")
+    if rows:
+        yield section("Displacement of the probes", _table(header, rows))
 
 
 def _modes(summary: dict[str, Any]) -> Iterator[str]:
-    if not summary["modes"]:
-        return
-    yield "<h2>Modes of the free motion</h2>"
-    yield (
-        "<p>Damped cosines fitted to the record since the last change of a load, strongest "
-        "first.</p>"
-    )
     rows = [
         (name, f"{m['frequency']:.6g}", f"{m['decay']:.4g}", f"{1e6 * m['amplitude']:.4g}")
         for name, modes in summary["modes"].items()
         for m in modes
     ]
-    yield _table(("record", "frequency (Hz)", "decay (1/s)", "amplitude (um)"), rows)
+    words = "Damped cosines fitted to the record since the last change of a load, strongest first."
+    header = ("record", "frequency (Hz)", "decay (1/s)", "amplitude (um)")
+    if rows:
+        yield section("Modes of the free motion", paragraph(words), _table(header, rows))
 
 
-def _meshes(summary: dict[str, Any]) -> Iterator[str]:
-    yield "<h2>Bodies and meshes</h2>"
-    yield _table(
-        (
-            "body", "elements", "nodes", "surface faces", "turned right-handed", "unused nodes",
-            "smallest altitude (mm)", "in element", "mass (kg)",
-        ),
-        [
-            (
-                name, f"{b['elements']:,}", f"{b['nodes']:,}", f"{b['surface_faces']:,}",
-                str(b["flipped"]), str(b["unused_nodes"]), f"{1e3 * b['smallest_altitude']:.4g}",
-                str(b["thinnest_element"]), f"{b['mass']:.6g}",
-            )
-            for name, b in summary["bodies"].items()
-        ],
+def _meshes(summary: dict[str, Any]) -> str:
+    header = (
+        "body", "elements", "nodes", "surface faces", "turned right-handed", "unused nodes",
+        "smallest altitude (mm)", "in element", "mass (kg)",
     )  # fmt: skip
+    rows = [
+        (
+            name, f"{b['elements']:,}", f"{b['nodes']:,}", f"{b['surface_faces']:,}",
+            str(b["flipped"]), str(b["unused_nodes"]), f"{1e3 * b['smallest_altitude']:.4g}",
+            str(b["thinnest_element"]), f"{b['mass']:.6g}",
+        )
+        for name, b in summary["bodies"].items()
+    ]  # fmt: skip
+    return section("Bodies and meshes", _table(header, rows))
 
 
-def _step(summary: dict[str, Any]) -> Iterator[str]:
+def _step(summary: dict[str, Any]) -> str:
     critical = summary["critical_step"]
-    yield "<h2>Time step</h2>"
     text = "No elastic motion limits the step. "
     if critical["value"] is not None and critical["element"] < 0:
         text = f"Critical step {critical['value']:.4g} s, of contact between rigid bodies. "
@@ -164,38 +158,28 @@ def _step(summary: dict[str, Any]) -> Iterator[str]:
             f" Mass scaling added {scaled['added_mass']:.4g} kg, {100 * scaled['share']:.3g} % of "
             "the bodies' own mass: inertia that they do not have."
         )
-    yield f"<p>{escape(text)}</p>"
+    return section("Time step", paragraph(escape(text)))
 
 
-def _energy(summary: dict[str, Any]) -> Iterator[str]:
+def _energy(summary: dict[str, Any]) -> str:
     energy = summary["energy"]
-    yield "<h2>Energy</h2>"
     if summary["method"] == "static":
-        yield f"<p>Elastic energy {energy['elastic']:.6g} J.</p>"
-        return
-    rows = [(f"{name} at the end", f"{energy[name]:.6g}") for name in energy if name in NAMED]
+        return section("Energy", paragraph(f"Elastic energy {energy['elastic']:.6g} J."))
+    named = [name for name in energy if name in (*STORED, "external")]
+    rows = [(f"{name} at the end", f"{energy[name]:.6g}") for name in named]
     imbalance = f"{energy['greatest_imbalance']:.3g} ({100 * energy['relative_imbalance']:.2g} %)"
     rows.append(("greatest external - kinetic - elastic on the way", imbalance))
-    yield _table(("energy", "J"), rows)
-
-
-NAMED = (*STORED, "external")
+    return section("Energy", _table(("energy", "J"), rows))
 
 
 def _bed(summary: dict[str, Any]) -> Iterator[str]:
     """How the prepared bed of a track stands."""
     if words := summary.get("bed", {}).get("words"):
-        yield f"<h2>The prepared bed</h2><p>{escape(words.capitalize())}.</p>"
+        yield section("The prepared bed", paragraph(f"{escape(words.capitalize())}."))
 
 
-def _left_out(summary: dict[str, Any]) -> Iterator[str]:
-    yield "<h2>What is not in this run</h2>"
-    yield bullets(escape(text) for text in summary["left_out"])
-
-
-def _cost(summary: dict[str, Any]) -> Iterator[str]:
+def _cost(summary: dict[str, Any]) -> str:
     cost = summary["cost"]
-    yield "<h2>Cost</h2>"
     rows = [
         ("CPU time (s)", f"{cost['cpu_s']:.3g}"),
         ("time on the clock (s)", f"{cost['wall_s']:.3g}"),
@@ -203,21 +187,24 @@ def _cost(summary: dict[str, Any]) -> Iterator[str]:
     if "million_elements_per_s" in cost:
         speed = f"{cost['million_elements_per_s']:.3g}"
         rows.append(("million element-steps per second on the clock", speed))
-    yield _table(("", ""), rows)
-    yield "<p>Advancing alone; without reading, pictures and compilation before the first step.</p>"
+    words = "Advancing alone; without reading, pictures and compilation before the first step."
+    return section("Cost", _table(("", ""), rows), paragraph(words))
 
 
-def _again(manifest: dict[str, Any]) -> Iterator[str]:
-    yield "<h2>To compute it again</h2>"
+def _again(manifest: dict[str, Any]) -> str:
     versions = ", ".join(f"{name} {version}" for name, version in manifest["versions"].items())
-    yield f"<pre>{escape(manifest['command'])}</pre>"
     made = "; ".join([versions, manifest["machine"], manifest["started"]])
-    yield f"<p>{escape(made)}.</p>"
-    asked = json.dumps(manifest["scene"], indent=1)
-    yield f"<details><summary>What was asked, defaults included</summary><pre>{escape(asked)}</pre>"
-    for name, digest in manifest["files"].items():
-        yield f"<p>{escape(name)}: SHA-256 <code>{digest}</code></p>"
-    yield "</details>"
+    asked = f"<pre>{escape(json.dumps(manifest['scene'], indent=1))}</pre>"
+    files = [
+        paragraph(f"{escape(name)}: SHA-256 <code>{digest}</code>")
+        for name, digest in manifest["files"].items()
+    ]
+    return section(
+        "To compute it again",
+        f"<pre>{escape(manifest['command'])}</pre>",
+        paragraph(f"{escape(made)}."),
+        folded("What was asked, defaults included", "".join([asked, *files])),
+    )
 
 
 def _table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

@@ -7,15 +7,15 @@ import time
 from dataclasses import dataclass, field
 from math import ceil
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from qdem_fem.files import EnergyLost, Interrupted, Table, read_table, write_bodies_vtu, write_pvd
 from qdem_fem.scene.energy_account import EnergyAccount
-from qdem_fem.scene.run_folder import RunFolder
 from qdem_fem.tables import Prepared
-from trackbed.run_files import note_signals, write_whole
+from trackbed.run_files import RESULT, note_signals, read_object, write_whole
+from trackbed.run_files import folder as run_folder
 
 CHUNK_WORK = 50_000_000
 """Element-steps between two looks at the clock and the signals: a second or a few."""
@@ -24,7 +24,27 @@ ENERGY = 100
 ENERGIES = ("kinetic", "elastic", "external")
 CONTACT_ENERGIES = ("contact", "friction")
 VISCOUS_ENERGY = ("viscous",)
-COST = "cost.json"
+CHECKPOINT, COST = "checkpoint.npz", "cost.json"
+
+
+class RunFolder(run_folder.RunFolder):
+    """The folder of one QDEM run; see `trackbed.run_files.folder.RunFolder`."""
+
+    own: ClassVar[tuple[str, ...]] = (
+        "scene.toml", "manifest.json", RESULT, CHECKPOINT, COST, "probes.csv", "energy.csv",
+        "fields.pvd", "fields_*.vtu", "report.html", "picture-*.png", ".*.partial",
+    )  # fmt: skip
+    states = CHECKPOINT
+    compared = ("scene", "files")
+    free: ClassVar[tuple[str, ...]] = (
+        "scene.title", "scene.simulation.threads", "scene.output.checkpoint_interval",
+        "scene.output.audit", "scene.output.magnification", "scene.output.modes",
+    )  # fmt: skip
+
+    @property
+    def checkpoint(self) -> Path:
+        """Where the last saved state is."""
+        return self.path / CHECKPOINT
 
 
 @dataclass(frozen=True)
@@ -114,42 +134,27 @@ def run_dynamic(
         run.restore(folder.checkpoint)
     probes = {name: (bodies[body], nodes) for name, (body, nodes) in prepared.probes.items()}
     plan = make_plan(prepared, float(run.step))
-    rows, energies = _tables(folder.path, probes, energy_names(run))
-    output = prepared.scene.output
-    record = _Record(
-        run, list(bodies.values()), plan, folder.path, rows, energies, prepared.scene.audit,
-        output.magnification,
-    )  # fmt: skip
+    done = Done(run, bodies, plan, {"cpu_s": 0.0, "wall_s": 0.0})
+    record = _Record(done, plan, folder.path, probes, prepared.scene.audit)
     if goes_on:
+        done.cost |= read_object(folder.path / COST) or {}  # none: killed before it was written
         record.go_on()
     else:
-        record.begin(probes)
-    cost = _read_cost(folder.path) if goes_on else {"cpu_s": 0.0, "wall_s": 0.0}
-    record.cost = cost
-    done = Done(run, bodies, plan, cost)
+        record.begin()
     saved = time.monotonic()
     with note_signals() as stop:
         while run.steps_done < plan.total:
-            record.advance(plan.next_stop(run.steps_done) - run.steps_done, probes)
+            record.advance(plan.next_stop(run.steps_done) - run.steps_done)
             progress.at(run.steps_done, plan.total, run.time)
             late = time.monotonic() - saved >= prepared.scene.output.checkpoint_interval
             if stop.name or late or run.steps_done == plan.total:
-                write_checkpoint(done, folder, record)
+                record.save(folder.checkpoint)
                 saved = time.monotonic()
             if stop.name and run.steps_done < plan.total:
                 raise Interrupted(
                     f"stopped by {stop.name} at t = {run.time:.6g} s; the state is saved in "
                     f"{folder.checkpoint}\n  -> the same command with --resume goes on from there"
                 )
-    if output.magnification is not None:
-        from qdem_fem.report import draw_series
-
-        files = [(when, folder.path / name) for _, when, name in plan.field_files(plan.total)]
-        pictures = draw_series(run, list(bodies.values()), files, output.magnification)
-        if output.video is not None and pictures:
-            from qdem_fem.report import write_video
-
-            write_video(folder.path / "video.gif", pictures, output.video)
     return done
 
 
@@ -165,44 +170,35 @@ def run_static(prepared: Prepared, run: Any, bodies: dict[str, Any], folder: Run
         "wall_s": time.perf_counter() - started,
     }
     probes = {name: (bodies[body], nodes) for name, (body, nodes) in prepared.probes.items()}
-    rows, energies = _tables(folder.path, probes, energy_names(run))
-    for table in (rows, energies):
-        table.begin()
-    rows.append(np.array([[0.0, *_probed(probes)]]))
-    energies.append(_energy_row(run, 0.0))
-    write_bodies_vtu(folder.path / "fields_000000.vtu", list(bodies.values()))
-    write_pvd(folder.path / "fields.pvd", [(0.0, "fields_000000.vtu")])
-    static = {
-        "residual": float(answer.residual),
-        "error_estimate": float(answer.error_estimate),
-        "steps": float(answer.steps),
-    }
-    return Done(run, bodies, None, cost, static)
+    names = ("residual", "error_estimate", "steps")
+    done = Done(run, bodies, None, cost, {name: float(getattr(answer, name)) for name in names})
+    _Record(done, None, folder.path, probes).begin()
+    return done
 
 
-@dataclass
 class _Record:
-    """What a dynamic run writes on its way."""
+    """What a run writes on its way; without a ``plan`` only what it came to.
 
-    run: Any
-    bodies: list[Any]
-    plan: Plan
-    path: Path
-    rows: Table
-    energies: Table
-    audit: float | None = None
-    """Share of the greatest energy that may be missing."""
-    magnification: float | None = None
-    """Of displacements in pictures beside the VTU files."""
-    cost: dict[str, float] = field(default_factory=dict)
-    """``cpu_s`` and ``wall_s`` of advancing so far [s]."""
-    account: EnergyAccount = field(default_factory=EnergyAccount)
+    ``audit``: share of the greatest energy that may be missing.
+    """
 
-    def begin(self, probes: dict[str, Any]) -> None:
+    def __init__(
+        self, done: Done, plan: Plan | None, path: Path, probes: dict[str, Any],
+        audit: float | None = None,
+    ) -> None:  # fmt: skip
+        self.done, self.run, self.path, self.probes = done, done.run, path, probes
+        self.plan = plan or Plan(0.0, 0, 1, 1, 1, 1, every_field=False)
+        self.audit, self.account = audit, EnergyAccount()
+        names = [f"{name}_{axis}" for name in probes for axis in "xyz"]
+        self.rows = Table(path / "probes.csv", ["time", *names])
+        self.energies = Table(path / "energy.csv", ["time", *energy_names(self.run)])
+
+    def begin(self) -> None:
         """First rows and fields, at t = 0."""
         self.rows.begin()
         self.energies.begin()
-        self.rows.append(np.array([[0.0, *_probed(probes)]]))
+        means = [body.displacement[nodes].mean(axis=0) for body, nodes in self.probes.values()]
+        self.rows.append(np.concatenate([[0.0], *means])[None])
         self.take_energy(0.0)
         self.write_fields()
 
@@ -219,17 +215,17 @@ class _Record:
             if path.name not in kept:
                 path.unlink()
 
-    def advance(self, steps: int, probes: dict[str, Any]) -> None:
+    def advance(self, steps: int) -> None:
         """Advance and write the rows, energies and fields that fall due."""
         run, plan = self.run, self.plan
         start = run.steps_done
         started, cpu = time.perf_counter(), time.process_time()
-        history = run.advance(steps * plan.step, probes=probes, sampling=plan.sampling * plan.step)
-        self.cost["wall_s"] += time.perf_counter() - started
-        self.cost["cpu_s"] += time.process_time() - cpu
+        history = run.advance(steps * plan.step, self.probes, plan.sampling * plan.step)
+        self.done.cost["wall_s"] += time.perf_counter() - started
+        self.done.cost["cpu_s"] += time.process_time() - cpu
         new = history.time > (start + 0.5) * plan.step
         number = np.rint(history.time[new] / plan.step)
-        columns = [history[name][new] for name in probes]
+        columns = [history[name][new] for name in self.probes]
         self.rows.append(np.column_stack([number * plan.step, *columns]))
         if run.steps_done % plan.energy == 0 or run.steps_done == plan.total:
             self.take_energy(run.steps_done * plan.step)
@@ -238,9 +234,10 @@ class _Record:
 
     def take_energy(self, when: float) -> None:
         """A row of energies at a time [s], into its file and the account."""
-        row = _energy_row(self.run, when)
+        energy, names = self.run.energy(), energy_names(self.run)
+        row = np.array([[when, *(float(getattr(energy, name)) for name in names)]])
         self.energies.append(row)
-        self.account.take(dict(zip(energy_names(self.run), row[:, 1:].T, strict=True)))
+        self.account.take(dict(zip(names, row[:, 1:].T, strict=True)))
 
     def audit_hold(self) -> None:
         """Raise `EnergyLost` where the account of energies so far does not close."""
@@ -258,49 +255,18 @@ class _Record:
         """Write the VTU file that is due now, and the list of all."""
         files = self.plan.field_files(self.run.steps_done)
         if files and files[-1][0] == self.run.steps_done:
-            target = self.path / files[-1][2]
-            if self.magnification is None:
-                write_bodies_vtu(target, self.bodies)
-            else:
-                from qdem_fem.report import draw_fields
-
-                draw_fields(target, self.run, self.bodies, self.magnification, files[-1][1])
+            write_bodies_vtu(self.path / files[-1][2], list(self.done.bodies.values()))
             write_pvd(self.path / "fields.pvd", [(when, name) for _, when, name in files])
 
-
-def write_checkpoint(done: Done, folder: RunFolder, record: _Record) -> None:
-    """Save the state; the tables reach the disk first, so that they hold all rows up to it."""
-    record.rows.sync()
-    record.energies.sync()
-    done.run.save(folder.checkpoint)
-    write_whole(folder.path / COST, json.dumps(done.cost) + "\n")
-
-
-def _read_cost(path: Path) -> dict[str, float]:
-    try:
-        found = json.loads((path / COST).read_text(encoding="utf-8"))
-        return {name: float(found[name]) for name in ("cpu_s", "wall_s")}
-    except (OSError, ValueError, KeyError, TypeError):  # killed before it was written
-        return {"cpu_s": 0.0, "wall_s": 0.0}
+    def save(self, checkpoint: Path) -> None:
+        """Save the state; the tables reach the disk first, so that they hold all rows up to it."""
+        self.rows.sync()
+        self.energies.sync()
+        self.run.save(checkpoint)
+        write_whole(self.path / COST, json.dumps(self.done.cost) + "\n")
 
 
 def energy_names(run: Any) -> tuple[str, ...]:
     """Columns of energy.csv beside the time; of what the scene has and counts."""
     touching = () if run.contact is None else CONTACT_ENERGIES
     return ENERGIES + touching + VISCOUS_ENERGY * run.viscous
-
-
-def _tables(path: Path, probes: dict[str, Any], energies: tuple[str, ...]) -> tuple[Table, Table]:
-    names = [f"{name}_{axis}" for name in probes for axis in "xyz"]
-    rows = Table(path / "probes.csv", ["time", *names])
-    return rows, Table(path / "energy.csv", ["time", *energies])
-
-
-def _probed(probes: dict[str, Any]) -> list[float]:
-    means = (body.displacement[nodes].mean(axis=0) for body, nodes in probes.values())
-    return [float(component) for mean in means for component in mean]
-
-
-def _energy_row(run: Any, when: float) -> Any:
-    energy = run.energy()
-    return np.array([[when, *(float(getattr(energy, name)) for name in energy_names(run))]])

@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from qdem_fem.files import read_table
+from qdem_fem.files import Series, read_table
 from qdem_fem.report import Mode, find_peak_frequencies
 from qdem_fem.scene.energy_account import list_energy_facts
-from qdem_fem.scene.run import Done
-from qdem_fem.scene.run_folder import RunFolder
-from qdem_fem.tables import Prepared, TimeSeries
+from qdem_fem.scene.run import Done, RunFolder
+from qdem_fem.tables import Prepared
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -43,7 +42,15 @@ def summary_of(prepared: Prepared, done: Done, folder: RunFolder) -> dict[str, A
         if element_steps and cost["wall_s"]
         else dict(cost),
         "energy": list_energy_facts(energy),
-        "probes": {name: _probe_facts(rows, name) for name in prepared.probes},
+        "probes": {
+            name: {
+                "end": [float(column[-1]) for column in columns],
+                "least": [float(column.min()) for column in columns],
+                "greatest": [float(column.max()) for column in columns],
+            }
+            for name in prepared.probes
+            if (columns := [rows[f"{name}_{axis}"] for axis in "xyz"])
+        },
         "modes": {
             label: [vars(mode) for mode in modes]
             for label, modes in modes_of(prepared, rows).items()
@@ -117,15 +124,6 @@ def body_facts(body: Any) -> dict[str, Any]:
     }
 
 
-def _probe_facts(rows: dict[str, FloatArray], name: str) -> dict[str, list[float]]:
-    xyz = [rows[f"{name}_{axis}"] for axis in "xyz"]
-    return {
-        "end": [float(column[-1]) for column in xyz],
-        "least": [float(column.min()) for column in xyz],
-        "greatest": [float(column.max()) for column in xyz],
-    }
-
-
 def find_moving_components(rows: dict[str, FloatArray]) -> list[str]:
     """Columns of probes.csv whose range is not negligible, in the order of the file."""
     ranges = {name: float(np.ptp(column)) for name, column in rows.items() if name != "time"}
@@ -139,7 +137,7 @@ def free_from(prepared: Prepared) -> float:
         value
         for step in prepared.conditions
         for value in step.arguments
-        if isinstance(value, TimeSeries) and len(value.times) > 1
+        if isinstance(value, Series) and len(value.times) > 1
     ]
     return max((float(one.times[-1]) for one in series), default=0.0)
 

@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import Field, Tag
 
 from qdem_fem.contact.search import PeriodicWidth
 from qdem_fem.contact.spheres import NEAR, ContactPlane, SphereContact, check_planes_along
 from qdem_fem.contact.surface import SurfaceContact
 from qdem_fem.files import ConditionError
 from qdem_fem.march import Contact
-from qdem_fem.tables.types import Vector, number_or_table
+from qdem_fem.tables.types import Vector, tell_kind
 from trackbed.scene_files import Name, NonNegative, Positive, Table
 
 NumberByBody = Annotated[
     Annotated[Positive, Tag("#number")] | Annotated[dict[Name, Positive], Tag("#table")],
-    Discriminator(number_or_table),
+    tell_kind("#number", "#table"),
 ]
 
 

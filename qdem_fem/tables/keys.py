@@ -1,13 +1,13 @@
 """The scene: bodies, conditions and output of one QDEM run, as the tables of a scene file (SI).
 
-`qdem_fem.tables.scene_read` reads a scene; ``cantilever.toml`` explains every key.
+`qdem_fem.tables.read_tables` reads a scene; ``cantilever.toml`` explains every key.
 """
 
 from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import Field, Tag
 
 from qdem_fem.bodies import Rigid
 from qdem_fem.element import MEASURES, Strain
@@ -20,8 +20,7 @@ from qdem_fem.tables.types import (
     Share,
     Size,
     Vector,
-    number_or_table,
-    vector_or_table,
+    tell_kind,
 )
 from trackbed.scene_files import Name, NonNegative, Positive, Real, Table, Text
 
@@ -42,26 +41,12 @@ class BoxMesh(Table):
     """Least corner [m]."""
 
 
-class RingMesh(Table):
-    """A hollow cylinder about the z axis, its lower face in the plane z = 0."""
-
-    inner_radius: Positive
-    """[m]"""
-    outer_radius: Positive
-    """[m]"""
-    height: Positive
-    """[m]"""
-    cells: Cells
-    """Cells along the radius, around (at least 3) and along the height."""
-
-
 class Mesh(Table):
-    """Where a body's tetrahedra come from: exactly one of the keys."""
+    """Where a body's tetrahedra come from: one of the keys."""
 
     file: Text | None = None
     """Mesh file of any format of meshio; a relative path counts from the scene file."""
     box: BoxMesh | None = None
-    ring: RingMesh | None = None
 
 
 class MaterialTable(Table):
@@ -159,11 +144,11 @@ class SeriesTable(Table):
 
 ScalarSeries = Annotated[
     Annotated[Real, Tag("#number")] | Annotated[SeriesTable, Tag("#table")],
-    Discriminator(number_or_table),
+    tell_kind("#number", "#table"),
 ]
 VectorSeries = Annotated[
     Annotated[Vector, Tag("#vector")] | Annotated[SeriesTable, Tag("#table")],
-    Discriminator(vector_or_table),
+    tell_kind("#vector", "#table"),
 ]
 
 
@@ -251,9 +236,7 @@ class Output(Table):
     vtu_interval: Positive | None = None
     """Between VTU files [s]; by default only the end is written."""
     magnification: Positive | None = None
-    """Of displacements in a PNG picture beside every VTU file; none when not given."""
-    video: Annotated[float, Field(gt=0, le=100)] | None = None
-    """Of those pictures, a second [1/s], in video.gif; none is made when not given."""
+    """Of displacements in the report's picture; by default a round one that lets them be seen."""
     checkpoint_interval: NonNegative = 300.0
     """Between checkpoints, by the clock on the wall [s]."""
     audit: Share | None = None

@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from qdem_fem.tables.keys import Mesh, Nodes
-from trackbed.scene_files import Problem, suggest_word
+from qdem_fem.tables.types import WrongKey
+from trackbed.scene_files import suggest_word
 
 if TYPE_CHECKING:
     from qdem_fem.mesh import TetMesh
@@ -21,44 +22,25 @@ SIDE = 1e-6
 """Distance to a side, over the size of the mesh, within which a node lies on it; mesh files keep
 single precision or a few digits."""
 KINDS = ("set", "box", "plane", "nearest", "all")
-
-
 CELLS_MOST = 4_000_000
 """Most cells of a generated mesh: what 128 GB of memory hold."""
-
-
-class NoNodes(Exception):
-    """A selection can not be used; ``problem`` says why."""
-
-    def __init__(self, problem: Problem) -> None:
-        super().__init__(problem.what)
-        self.problem = problem
 
 
 def make_body_mesh(table: Mesh, folder: Path, key: str) -> TetMesh:
     """The mesh of a body; a relative path counts from ``folder``.
 
-    Raises `MeshError`, or `NoNodes` with the key for measures that make no mesh.
+    Raises `MeshError`, or `WrongKey` with the key for measures that make no mesh.
     """
-    from qdem_fem.mesh import make_box_mesh, make_ring_mesh, read_mesh
+    from qdem_fem.mesh import make_box_mesh, read_mesh
 
-    given = [name for name in ("file", "box", "ring") if getattr(table, name) is not None]
-    if len(given) != 1:
-        raise NoNodes(Problem(key, "give exactly one of file, box, ring"))
-    if table.file is not None:
-        return read_mesh(folder / table.file)
-    shape = table.box or table.ring
-    assert shape is not None
-    count = int(np.prod(shape.cells))
+    if (table.file is None) == (table.box is None):
+        raise WrongKey(key, "give one of file, box")
+    if table.box is None:
+        return read_mesh(folder / str(table.file))
+    count = int(np.prod(table.box.cells))
     if count > CELLS_MOST:
-        what = f"{count} cells are too many; at most {CELLS_MOST}"
-        raise NoNodes(Problem(f"{key}.{given[0]}.cells", what))
-    if table.box is not None:
-        box = table.box
-        return read_mesh(make_box_mesh(box.size, box.cells, box.pattern, box.origin))
-    ring = table.ring
-    assert ring is not None
-    return read_mesh(make_ring_mesh(ring.inner_radius, ring.outer_radius, ring.height, ring.cells))
+        raise WrongKey(f"{key}.box.cells", f"{count} cells are too many; at most {CELLS_MOST}")
+    return read_mesh(make_box_mesh(*dict(table.box).values()))
 
 
 def node_sets(mesh: TetMesh) -> dict[str, IntArray]:
@@ -78,11 +60,11 @@ def node_sets(mesh: TetMesh) -> dict[str, IntArray]:
 def find_named_nodes(nodes: Nodes, mesh: TetMesh, key: str) -> IntArray:
     """Numbers of the nodes that a scene names at ``key``, sorted, without nodes of no element.
 
-    Raises `NoNodes` for an unknown set and for a selection that names no node.
+    Raises `WrongKey` for an unknown set and for a selection that names no node.
     """
     given = [name for name in KINDS if getattr(nodes, name) is not None]
     if len(given) != 1:
-        raise NoNodes(Problem(key, f"give exactly one of {', '.join(KINDS)}"))
+        raise WrongKey(key, f"give exactly one of {', '.join(KINDS)}")
     kind = given[0]
     x = mesh.nodes
     chosen: npt.NDArray[np.bool_]
@@ -94,13 +76,13 @@ def find_named_nodes(nodes: Nodes, mesh: TetMesh, key: str) -> IntArray:
             near = suggest_word(nodes.set, sets)
             known = f" (sets of this mesh: {', '.join(sorted(sets)[:20])})"
             what = f"there is no set {nodes.set!r}{near}{known if 'mean' in near else ''}"
-            raise NoNodes(Problem(f"{key}.set", what))
+            raise WrongKey(f"{key}.set", what)
         chosen = np.zeros(len(x), bool)
         chosen[sets[nodes.set]] = True
     elif nodes.box is not None:
         low, high = np.array(nodes.box.min), np.array(nodes.box.max)
         if (low > high).any():
-            raise NoNodes(Problem(f"{key}.box", "min must not be above max"))
+            raise WrongKey(f"{key}.box", "min must not be above max")
         chosen = np.asarray(((x >= low) & (x <= high)).all(axis=1), bool)
     elif nodes.plane is not None:
         normal = unit_vector(nodes.plane.normal, f"{key}.plane.normal")
@@ -117,13 +99,13 @@ def find_named_nodes(nodes: Nodes, mesh: TetMesh, key: str) -> IntArray:
         low, high = x[used].min(axis=0), x[used].max(axis=0)
         spans = ", ".join(f"{a:g} ... {b:g}" for a, b in zip(low, high, strict=True))
         what = f"names no node; the body spans {spans} m"
-        raise NoNodes(Problem(f"{key}.{kind}", what))
+        raise WrongKey(f"{key}.{kind}", what)
     return found
 
 
 def unit_vector(vector: tuple[float, float, float], key: str) -> FloatArray:
-    """The vector over its length; raises `NoNodes` for zero."""
+    """The vector over its length; raises `WrongKey` for zero."""
     length = float(np.linalg.norm(vector))
     if length == 0:
-        raise NoNodes(Problem(key, "has no direction"))
+        raise WrongKey(key, "has no direction")
     return np.array(vector) / length

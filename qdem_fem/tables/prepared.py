@@ -1,9 +1,8 @@
-"""A checked scene, and the checks that scenes of bodies and of a track share."""
+"""A scene read and checked, and the checks that scenes of bodies and of a track share."""
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,13 +11,17 @@ import numpy as np
 import numpy.typing as npt
 
 from qdem_fem.tables.keys import BodyTable, Output, Scene, SeriesTable, SimulationTable
-from trackbed.scene_files import Problem, SceneText, Table
+from trackbed.run_files import digest_file
+from trackbed.scene_files import Guide, Problem, SceneText, Table, read_scene
 
 if TYPE_CHECKING:
     from qdem_fem.mesh import TetMesh
 
 IntArray = npt.NDArray[np.int64]
 
+GUIDE = Guide("cantilever", "simulation.duration=0.1")
+TRACK_GUIDE = Guide("track-small", "simulation.duration=0.1")
+"""Of scenes with a table ``[track]``."""
 ROWS_MOST = 100_000_000
 """Most rows of a table that is written."""
 
@@ -32,7 +35,7 @@ class Step:
     """Method of `qdem_fem.Simulation`."""
     body: str
     arguments: tuple[Any, ...]
-    """Behind the body; series are `TimeSeries`."""
+    """Behind the body; values over time are `qdem_fem.Series`."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,25 @@ class Prepared:
     """Each file that the scene names, as it is written there, and its SHA-256."""
 
 
+def read_tables(
+    path: Path | str,
+    overrides: Sequence[str] = (),
+    choose_model: Callable[[Mapping[str, Any]], type[Scene]] = lambda data: Scene,
+) -> SceneText:
+    """Read a scene file and check every table by itself; nothing that needs a mesh.
+
+    ``choose_model`` gives the tables that a scene may have by its data.
+    What is wrong with the keys is in ``problems`` of the answer, not raised: `refuse` does.
+
+    Raises `UsageError` when the file or an override can not be read, `SceneError` for no TOML.
+    """
+    scene = read_scene(path, overrides, guide=GUIDE)
+    if "track" in scene.data:
+        scene.guide = TRACK_GUIDE
+    scene.check(choose_model(scene.data))
+    return scene
+
+
 def list_tables(text: SceneText, *kinds: Any) -> Iterator[tuple[str, Any]]:
     """Key and table of every sound table of these kinds."""
     for key, table in text.tables.items():
@@ -62,8 +84,6 @@ def find_output_faults(text: SceneText) -> Iterator[Problem]:
     output = text.tables.get("output", Output())
     if not isinstance(simulation, SimulationTable) or not isinstance(output, Output):
         return
-    if output.video is not None and output.magnification is None:
-        yield Problem("output.video", "there are no pictures to show: give magnification, too")
     duration = simulation.duration
     if simulation.method == "static":
         return
@@ -86,18 +106,10 @@ def find_output_faults(text: SceneText) -> Iterator[Problem]:
 
 def list_named_files(text: SceneText, folder: Path) -> Iterator[tuple[str, str]]:
     """Files that a sound scene names, and their SHA-256."""
-    for name in sorted(_file_names(text)):
-        digest = hashlib.sha256()
-        with (folder / name).open("rb") as stream:
-            while block := stream.read(1 << 20):
-                digest.update(block)
-        yield name, digest.hexdigest()
-
-
-def _file_names(text: SceneText) -> set[str]:
     names = {body.mesh.file for _, body in list_tables(text, BodyTable) if body.mesh.file}
     for _, table in list_tables(text, Table):
         for series in dict(table).values():
             if isinstance(series, SeriesTable) and series.csv:
                 names.add(series.csv)
-    return names
+    for name in sorted(names):
+        yield name, digest_file(folder / name)

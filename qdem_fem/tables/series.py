@@ -2,61 +2,34 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from qdem_fem.files import Series, ramp
 from qdem_fem.tables.keys import SeriesTable
-from trackbed.errors import LibraryMissing, UsageError
-from trackbed.scene_files import Problem
+from qdem_fem.tables.types import WrongKey
+from trackbed.errors import UsageError
 from trackbed.series_file import SI, TIMES, read_columns
-
-FloatArray = npt.NDArray[np.float64]
 
 WAYS = {"ramp": ("ramp", "value"), "times": ("times", "values"), "csv": ("csv", "value")}
 """First key of each way to give a series, and the keys that it needs."""
 
 
-@dataclass(frozen=True)
-class TimeSeries:
-    """Linear between instants, constant before the first and behind the last."""
-
-    times: FloatArray
-    """Instants [s], (k,), growing; one for a constant."""
-    values: FloatArray
-    """SI, (k,) or (k, 3)."""
-
-    def end(self) -> Any:
-        """The last value: what a static answer takes."""
-        return self.values[-1]
-
-
-class WrongSeries(Exception):
-    """A series can not be used; ``problem`` says why."""
-
-    def __init__(self, problem: Problem) -> None:
-        super().__init__(problem.what)
-        self.problem = problem
-
-
 def series_of(
     table: SeriesTable | float | tuple[float, ...], key: str, folder: Path, *, vector: bool
-) -> TimeSeries:
+) -> Series:
     """The series that a scene gives at ``key``; a relative CSV path counts from ``folder``.
 
-    Values are numbers, or vectors where ``vector``.  Raises `WrongSeries`.
+    Values are numbers, or vectors where ``vector``.  Raises `WrongKey`.
     """
     if not isinstance(table, SeriesTable):
-        return TimeSeries(np.zeros(1), np.array([table], float))
+        return Series([0.0], [table])
     way = _way(table, key)
     if way == "ramp":
         if isinstance(table.value, str) or table.value is None or table.ramp is None:
-            raise WrongSeries(Problem(f"{key}.value", "a ramp needs a value in SI units"))
-        end = np.array(table.value, float)
-        found = TimeSeries(np.array([0.0, table.ramp]), np.array([np.zeros_like(end), end]))
+            raise WrongKey(f"{key}.value", "a ramp needs a value in SI units")
+        found = ramp(table.ramp, table.value)
     elif way == "times":
         found = _tabulated(table, key)
     else:
@@ -69,61 +42,61 @@ def _way(table: SeriesTable, key: str) -> str:
     given = table.model_fields_set
     ways = [way for way in WAYS if way in given]
     if len(ways) != 1:
-        raise WrongSeries(Problem(key, "give one of ramp, times or csv"))
+        raise WrongKey(key, "give one of ramp, times or csv")
     (way,) = ways
     needed = set(WAYS[way])
     allowed = needed | {"direction"} | ({"time"} if way == "csv" else set())
     missing, extra = sorted(needed - given), sorted(given - allowed)
     if missing:
-        raise WrongSeries(Problem(f"{key}.{missing[0]}", f"missing: {way} needs it"))
+        raise WrongKey(f"{key}.{missing[0]}", f"missing: {way} needs it")
     if extra:
-        raise WrongSeries(Problem(f"{key}.{extra[0]}", f"{way} does not use it"))
+        raise WrongKey(f"{key}.{extra[0]}", f"{way} does not use it")
     return way
 
 
-def _tabulated(table: SeriesTable, key: str) -> TimeSeries:
+def _tabulated(table: SeriesTable, key: str) -> Series:
     times, values = table.times or (), table.values or ()
     if len(times) != len(values) or not times:
         what = f"{len(times)} times, {len(values)} values: give as many, and at least one"
-        raise WrongSeries(Problem(f"{key}.values", what))
+        raise WrongKey(f"{key}.values", what)
     if len({isinstance(value, tuple) for value in values}) > 1:
-        raise WrongSeries(Problem(f"{key}.values", "numbers and vectors are mixed"))
+        raise WrongKey(f"{key}.values", "numbers and vectors are mixed")
     for index in range(1, len(times)):
         if times[index] <= times[index - 1]:
             what = f"must grow: entry {index}, {times[index]:g} s, follows {times[index - 1]:g} s"
-            raise WrongSeries(Problem(f"{key}.times", what))
-    return TimeSeries(np.array(times, float), np.array(values, float))
+            raise WrongKey(f"{key}.times", what)
+    return Series(times, values)
 
 
-def _from_csv(table: SeriesTable, key: str, folder: Path) -> TimeSeries:
+def _from_csv(table: SeriesTable, key: str, folder: Path) -> Series:
     if not isinstance(table.value, str):
-        raise WrongSeries(Problem(f"{key}.value", "name the column of the values"))
+        raise WrongKey(f"{key}.value", "name the column of the values")
     path = folder / str(table.csv)
 
-    def refuse(what: str, where: str) -> WrongSeries:
-        return WrongSeries(Problem(f"{key}.csv", what, where))
+    def refuse(what: str, where: str) -> WrongKey:
+        return WrongKey(f"{key}.csv", what, where)
 
     try:
         (times, values), lines = read_columns(path, (table.time, table.value), (TIMES, tuple(SI)))
-    except (UsageError, LibraryMissing) as error:
+    except UsageError as error:
         raise refuse(error.what, error.where) from error
     back = np.flatnonzero(np.diff(times) <= 0)
     if len(back):
         row = int(back[0]) + 1
         what = f"times must grow: {times[row]:g} s follows {times[row - 1]:g} s"
         raise refuse(what, f"{path}:{lines[row]}")
-    return TimeSeries(times, values)
+    return Series(times, values)
 
 
-def _directed(found: TimeSeries, table: SeriesTable, key: str, vector: bool) -> TimeSeries:
+def _directed(found: Series, table: SeriesTable, key: str, vector: bool) -> Series:
     """Numbers times the direction for a vector quantity; refuses what does not fit."""
     is_vector = found.values.ndim == 2
     if table.direction is not None:
         if not vector or is_vector:
-            raise WrongSeries(Problem(f"{key}.direction", "only numbers of a force are directed"))
-        return TimeSeries(found.times, found.values[:, None] * np.array(table.direction))
+            raise WrongKey(f"{key}.direction", "only numbers of a force are directed")
+        return Series(found.times, found.values[:, None] * np.array(table.direction))
     if vector and not is_vector:
-        raise WrongSeries(Problem(key, "a force is a vector: give vectors, or direction = [...]"))
+        raise WrongKey(key, "a force is a vector: give vectors, or direction = [...]")
     if is_vector and not vector:
-        raise WrongSeries(Problem(key, "must be numbers, not vectors"))
+        raise WrongKey(key, "must be numbers, not vectors")
     return found

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, Discriminator, Field, Tag
 
-from trackbed.scene_files import Positive, Real, Text
+from trackbed.scene_files import Positive, Problem, Real, Text
 
 Poisson = Annotated[float, Field(gt=-1, lt=0.5, allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=1e-3, le=1, allow_inf_nan=False)]
@@ -16,41 +16,38 @@ CellCount = Annotated[int, Field(ge=1, le=2000)]
 Cells = Annotated[tuple[CellCount, CellCount, CellCount], Field(strict=False)]
 
 
-def _kind(value: object) -> str:
-    """Which type of a union a value is checked as; keys in messages leave these tags out."""
-    if isinstance(value, dict | BaseModel):
-        return "#table"
-    if isinstance(value, list | tuple):
-        return "#vector"
-    return "#name" if isinstance(value, str) else "#number"
+class WrongKey(Exception):
+    """What a key says can not be used; ``problem`` says why."""
+
+    def __init__(self, key: str, what: str, where: str = "") -> None:
+        super().__init__(what)
+        self.problem = Problem(key, what, where)
 
 
-def _number_or_vector(value: object) -> str:
-    return "#vector" if _kind(value) == "#vector" else "#number"
+def tell_kind(*tags: str) -> Discriminator:
+    """Which type of a union a value is checked as: that of its kind, or the first of ``tags``.
 
+    Keys in messages leave these tags out.
+    """
 
-def _number_vector_or_name(value: object) -> str:
-    kind = _kind(value)
-    return "#number" if kind == "#table" else kind
+    def choose(value: object) -> str:
+        kind = "#name" if isinstance(value, str) else "#number"
+        if isinstance(value, dict | BaseModel):
+            kind = "#table"
+        elif isinstance(value, list | tuple):
+            kind = "#vector"
+        return kind if kind in tags else tags[0]
 
-
-def number_or_table(value: object) -> str:
-    """Tag of a number or a table."""
-    return "#table" if _kind(value) == "#table" else "#number"
-
-
-def vector_or_table(value: object) -> str:
-    """Tag of a vector or a table."""
-    return "#table" if _kind(value) == "#table" else "#vector"
+    return Discriminator(choose)
 
 
 NumberVector = Annotated[
     Annotated[Real, Tag("#number")] | Annotated[Vector, Tag("#vector")],
-    Discriminator(_number_or_vector),
+    tell_kind("#number", "#vector"),
 ]
 NumberVectorName = Annotated[
     Annotated[Real, Tag("#number")]
     | Annotated[Vector, Tag("#vector")]
     | Annotated[Text, Tag("#name")],
-    Discriminator(_number_vector_or_name),
+    tell_kind("#number", "#vector", "#name"),
 ]

@@ -298,11 +298,11 @@ def read_bed(path: Path, recipe: BedRecipe) -> Bed:
         counts, nodes = arrays.pop("counts"), arrays.pop("nodes")
         displacement = arrays.pop("displacement")
         stage, rests = head["stage"], head["rests"]
-        stage = {"firm": "firm 4/8"}.get(stage, stage)  # as it was called once
-        stands = head.get("stands", {})
+        stands = head["stands"]
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
         raise CheckpointError(f"no bed ({error})", where=str(path), remedy=remedy) from error
-    there.pop("patience", None)  # named once; what is at rest does not depend on it
+    for once in ("centre_height", "end_height"):  # of the sleeper, once; both its height
+        there["shape"].pop(once, None)
     if there != here:
         other = [name for name in here if there.get(name) != here[name]]
         raise CheckpointError(

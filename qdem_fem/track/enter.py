@@ -18,7 +18,7 @@ from pydantic import Field
 
 from qdem_fem.contact.spheres import SphereContact
 from qdem_fem.element import Material
-from qdem_fem.files import ConditionError
+from qdem_fem.files import ConditionError, Series
 from qdem_fem.march import Rest
 from qdem_fem.mesh import FloatArray, IntArray
 from qdem_fem.tables import (
@@ -28,8 +28,7 @@ from qdem_fem.tables import (
     Prepared,
     Scene,
     Step,
-    TimeSeries,
-    WrongSeries,
+    WrongKey,
     contact_faults,
     find_output_faults,
     list_named_files,
@@ -73,13 +72,13 @@ class TrackPrepared(Prepared):
 
     recipe: BedRecipe
     bed_file: Path
-    loads: tuple[TimeSeries, ...]
+    loads: tuple[Series, ...]
     """On each rail seat [N], (k, 3)."""
     stand: dict[str, Any] = field(default_factory=dict)
     """`qdem_fem.track.stand.Stand` of the bed, and its ``words``; filled by `enter_track`."""
 
     @property
-    def load(self) -> TimeSeries:
+    def load(self) -> Series:
         """On the first rail seat."""
         return self.loads[0]
 
@@ -87,12 +86,12 @@ class TrackPrepared(Prepared):
 def track_load(text: SceneText) -> TrackPrepared:
     """Check a scene with ``[track]``; raises `SceneError` with all that is wrong."""
     problems = list(text.problems) + list(_faults(text))
-    loads: tuple[TimeSeries, ...] = ()
+    loads: tuple[Series, ...] = ()
     track = text.tables.get("track")
     if isinstance(track, TrackTable):
         try:
             loads = loads_of(track, text.path.parent)
-        except WrongSeries as wrong:
+        except WrongKey as wrong:
             problems.append(wrong.problem)
         except ConditionError as error:
             problems.append(Problem("track.bogie", describe_error(error)))
@@ -208,7 +207,6 @@ def enter_track(prepared: TrackPrepared) -> tuple[Any, dict[str, Any]]:
     Fills the meshes, the probes and the stand of ``prepared``.  Raises `NotConverged` for a bed
     that finds no equilibrium or creeps.
     """
-    from qdem_fem.files import Series
     from qdem_fem.track.stand import begin_bed, judge_bed
 
     scene, recipe = prepared.scene, prepared.recipe
@@ -229,7 +227,7 @@ def enter_track(prepared: TrackPrepared) -> tuple[Any, dict[str, Any]]:
     sets = sleeper.mesh.node_sets
     seats = [sets[name] for name in sorted(sets) if name.startswith("seat")]
     for seat, load in zip(seats, prepared.loads, strict=True):
-        run.load(sleeper, seat, Series(load.times, load.values))
+        run.load(sleeper, seat, load)
     prepared.stand.update(asdict(stand), creep=stand.creep, words=stand.describe())
     prepared.meshes.update({name: body.mesh for name, body in bodies.items()})
     prepared.probes.update(points_of(recipe, bed, bodies))

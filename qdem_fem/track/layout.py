@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from qdem_fem.mesh import FloatArray, TetMesh
 from qdem_fem.track.bodies import GAP, Room, TrackBox, make_loose_lattice, make_sleeper_slice
-from qdem_fem.track.sleeper_mesh import SleeperShape, make_half_sleeper, sleeper_mesh
+from qdem_fem.track.sleeper_mesh import SleeperShape, make_half_sleeper, make_sleeper_mesh
 
 Part = Literal["slice", "half", "whole"]
 SLICE_POINTS = {"B1": 0.2, "B2": 0.5, "B3": 0.8}
@@ -58,7 +58,7 @@ class TrackLayout:
         """
         if self.part == "slice":
             return make_sleeper_slice(self.shape, self.box, bottom, self.radius, self.cells)
-        make = make_half_sleeper if self.part == "half" else sleeper_mesh
+        make = make_half_sleeper if self.part == "half" else make_sleeper_mesh
         mesh = make(self.shape, *self.cells)
         return replace(
             mesh, nodes=mesh.nodes + np.array([self.span[0], self.box.width / 2, bottom])

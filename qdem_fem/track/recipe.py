@@ -9,7 +9,6 @@ import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +21,6 @@ from qdem_fem.grains import Grading, GrainSet, make_grains
 from qdem_fem.track.bodies import TrackBox
 from qdem_fem.track.layout import Part, TrackLayout
 from qdem_fem.track.sleeper_mesh import SleeperShape
-
-if TYPE_CHECKING:
-    from qdem_fem.mesh import TetMesh
 
 Floats = NDArray[np.float64]
 
@@ -125,14 +121,6 @@ def names_of(count: int, sleeper: bool) -> list[str]:
     return [f"grain-{number}" for number in range(count)] + [SLEEPER] * sleeper
 
 
-def make_bed_meshes(recipe: BedRecipe, grains: GrainSet, nodes: Sequence[Floats]) -> list[TetMesh]:
-    """Meshes of bodies at their places: grains, and the sleeper where nodes are one more."""
-    meshes = [replace(grains.mesh(i), nodes=x) for i, x in enumerate(nodes[: len(grains)])]
-    if len(nodes) > len(grains):
-        meshes.append(replace(recipe.layout.sleeper(0.0), nodes=nodes[-1]))
-    return meshes
-
-
 def make_bed_bodies(
     recipe: BedRecipe, grains: GrainSet, nodes: Sequence[Floats], *, rigid: Rigid,
     sleeper_rigid: Rigid | None = None,
@@ -141,9 +129,12 @@ def make_bed_bodies(
     sleeper = len(nodes) > recipe.below + recipe.beside
     names = names_of(len(nodes) - sleeper, sleeper)
     other = rigid if sleeper_rigid is None else sleeper_rigid
-    return {
-        name: Body(mesh, recipe.sleeper, name=name, rigid=other)
-        if name == SLEEPER
-        else Body(mesh, recipe.ballast, name=name, rigid=rigid)
-        for name, mesh in zip(names, make_bed_meshes(recipe, grains, nodes), strict=True)
-    }
+    bodies = {}
+    for number, (name, x) in enumerate(zip(names, nodes, strict=True)):
+        if name == SLEEPER:
+            mesh = replace(recipe.layout.sleeper(0.0), nodes=x)
+            bodies[name] = Body(mesh, recipe.sleeper, name=name, rigid=other)
+        else:
+            mesh = replace(grains.mesh(number), nodes=x)
+            bodies[name] = Body(mesh, recipe.ballast, name=name, rigid=rigid)
+    return bodies

@@ -1,9 +1,8 @@
-"""A mono-block sleeper as a mesh: trapezoidal sections whose height varies along it."""
+"""A mono-block sleeper of trapezoidal section as a mesh."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from math import isfinite
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -28,74 +27,25 @@ class SleeperShape:
     width: float = 0.24
     """Of the bottom."""
     height: float = 0.174
-    """At the rail seats."""
     top_width: float = 0.17
-    """At ``height``; the sides are planes, so a lower section is wider at its top."""
-    centre_height: float = 0.174
-    end_height: float = 0.174
     seat_distance: float = 1.132
     """From the middle of one rail seat to that of the other."""
     seat_length: float = 0.13
-    """Along the sleeper; a seat is level over it."""
-
-    def __post_init__(self) -> None:
-        values = {field.name: getattr(self, field.name) for field in fields(self)}
-        wrong = [name for name, value in values.items() if not (isfinite(value) and value > 0)]
-        if not wrong and self.top_width > self.width:
-            wrong = ["top_width"]
-        if not wrong and max(self.centre_height, self.end_height) > self.height:
-            wrong = ["centre_height" if self.centre_height > self.height else "end_height"]
-        if not wrong and not (
-            self.seat_length < self.seat_distance < self.length - self.seat_length
-        ):
-            wrong = ["seat_distance"]
-        if wrong:
-            raise MeshError(
-                f"{wrong[0]} = {values[wrong[0]]} makes no sleeper",
-                where="sleeper",
-                remedy="give lengths above zero in metres: the top no wider than the bottom, the "
-                "height greatest at the seats, the seats apart and within the length",
-            )
+    """Along the sleeper."""
 
     @property
     def stations(self) -> FloatArray:
-        """Where the slope of the top changes [m], (7,): ends, edges of the seats, centre."""
+        """Ends of the sleeper and of its seats, and its centre [m], (7,)."""
         middle, apart, half = self.length / 2, self.seat_distance / 2, self.seat_length / 2
         right = np.array([0.0, apart - half, apart + half, middle])
         return np.concatenate([middle - right[:0:-1], middle + right])
-
-    def height_at(self, x: FloatArray) -> FloatArray:
-        """Height h(x) [m], linear between `stations`."""
-        end, seat, centre = self.end_height, self.height, self.centre_height
-        levels = [end, seat, seat, centre, seat, seat, end]
-        return np.interp(x, self.stations, levels)
 
     def width_at(self, z: FloatArray) -> FloatArray:
         """Width b(z) [m]."""
         return self.width - (self.width - self.top_width) * np.asarray(z) / self.height
 
-    def area_at(self, x: FloatArray) -> FloatArray:
-        """Area of the section, integral of b(z) from 0 to h(x) [m^2]."""
-        h = self.height_at(x)
-        return h * (self.width + self.width_at(h)) / 2
 
-    def inertia_at(self, x: FloatArray) -> FloatArray:
-        """Second moment of a section about its level neutral axis [m^4]: that of a trapezoid,
-        h^3 (b^2 + 4 b t + t^2)/(36 (b + t))."""
-        h = self.height_at(x)
-        b, t = self.width, self.width_at(h)
-        return h**3 * (b**2 + 4 * b * t + t**2) / (36 * (b + t))
-
-    @property
-    def volume(self) -> float:
-        """[m^3]; exact: the area is quadratic between stations, which Simpson's rule integrates."""
-        x = self.stations
-        middle = (x[1:] + x[:-1]) / 2
-        parts = self.area_at(x[1:]) + 4 * self.area_at(middle) + self.area_at(x[:-1])
-        return float(np.diff(x) @ parts / 6)
-
-
-def sleeper_mesh(shape: SleeperShape, along: int = 80, across: int = 8, up: int = 6) -> TetMesh:
+def make_sleeper_mesh(shape: SleeperShape, along: int, across: int, up: int) -> TetMesh:
     """The sleeper in ``along`` x ``across`` x ``up`` cells of six tetrahedra; volume exact.
 
     Cells along it are shared out between the `SleeperShape.stations` by their distance, at least
@@ -114,7 +64,7 @@ def sleeper_mesh(shape: SleeperShape, along: int = 80, across: int = 8, up: int 
         + [knots[-1:]]
     )  # fmt: skip
     x = grid[np.rint(mesh.nodes[:, 0] * along).astype(np.int64)]
-    z = mesh.nodes[:, 2] * shape.height_at(x)
+    z = mesh.nodes[:, 2] * shape.height
     nodes = np.stack([x, (mesh.nodes[:, 1] - 0.5) * shape.width_at(z), z], axis=1)
     sets = {
         new: mesh.node_sets[old]
@@ -134,12 +84,12 @@ def sleeper_mesh(shape: SleeperShape, along: int = 80, across: int = 8, up: int 
 
 
 def make_half_sleeper(shape: SleeperShape, along: int, across: int, up: int) -> TetMesh:
-    """The half of a sleeper from end 1 to its middle, ``along`` cells long, as `sleeper_mesh`.
+    """The half of a sleeper from end 1 to its middle, ``along`` cells long, as `make_sleeper_mesh`.
 
     Its node sets without those of the other half, and ``ends``: the plane of symmetry at the
     middle.  Raises `MeshError` for fewer than 3 cells along.
     """
-    whole = sleeper_mesh(shape, 2 * along, across, up)
+    whole = make_sleeper_mesh(shape, 2 * along, across, up)
     middle = shape.length / 2
     kept = whole.nodes[whole.elements, 0].mean(axis=1) < middle
     nodes = np.unique(whole.elements[kept])

@@ -15,10 +15,10 @@ import pytest
 
 from trackbed.errors import DiskFull, UsageError
 from trackbed.run_files.folder import RunFolder, lock_folder
-from trackbed.run_files.whole import append_line, seal_file, write_whole
+from trackbed.run_files.whole import append_line, seal_file, whole_file, write_whole
 
 ROOT = Path(__file__).parents[2]
-FOLDERS = ("adapters.files", "qdem_fem.scene", "rigid_lcp.scene")
+FOLDERS = ("adapters.files.run_folder", "qdem_fem.scene.run", "rigid_lcp.scene.run_folder")
 
 
 class Folder(RunFolder):
@@ -45,11 +45,11 @@ def tree(folder: Path) -> dict[str, bytes]:
 def test_second_writer_is_refused(room: str, tmp_path: Path) -> None:
     """Another process gets the pid of the first; when the first is gone the folder is free."""
     code = (
-        f"import sys; from pathlib import Path; from {room}.run_folder import RunFolder\n"
+        f"import sys; from pathlib import Path; from {room} import RunFolder\n"
         "with RunFolder(Path(sys.argv[1])).locked():\n"
         "    print('in', flush=True); sys.stdin.read()"
     )
-    name = "lock" if room == "adapters.files" else ".lock"
+    name = "lock" if room.startswith("adapters") else ".lock"
     first = subprocess.Popen(
         [sys.executable, "-c", code, str(tmp_path)],
         cwd=ROOT, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
@@ -142,12 +142,13 @@ def test_a_failed_write_leaves_the_old_file(
     path = tmp_path / "table.csv"
     write_whole(path, "old")
 
-    def parts() -> Any:
-        yield b"new"
-        raise RuntimeError
+    def die() -> None:
+        with whole_file(path) as temporary:
+            temporary.write_text("new")
+            raise RuntimeError
 
     with pytest.raises(RuntimeError):
-        write_whole(path, parts())
+        die()
 
     def full(_: int) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")

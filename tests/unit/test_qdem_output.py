@@ -14,17 +14,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from qdem_fem.files.errors import DiskFull, UsageError
-from qdem_fem.files.output import Table, read_table, write_bodies_vtu, write_pvd, write_vtu
+from qdem_fem.files.output import Table, read_table, write_bodies_vtu, write_pvd
 from qdem_fem.mesh.generation import make_box_mesh
 from qdem_fem.mesh.surface import find_surface_faces
 from qdem_fem.report.deformed import (
     draw_deformed,
-    feature_edges,
-    nodal_average,
     round_magnification,
-    view_frame,
 )
-from qdem_fem.report.figures import draw_energy, draw_spectrum, picture_history, unit_of
+from qdem_fem.report.figures import draw_energy, draw_history, draw_spectrum, unit_of
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 
@@ -56,23 +53,6 @@ def test_vtu_is_read_back_by_meshio(tmp_path: Path) -> None:
     expected = np.concatenate([one.von_mises() for one in bodies])
     assert (mesh.cell_data["von_mises"][0] == expected).all()
     assert mesh.cell_data["body"][0].tolist() == [0] * 96 + [1] * 96
-
-
-@pytest.mark.parametrize("kind", [np.float32, np.float64, np.int64, ">f8"])
-def test_fields_of_any_type_and_name(tmp_path: Path, kind: Any) -> None:
-    """Single precision, integers and foreign byte order survive, and so does a strange name."""
-    one = body()
-    field = np.arange(len(one.nodes)).astype(kind)
-    write_vtu(tmp_path / "a.vtu", one.nodes, one.elements, {'<"&>': field}, {})
-    assert (meshio.read(tmp_path / "a.vtu").point_data['<"&>'] == field).all()
-
-
-def test_field_of_another_length_is_refused(tmp_path: Path) -> None:
-    """A field must have a row for each node or element; nothing is written else."""
-    one = body()
-    with pytest.raises(UsageError, match="'wrong' has 3 rows, not 96"):
-        write_vtu(tmp_path / "a.vtu", one.nodes, one.elements, {}, {"wrong": np.zeros(3)})
-    assert not list(tmp_path.iterdir())
 
 
 def test_pvd_names_times_and_files(tmp_path: Path) -> None:
@@ -143,29 +123,6 @@ def test_no_space_is_a_sentence_with_the_file(tmp_path: Path) -> None:
 # ---------------------------------------------------------------------------- pictures
 
 
-def test_feature_edges_of_a_box_are_its_twelve() -> None:
-    """Sharp edges of a 4 x 2 x 2 box: 4 (4 + 2 + 2) mesh edges along its twelve sides."""
-    one = body()
-    edges = feature_edges(one.nodes, one.surface)
-    assert len(edges) == 4 * (4 + 2 + 2)
-    sides = (one.nodes[edges] == np.array([2, 1, 1])) | (one.nodes[edges] == 0)
-    assert (sides.all(axis=1).sum(axis=1) >= 2).all()
-
-
-def test_view_frame_is_right_handed() -> None:
-    """From the front (azimuth -90, elevation 0) x is right, y away, z up; others are rotations."""
-    assert view_frame(-90, 0) == pytest.approx(np.eye(3), abs=1e-15)
-    frame = view_frame(-62, 24)
-    assert frame @ frame.T == pytest.approx(np.eye(3), abs=1e-15)
-    assert np.linalg.det(frame) == pytest.approx(1)
-
-
-def test_average_of_nodes_keeps_a_constant_and_unused_nodes() -> None:
-    """A node gets the mean of its elements; nodes of no element get 0."""
-    elements = np.array([[0, 1, 2, 3], [1, 2, 3, 4]])
-    assert nodal_average(elements, np.array([2.0, 4.0]), 6).tolist() == [2, 3, 3, 3, 4, 0]
-
-
 @pytest.mark.parametrize("scale", [0.0, 1e-12, 1e-6, 1e-2, 10.0])
 def test_magnification_is_round_and_never_below_one(scale: float) -> None:
     """1, 2, 5 times a power of ten; 1 for bodies that do not move or move far."""
@@ -197,7 +154,7 @@ def test_pictures_are_written_and_repeat(tmp_path: Path) -> None:
     drawn: list[dict[str, bytes]] = []
     for _ in range(2):
         draw_deformed(tmp_path / "a.png", [body(), body(5.0)])
-        picture_history(tmp_path / "b.png", curve, rivals={"FEM": curve["tip_z"]})
+        draw_history(tmp_path / "b.png", curve)
         draw_spectrum(tmp_path / "c.png", curve)
         draw_energy(tmp_path / "d.png", energy)
         now = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
@@ -224,25 +181,3 @@ def test_motionless_body_is_drawn(tmp_path: Path) -> None:
     one.displacement = np.zeros_like(one.nodes)
     one.von_mises = lambda: np.zeros(len(one.elements))
     assert draw_deformed(tmp_path / "a.png", [one]) == 1.0
-
-
-def test_video_holds_every_picture_at_its_scale(tmp_path: Path) -> None:
-    """Pictures of two sizes: as many frames of the larger one, the rest white, 0.1 s each."""
-    from PIL import Image
-
-    from qdem_fem.report.video import write_video
-
-    sizes = [(40, 30), (60, 30), (60, 50)]
-    paths = [tmp_path / f"{number}.png" for number in range(3)]
-    for path, size in zip(paths, sizes, strict=True):
-        Image.new("RGB", size, (0, 0, 200)).save(path)
-    write_video(tmp_path / "video.gif", paths, 10.0)
-    with Image.open(tmp_path / "video.gif") as video:
-        assert video.size == (60, 50)
-        assert video.n_frames == 3
-        assert video.info["duration"] == 100
-        video.seek(0)
-        first = np.asarray(video.convert("RGB"))
-    assert (first[20:, :40] == (0, 0, 200)).all()
-    assert (first[:20] == 255).all()
-    assert (first[:, 40:] == 255).all()

@@ -59,7 +59,7 @@ def test_table_is_a_copy() -> None:
         ([0, 1, 2], [[0, 0, 1], [nan, 0, 0], [0, 0, 0]], "value number 1"),
         ([1, 0], [0, 1], "row 0 to 1"),
         ([0, 0], [0, 1], "row 0 to 1"),
-        ([0, 1], [0, 1, 2], "2 times, but 3 values"),
+        ([0, 1], [0, 1, 2], "shape"),
         ([], [], "shape"),
         ("ab", [1, 2], "not a table"),
         ([0, 1], [[1, 2], [3]], "not a table"),

@@ -88,7 +88,7 @@ def test_shipped_scenes_load_without_doubts() -> None:
 
 def test_new_names_the_verb_that_reads_the_scene() -> None:
     """`trackbed new` says which verb goes on: that whose reader takes the scene."""
-    from qdem_fem.tables.file import scene_read as qdem_scene
+    from qdem_fem.tables.prepared import read_tables as qdem_scene
     from rigid_lcp.scene.file import scene_read as rigid_scene
 
     readers = {"run": load_scene, "qdem": qdem_scene, "rigid": rigid_scene}

@@ -19,14 +19,15 @@ from qdem_fem.files.output import read_table
 from qdem_fem.mesh.tetrahedra import element_gradients, lumped_mass
 from qdem_fem.report.spectra import fourier_spectrum
 from qdem_fem.track.loads.rail import Track, seat_share
-from qdem_fem.track.loads.record import SEATS, LoadRecord
 from qdem_fem.track.loads.train import (
+    SEATS,
+    LoadRecord,
     Train,
     WheelFlat,
     find_seat_forces,
     make_train_record,
 )
-from qdem_fem.track.sleeper_mesh import SleeperShape, sleeper_mesh
+from qdem_fem.track.sleeper_mesh import SleeperShape, make_sleeper_mesh
 from trackbed.command import main
 
 CONCRETE = Material(young=45e9, poisson=0.167, density=2350)
@@ -52,23 +53,18 @@ def train_spectrum(frequency: np.ndarray, train: Train, track: Track) -> np.ndar
 # --- sleeper ------------------------------------------------------------------------------------
 
 
-@settings(max_examples=15)
-@given(
-    top=st.floats(0.1, 0.24), centre=st.floats(0.08, 0.174), end=st.floats(0.08, 0.174),
-    along=st.integers(6, 20),
-)  # fmt: skip
-def test_mesh_fills_the_shape(top: float, centre: float, end: float, along: int) -> None:
-    """All faces of the shape are planes between stations, so its tetrahedra fill it exactly."""
-    shape = SleeperShape(top_width=top, centre_height=centre, end_height=end)
-    mesh = sleeper_mesh(shape, along, 3, 2)
+@settings(max_examples=10)
+@given(top=st.floats(0.1, 0.24), along=st.integers(6, 20))
+def test_mesh_fills_the_shape(top: float, along: int) -> None:
+    """The faces of a sleeper are planes, so its tetrahedra fill it exactly."""
+    mesh = make_sleeper_mesh(SleeperShape(top_width=top), along, 3, 2)
     _, volumes = element_gradients(mesh.nodes, mesh.elements)
-    assert volumes.sum() == pytest.approx(shape.volume, rel=1e-12)
+    assert volumes.sum() == pytest.approx(2.0 * 0.174 * (0.24 + top) / 2, rel=1e-12)
     np.testing.assert_allclose(np.ptp(mesh.nodes, axis=0), [2.0, 0.24, 0.174], rtol=1e-12)
 
 
 def test_sets_lie_where_they_say() -> None:
-    shape = SleeperShape(end_height=0.14)
-    mesh = sleeper_mesh(shape, 40, 4, 3)
+    mesh = make_sleeper_mesh(SleeperShape(), 40, 4, 3)
     seat = mesh.nodes[mesh.node_sets["seat-1"]]
     assert (seat[:, 0].min(), seat[:, 0].max()) == pytest.approx((0.369, 0.499))
     np.testing.assert_allclose(seat[:, 2], 0.174)
@@ -78,18 +74,8 @@ def test_sets_lie_where_they_say() -> None:
     x = [mesh.nodes[mesh.node_sets[name]][0, 0] for name in ("S1", "S2", "S3")]
     np.testing.assert_allclose(x, [0, 0.499, 1.0])
     assert (mesh.nodes[mesh.node_sets["bottom"], 2] == 0).all()
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [{"length": 0.0}, {"top_width": 0.3}, {"end_height": 0.2}, {"centre_height": 0.2},
-     {"seat_distance": 1.95}, {"height": float("nan")}],
-)  # fmt: skip
-def test_measures_of_no_sleeper_are_refused(wrong: dict[str, float]) -> None:
-    with pytest.raises(MeshError, match=f"{next(iter(wrong))} = .* makes no sleeper"):
-        SleeperShape(**wrong)
     with pytest.raises(MeshError, match="5 cells along"):
-        sleeper_mesh(SleeperShape(), 5, 1, 1)
+        make_sleeper_mesh(SleeperShape(), 5, 1, 1)
 
 
 # --- train --------------------------------------------------------------------------------------
@@ -155,22 +141,6 @@ def test_spectrum_is_the_closed_form() -> None:
     assert abs(exact[0]) == pytest.approx(20 * 50e3 * 0.6 / 32, rel=1e-12)
 
 
-def test_peaks_of_the_spectrum_are_at_multiples_of_speed_over_car_length() -> None:
-    """Every local peak that is no side lobe (22 % of its main one) lies within a third of the width
-    of a lobe, v/(8 cars), of n v/car length; pairs of axles and bogies say which n are weak."""
-    train = Train(cars=8)
-    step = train.speed / train.car_length
-    frequency = np.linspace(0.5 * step, 12.5 * step, 4801)
-    size = np.abs(train_spectrum(frequency, train, TRACK))
-    inner = size[1:-1]
-    peak = (inner > size[:-2]) & (inner > size[2:]) & (inner > 0.4 * size.max())
-    order = frequency[1:-1][peak] / step
-    assert len(order) == 3
-    assert np.abs(order - np.rint(order)).max() < 1 / train.cars / 3
-    weak = train_spectrum(np.array([train.speed / 2 / train.bogie_distance]), train, TRACK)
-    assert abs(weak[0]) < 1e-9 * size.max()
-
-
 def flat_of(**changed: float) -> object:
     """The load of the default train with one flat, of 60 kN for 2 ms but for what is changed."""
     sizes = {"axle": 0, "peak": 60e3, "duration": 2e-3} | changed
@@ -207,7 +177,7 @@ def test_a_free_sleeper_takes_up_the_impulse_of_the_record() -> None:
     """Both seats loaded by a record in steps: momentum is the integral of the forces, its moment
     about the centre that of their difference."""
     record = LoadRecord(np.arange(5) * 1e-4, np.outer(np.arange(5.0), [2e5, 1e5]))
-    body = Body(sleeper_mesh(SleeperShape(), 12, 2, 1), CONCRETE)
+    body = Body(make_sleeper_mesh(SleeperShape(), 12, 2, 1), CONCRETE)
     simulation = Simulation([body])
     for seat in (1, 2):
         nodes = body.mesh.node_sets[f"seat-{seat}"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -122,11 +121,3 @@ def test_a_body_joined_to_its_images_does_not_turn(tmp_path: Path) -> None:
             continue
         with pytest.raises(SceneError, match=r"body\.0\.spin: a body that \[\[periodic\]\] joins"):
             load_scene(path, [])
-
-
-def test_the_key_file_names_both() -> None:
-    """trackbed/scenes/cantilever.toml explains every key."""
-    text = Path("trackbed/scenes/cantilever.toml").read_text()
-    for key in ("velocity", "spin"):
-        line = next(one for one in text.splitlines() if one.startswith(f"# {key} = "))
-        assert len(tomllib.loads(line[2:])[key]) == 3

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from matplotlib import image
 
 import qdem_fem as q
 from qdem_fem.cli.run import Progress
@@ -20,19 +19,13 @@ from qdem_fem.grains.grading import Grading
 from qdem_fem.grains.sets import make_grains
 from qdem_fem.march import energies, kinetic_damping
 from qdem_fem.mesh.generation import make_box_mesh
-from qdem_fem.report.deformed import draw_deformed, find_bearing_spheres
 from qdem_fem.report.track import (
-    acceleration_spectrum,
-    accelerations,
     mobility,
-    peaks_of,
-    velocities,
 )
 from qdem_fem.scene.build import simulation_of
 from qdem_fem.scene.checks import load_scene
 from qdem_fem.scene.energy_account import EnergyAccount, list_energy_facts
-from qdem_fem.scene.run import run_dynamic
-from qdem_fem.scene.run_folder import RunFolder
+from qdem_fem.scene.run import RunFolder, run_dynamic
 from qdem_fem.track.bed import Bed, read_bed, scatter, write_bed
 from qdem_fem.track.bodies import (
     TrackBox,
@@ -230,29 +223,6 @@ def test_what_does_not_rest_is_left_longer_between_stops(
     assert waits[-1] == last
 
 
-def test_spheres_that_bear_are_drawn_between_bodies(tmp_path: Path) -> None:
-    # Both cubes are let down until they touch: four spheres on the ground, four pairs between.
-    # Seen from the side, the middle of the gap is white but for spheres.
-    run = stacked(True)
-    for number, body in enumerate(run.bodies):
-        body.displacement = np.tile([0.0, 0.0, -2e-4 - 2e-4 * number], (len(body.nodes), 1))
-    bearing = find_bearing_spheres(run)
-    assert bearing is not None
-    assert bearing.nodes.tolist() == list(range(12))
-    drawn = []
-    for spheres in (None, bearing):
-        file = tmp_path / "picture.png"
-        view = {"azimuth": -90.0, "elevation": 0.0, "magnification": 1.0}
-        draw_deformed(file, run.bodies, bearing=spheres, **view)
-        pixels = image.imread(file)[:, :450, :3]  # without the colour bar
-        cubes = np.flatnonzero((np.ptp(pixels, axis=2) > 0.15).sum(axis=1) > 50)
-        at = int(np.argmax(np.diff(cubes)))
-        drawn.append(bool((pixels[(cubes[at] + cubes[at + 1]) // 2] < 0.97).any()))
-    assert drawn == [False, True]
-    block = q.Simulation([q.Body(make_box_mesh((1, 1, 1), (1, 1, 1)), STONE)])
-    assert find_bearing_spheres(block) is None
-
-
 def shaken(folder: Path, text: str = "") -> tuple[object, ...]:
     """A scene of a viscous block that is struck, with an audit."""
     path = folder / "scene.toml"
@@ -283,8 +253,8 @@ def shaken(folder: Path, text: str = "") -> tuple[object, ...]:
 
 def test_what_viscosity_takes_closes_the_account(tmp_path: Path) -> None:
     prepared, run, bodies, folder = shaken(tmp_path)
-    with folder.locked(), Progress() as progress:  # type: ignore[attr-defined]
-        run_dynamic(prepared, run, bodies, folder, resume=False, progress=progress)  # type: ignore[arg-type]
+    with folder.locked():  # type: ignore[attr-defined]
+        run_dynamic(prepared, run, bodies, folder, resume=False, progress=Progress())  # type: ignore[arg-type]
     energy = run.energy()  # type: ignore[attr-defined]
     kept = energy.kinetic + energy.elastic + energy.viscous
     assert energy.viscous > 0.05 * energy.external  # or the test shows nothing
@@ -298,10 +268,9 @@ def test_a_run_whose_account_does_not_close_stops(
     prepared, run, bodies, folder = shaken(tmp_path)
     with (
         folder.locked(),  # type: ignore[attr-defined]
-        Progress() as progress,
         pytest.raises(EnergyLost, match="missing in the account"),
     ):
-        run_dynamic(prepared, run, bodies, folder, resume=False, progress=progress)  # type: ignore[arg-type]
+        run_dynamic(prepared, run, bodies, folder, resume=False, progress=Progress())  # type: ignore[arg-type]
 
 
 def test_account_of_energies_is_the_same_row_by_row() -> None:
@@ -401,25 +370,6 @@ def test_the_load_of_a_bogie_is_that_of_its_axles_and_begins_and_ends_at_rest() 
     assert impulse == pytest.approx(whole, rel=0.05)  # e^-3.5: what lies beyond 3 m
 
 
-def test_accelerations_and_spectra_of_known_motions() -> None:
-    time = np.arange(4001) * 1e-4
-    when, velocity = velocities(time, 3.0 * time**2)
-    assert velocity == pytest.approx(6.0 * when, rel=1e-9)
-    when, acceleration = accelerations(time, 3.0 * time**2)
-    assert when == pytest.approx(time[1:-1])
-    assert acceleration == pytest.approx(6.0, rel=1e-6)
-    swing = 1e-3 * np.sin(2 * np.pi * 320.0 * time) * np.sin(np.pi * time / 0.4) ** 2
-    frequency, size = acceleration_spectrum(time, swing)
-    assert peaks_of(frequency, size, 1) == pytest.approx([320.0], abs=2.5)
-    force = np.zeros((len(time), 3))
-    force[:, 2] = swing
-    from qdem_fem.tables.series import TimeSeries
-
-    frequency, ratio = mobility(time, 2e-6 * swing, TimeSeries(time, force))
-    at = np.argmin(np.abs(frequency - 320.0))  # V = 2 pi f 2e-6 F
-    assert ratio[at] == pytest.approx(2 * np.pi * 320.0 * 2e-6, rel=0.02)
-
-
 @pytest.mark.parametrize("samples", [4000, 4001, 4002, 4003])
 @pytest.mark.parametrize("interval", [1e-4, 9.9989e-5, 3e-5])
 def test_mobility_of_a_grain_that_drops_off(samples: int, interval: float) -> None:
@@ -427,14 +377,12 @@ def test_mobility_of_a_grain_that_drops_off(samples: int, interval: float) -> No
     highest, as means over intervals have it.  Of the blow J these are J/2, J, J/2: |F| =
     J (1 + cos(2 pi f dt)).  (Central differences have a zero at the highest frequency, and
     smoothing spread what it was divided by over all others.)"""
-    from qdem_fem.tables.series import TimeSeries
-
     time = interval * np.arange(samples)
     middle, slip, impulse = samples // 2, 2e-5, 3.0
     force = np.zeros((samples, 3))
     force[middle - 1 : middle + 1, 2] = impulse / interval  # one sample half-way between them
     drop = np.where(np.arange(samples) < samples - 1, 0.0, slip)  # in the last interval
-    frequency, ratio = mobility(time, drop, TimeSeries(time, force))
+    frequency, ratio = mobility(time, drop, q.Series(time, force))
     assert frequency[-1] > 1000.0 - 1 / (samples * interval) - 1e-6
     blow = impulse * (1 + np.cos(2 * np.pi * frequency * interval))
     exact = slip / blow

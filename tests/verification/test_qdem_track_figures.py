@@ -10,6 +10,7 @@ import pytest
 from scipy.signal import periodogram
 
 from qdem_fem.files.output import Table
+from qdem_fem.files.series import Series
 from qdem_fem.report.spectra import fourier_spectrum, frequency_response, parzen_smoothed
 from qdem_fem.report.track import (
     BANDWIDTH,
@@ -24,16 +25,15 @@ from qdem_fem.report.track import (
     peaks_of,
     smoothing,
 )
-from qdem_fem.tables.series import TimeSeries
 
 STEP = 1e-4
 
 
-def load_of(force: np.ndarray, step: float = STEP) -> TimeSeries:
+def load_of(force: np.ndarray, step: float = STEP) -> Series:
     """A force along z, sampled evenly from 0 on."""
     values = np.zeros((len(force), 3))
     values[:, 2] = force
-    return TimeSeries(step * np.arange(len(force)), values)
+    return Series(step * np.arange(len(force)), values)
 
 
 def pushed(force: np.ndarray, spring: float, damper: float) -> np.ndarray:
@@ -127,21 +127,6 @@ def test_density_of_a_spectrum_is_scipys_and_holds_the_variance() -> None:
     assert smooth[5:-5].mean() == pytest.approx(
         level, rel=4 / np.sqrt(apart * BANDWIDTH * duration)
     )
-
-
-def test_two_sines_are_separate_from_the_bandwidth_on() -> None:
-    """Of amplitude A over T each is a line A T/2, so that a peak, smoothed, is
-    A T/2 sqrt(W(0)/T), W(0) = 3/4 280/(151 b); half a bandwidth apart they are one peak."""
-    time = STEP * np.arange(20000)
-    duration = 20000 * STEP
-    for apart, expected in ((10.0, [305.0]), (20.0, [300.0, 320.0]), (40.0, [300.0, 340.0])):
-        both = [np.sin(2 * np.pi * f * time) for f in (300.0, 300.0 + apart)]
-        frequency, spectrum = fourier_spectrum(time, sum(both))
-        smooth = parzen_smoothed(frequency, np.abs(spectrum), BANDWIDTH)
-        found = [f for f in peaks_of(frequency, smooth, len(expected)) if 250 < f < 400]
-        assert sorted(found) == pytest.approx(expected, abs=1.0)
-    highest = duration / 2 * np.sqrt(0.75 * 280 / 151 / BANDWIDTH / duration)
-    assert smooth.max() == pytest.approx(highest, rel=0.01)  # the other one, 40 Hz off: 2e-3
 
 
 def test_peaks_at_the_edges_and_in_constants_are_none() -> None:

@@ -56,24 +56,14 @@ def test_rigid_grains_begin_with_the_forces_of_deformable_ones(folder: Path) -> 
     assert hard.step > soft.step
 
 
-@pytest.mark.filterwarnings("ignore::qdem_fem.files.errors.StepWarning")
-def test_advice_on_a_track_is_checked_with_all_grains_rigid(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """By the advice none may be; the sleeper is then found to sink by too little, at most by what
-    was predicted: a share of the compliance that is left out is left out of the way too."""
+def test_of_a_hard_track_no_grain_may_be_rigid(folder: Path) -> None:
+    """By the advice: its contacts are as stiff as its grains."""
     scene, file = folder / "scene.toml", folder / "advice.json"
-    marks = [f"--set={one}" for one in (*FEW, "simulation.duration=0.006")]
-    assert command.main(["advise", str(scene), "--check", "--json", str(file), *marks]) == 0
-    told = capsys.readouterr().out
-    assert "two runs, 11 bodies rigid in one" in told
-    found = json.loads(file.read_text(encoding="utf-8"))
-    assert not any(one["rigid"] for one in found["bodies"])
-    check = found["check"]
-    assert set(check["probes"]) == {"B1", "B2", "B3", "B2a", "S1", "S2", "S3", "sleeper"}
-    assert check["measured"] == max(check["probes"].values())
-    assert 0.3 < check["probes"]["sleeper"] < check["predicted"]
-    assert check["steps"][0] == check["steps"][1]
+    marks = [f"--set={one}" for one in FEW]
+    assert command.main(["advise", str(scene), "--json", str(file), *marks]) == 0
+    found = json.loads(file.read_text(encoding="utf-8"))["bodies"]
+    assert len(found) == 12
+    assert not any(one["rigid"] for one in found)
 
 
 @pytest.mark.filterwarnings("ignore::qdem_fem.files.errors.StepWarning")

@@ -7,7 +7,6 @@ weight has a lever.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -98,17 +97,6 @@ def test_a_bed_with_too_little_is_refused_and_remembered(
     tangential = STIFFNESS / (2 * 1.2)  # k_n/(2 (1 + nu))
     way += weight * (np.sin(SLOPE) - 0.15 * np.cos(SLOPE)) / (4 * tangential)
     assert stand.slid == pytest.approx(0.15 * weight * np.cos(SLOPE) * way, rel=0.1)
-
-
-def test_files_of_before_are_read(bed: Bed, tmp_path: Path) -> None:
-    path = tmp_path / "bed.npz"
-    write_bed(path, SLOPING, bed)
-    with np.load(path) as archive:
-        arrays = {name: archive[name] for name in archive.files}
-    head = json.loads(str(arrays.pop("head")))
-    del head["stands"]
-    np.savez(path, head=json.dumps(head), **arrays)
-    assert read_bed(path, SLOPING).stands == {}
 
 
 def scene_in_the_air(folder: Path, text: Callable[[str], str]) -> TrackPrepared:

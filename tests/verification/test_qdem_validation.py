@@ -9,8 +9,8 @@ import pytest
 from scipy.linalg import eigh
 
 from qdem_fem import Body, Material, Simulation
-from qdem_fem.mesh.generation import make_ring_mesh
 from qdem_fem.report.spectra import find_peak_frequencies
+from tests.qdem_rings import make_ring_mesh
 from validation.bench.qdem import judge, static, vibration, waves
 from validation.bench.qdem.checks import below, meets, near, orders
 from validation.bench.qdem.closed_forms import bar_speed

@@ -20,6 +20,7 @@ from trackbed.run_files.whole import (
     refuse_writing,
     seal_file,
     sync_folder,
+    whole_file,
     write_whole,
 )
 
@@ -27,5 +28,5 @@ __all__ = [
     "MANIFEST", "RESULT", "add_run_arguments", "append_line", "digest_file", "folder", "is_written",
     "lock_folder", "note_signals", "open_unlinked", "place_run", "raise_on_signals", "read_object",
     "record_provenance", "refuse_both", "refuse_format", "refuse_links", "refuse_writing",
-    "seal_file", "sync_folder", "write_whole",
+    "seal_file", "sync_folder", "whole_file", "write_whole",
 ]  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from errno import EEXIST, ELOOP, ENOTDIR
 from pathlib import Path
@@ -52,29 +52,30 @@ def explain_refusal(path: Path, error: OSError) -> DiskFull | UsageError:
     )
 
 
-def write_whole(path: Path, content: str | bytes | Iterable[bytes]) -> None:
-    """Write a file: whatever kills the writer leaves the old file or the new, never a part.
+@contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """A name to write to that becomes ``path`` when the block ends well, and else is removed.
 
-    A symbolic link at ``path`` is replaced, not followed.  Raises `DiskFull` when there is no
-    room, `UsageError` when the system refuses otherwise.
+    Whatever kills the writer leaves the old file or the new, never a part; a symbolic link at
+    ``path`` is replaced, not followed.  Raises `DiskFull` when there is no room, `UsageError` when
+    the system refuses otherwise.
     """
     temporary = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    parts: Iterable[bytes]
-    if isinstance(content, str):
-        parts = [content.encode()]
-    else:
-        parts = [content] if isinstance(content, bytes) else content
     try:
         with refuse_writing(path):
-            with open_unlinked(temporary, "wb") as stream:
-                for part in parts:
-                    stream.write(part)
-                stream.flush()
+            yield temporary
+            with temporary.open("rb") as stream:
                 os.fsync(stream.fileno())
             temporary.replace(path)
     finally:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
+
+
+def write_whole(path: Path, content: str | bytes) -> None:
+    """Write a text or bytes as `whole_file` does."""
+    with whole_file(path) as temporary, open_unlinked(temporary, "wb") as stream:
+        stream.write(content.encode() if isinstance(content, str) else content)
 
 
 def append_line(path: Path, line: str) -> None:

@@ -16,13 +16,8 @@ VERB_OF_TABLE = {"sample": "run", "simulation": "qdem", "run": "rigid"}
 
 def scene_names() -> tuple[str, ...]:
     """Names of the scenes that ship with the package, sorted."""
-    return tuple(
-        sorted(
-            entry.name.removesuffix(".toml")
-            for entry in files(__name__).iterdir()
-            if entry.name.endswith(".toml")
-        )
-    )
+    names = sorted(entry.name for entry in files(__name__).iterdir())
+    return tuple(name.removesuffix(".toml") for name in names if name.endswith(".toml"))
 
 
 def scene_template(name: str) -> str:

@@ -1,19 +1,17 @@
-"""Loads of a passing train: rail, wheels, roughness, records."""
+"""Loads of a passing train: rail, wheels, records."""
 
 from qdem_fem.track.loads.rail import Track, seat_share
-from qdem_fem.track.loads.record import RATE, write_load_record
-from qdem_fem.track.loads.rolling import find_rolling_forces
-from qdem_fem.track.loads.roughness import RailKind, Roughness, WheelKind
 from qdem_fem.track.loads.train import (
     MOST_SAMPLES,
+    RATE,
     Train,
     WheelFlat,
     find_flat_forces,
     make_train_record,
+    write_load_record,
 )
 
 __all__ = [
-    "MOST_SAMPLES", "RATE", "RailKind", "Roughness", "Track", "Train", "WheelFlat", "WheelKind",
-    "find_flat_forces", "find_rolling_forces", "make_train_record", "seat_share",
-    "write_load_record",
+    "MOST_SAMPLES", "RATE", "Track", "Train", "WheelFlat", "find_flat_forces", "make_train_record",
+    "seat_share", "write_load_record",
 ]  # fmt: skip

@@ -3,27 +3,31 @@
 The record of the paper's Fig. 5 is not published.  Axles move at constant speed over a rail that is
 an infinite beam on a Winkler foundation (Zimmermann 1888; Hetenyi, Beams on Elastic Foundation,
 1946, ch. 2), and a sleeper takes what the foundation carries over its share of the track.  That
-holds the quasi-static load, to some tens of Hz; of wheel-rail dynamics only what a `WheelFlat` or
-a `qdem_fem.track.loads.roughness.Roughness` names.
+holds the quasi-static load, to some tens of Hz; of wheel-rail dynamics only what a `WheelFlat`
+names.
 
     trackbed train --flat 0 60e3 2e-3 --out train.csv
 """
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf, isfinite, pi
+from pathlib import Path
 
 import numpy as np
 
 from qdem_fem.files import ConditionError
 from qdem_fem.mesh import FloatArray
 from qdem_fem.track.loads.rail import QUIET, Track, refuse_unless_positive, seat_share
-from qdem_fem.track.loads.record import RATE, LoadRecord
-from qdem_fem.track.loads.rolling import find_rolling_forces
-from qdem_fem.track.loads.roughness import Roughness
+from trackbed.run_files import write_whole
 
+RATE = 10_000.0
+"""Samples a second of the paper's record (section 4) [Hz]."""
+SEATS = ("rp1", "rp2")
+"""Columns of the right and the left rail seat, by the names of the paper's Fig. 5."""
 MOST_SAMPLES = 10_000_000
 """Samples of a record: 17 minutes at 10 kHz."""
 
@@ -149,14 +153,28 @@ def find_flat_forces(
     return total
 
 
+@dataclass(frozen=True, eq=False)
+class LoadRecord:
+    """Pressures sampled at an even rate."""
+
+    time: FloatArray
+    """[s], (k,), growing evenly."""
+    pressure: FloatArray
+    """Pressure on seat 1 and 2 [Pa], (k, 2); negative where the rail lifts the sleeper."""
+
+    @property
+    def rate(self) -> float:
+        """Samples a second [Hz]."""
+        return float((len(self.time) - 1) / (self.time[-1] - self.time[0]))
+
+
 def make_train_record(
-    train: Train, track: Track, area: float, flats: Sequence[WheelFlat] = (), rate: float = RATE,
-    roughness: Roughness | None = None,
-) -> LoadRecord:  # fmt: skip
+    train: Train, track: Track, area: float, flats: Sequence[WheelFlat] = (), rate: float = RATE
+) -> LoadRecord:
     """The pressure on both seats of ``area`` [m^2] while the train passes, sampled at ``rate``.
 
     It begins and ends with the nearest axle `QUIET` elastic lengths and half a spacing away; time
-    0 is the first sample.  ``roughness``: what rolling adds, too.
+    0 is the first sample.
     """
     if not (0 < area < inf and 0 < rate < inf):
         raise ConditionError(f"area {area} m^2, rate {rate} Hz", where="train",
@@ -169,9 +187,11 @@ def make_train_record(
             remedy=f"give more speed or fewer cars: at most {MOST_SAMPLES} samples",
         )  # fmt: skip
     time = np.arange(int(np.ceil(last * rate)) + 1) / rate
-    force = find_seat_forces(time - lead, train, track, flats)
-    if roughness is not None:
-        force += find_rolling_forces(
-            time - lead, train.speed, train.axles, train.wheel_loads, track, roughness
-        )
-    return LoadRecord(time, force / area)
+    return LoadRecord(time, find_seat_forces(time - lead, train, track, flats) / area)
+
+
+def write_load_record(path: str | os.PathLike[str], record: LoadRecord) -> None:
+    """Write a table, atomically; times to 0.1 us, pressures to nine digits."""
+    rows = zip(record.time, record.pressure, strict=True)
+    lines = (f"{time:.7f},{one:.9g},{two:.9g}\n" for time, (one, two) in rows)
+    write_whole(Path(path), f"time,{','.join(SEATS)}\n" + "".join(lines))

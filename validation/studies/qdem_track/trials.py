@@ -12,8 +12,7 @@ from qdem_fem.files.output import read_table
 from qdem_fem.report.track import list_track_facts
 from qdem_fem.scene.build import simulation_of
 from qdem_fem.scene.energy_account import list_energy_facts
-from qdem_fem.scene.run import run_dynamic
-from qdem_fem.scene.run_folder import RunFolder
+from qdem_fem.scene.run import RunFolder, run_dynamic
 from qdem_fem.track.bed import prepare_bed
 from qdem_fem.track.enter import TrackPrepared
 from validation.bench.qdem.checks import reported
