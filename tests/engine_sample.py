@@ -30,7 +30,7 @@ from adapters.procedure.progress import Progress
 from adapters.procedure.run import run_scene
 from adapters.scene.file import load_scene
 from adapters.scene.tables import Scene
-from trackbed.scenes import scene_template
+from trackbed.scenes import read_template
 
 REAL = [pytest.param(name, marks=pytest.mark.engine(name)) for name in list_real_engines()]
 """Engines with mechanics, and with a process to kill."""
@@ -101,7 +101,7 @@ class Sample:
         if not (folder / "done").exists():
             shutil.rmtree(folder, ignore_errors=True)
             folder.mkdir()
-            self.file.write_text(scene_template("karrech-coarse"))
+            self.file.write_text(read_template("karrech-coarse"))
             (folder / FAULT).write_text(RECORD)
             run_scene(self.file, self.run, overrides=self.overrides, progress=QUIET)
             (folder / FAULT).unlink()

@@ -20,8 +20,8 @@ def provide_cache_folders(package: str) -> None:
     all.  Call this before the first kernel is defined.  matplotlib would look for all fonts at
     every start, and say so.  Raises `OSError` where there is no temporary folder either.
     """
-    if not numba_can_write(package):
-        folder = os.environ["NUMBA_CACHE_DIR"] = private_folder()
+    if not can_numba_write(package):
+        folder = os.environ["NUMBA_CACHE_DIR"] = make_private_folder()
         if "numba" in sys.modules:  # it read the variable when it was imported
             sys.modules["numba"].config.CACHE_DIR = folder
     settings = os.environ.get("XDG_CONFIG_HOME") or os.path.expanduser("~/.config")
@@ -29,10 +29,10 @@ def provide_cache_folders(package: str) -> None:
     while not os.path.exists(settings):
         settings = os.path.dirname(settings) or "."
     if "MPLCONFIGDIR" not in os.environ and not can_write(settings):
-        os.environ["MPLCONFIGDIR"] = os.path.join(private_folder(), "matplotlib")
+        os.environ["MPLCONFIGDIR"] = os.path.join(make_private_folder(), "matplotlib")
 
 
-def numba_can_write(package: str) -> bool:
+def can_numba_write(package: str) -> bool:
     """Whether numba finds a place: the one it was given, beside all sources, the user's cache."""
     given = os.environ.get("NUMBA_CACHE_DIR")
     if given and can_write(given):
@@ -54,7 +54,7 @@ def can_write(folder: str) -> bool:
     return True
 
 
-def private_folder() -> str:
+def make_private_folder() -> str:
     """A folder in the temporary one that only this user can write to: kernels are programs.
 
     The same in every process; where someone else took its name another, removed at the end.

@@ -45,7 +45,7 @@ class HelpFormatter(argparse.RawDescriptionHelpFormatter):
         return wrap(" ".join(text.split()), width, break_on_hyphens=False)
 
 
-def parser_build(verb: str | None) -> argparse.ArgumentParser:
+def build_parser(verb: str | None) -> argparse.ArgumentParser:
     """The command's parser; only ``verb`` gets its arguments, so only its package is loaded."""
     parser = argparse.ArgumentParser(
         prog="trackbed",
@@ -88,7 +88,7 @@ CHECKOUT = (("pyproject.toml",), ("validation", "cli.py"))
 """What tells a checkout from an installation, where `validation` may be another project."""
 
 
-def verb_named(words: Sequence[str]) -> str | None:
+def find_verb(words: Sequence[str]) -> str | None:
     """The first word that is no flag; exits with a suggestion when it is no verb."""
     verb = next((word for word in words if not word.startswith("-")), None)
     if verb is not None and verb not in VERBS:
@@ -96,11 +96,11 @@ def verb_named(words: Sequence[str]) -> str | None:
 
         near = get_close_matches(verb, VERBS, n=1)
         hint = f"did you mean '{near[0]}'?" if near else f"the verbs are {', '.join(VERBS)}"
-        parser_build(None).error(f"there is no verb '{verb}'; {hint}")
+        build_parser(None).error(f"there is no verb '{verb}'; {hint}")
     return verb
 
 
-def import_failed(error: ImportError) -> str:
+def explain_import(error: ImportError) -> str:
     """Why a package can not be imported, and what to do; empty when the fault is ours."""
     from importlib import metadata
 
@@ -122,13 +122,13 @@ def import_failed(error: ImportError) -> str:
     )
 
 
-def explained(error: BaseException) -> tuple[str, int]:
+def explain_error(error: BaseException) -> tuple[str, int]:
     """What to say of an error, and the exit code."""
     if isinstance(error, TrackbedError | Interrupted):
         return str(error), error.exit_code
     if isinstance(error, KeyboardInterrupt):
         return "interrupted", 130
-    if isinstance(error, ImportError) and (why := import_failed(error)):
+    if isinstance(error, ImportError) and (why := explain_import(error)):
         return why, 4
     if isinstance(error, OSError):
         return str(error), 5 if error.errno in NO_ROOM else 2
@@ -143,7 +143,7 @@ def main(words: Sequence[str] | None = None) -> int:
     """Run one verb; every outcome is an exit code and, if bad, a sentence on stderr."""
     words = sys.argv[1:] if words is None else words
     try:
-        arguments = parser_build(verb_named(words)).parse_args(words)
+        arguments = build_parser(find_verb(words)).parse_args(words)
         code = choose_command(arguments)(arguments)
         sys.stdout.flush()
         return code
@@ -155,7 +155,7 @@ def main(words: Sequence[str] | None = None) -> int:
             import traceback
 
             traceback.print_exc()
-        message, code = explained(error)
+        message, code = explain_error(error)
         print(f"trackbed: {message}", file=sys.stderr)
         return code
 

@@ -12,12 +12,12 @@ from adapters.errors import EngineMissing, UsageError
 
 def register(verb: str, parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``verb`` to its parser."""
-    from trackbed.scenes import scene_names
+    from trackbed.scenes import list_scenes
 
     if verb == "doctor":
         add_json_flag(parser)
     elif verb == "new":
-        parser.add_argument("name", metavar="NAME", help="; ".join(scene_names()))
+        parser.add_argument("name", metavar="NAME", help="; ".join(list_scenes()))
         parser.add_argument("folder", metavar="FOLDER", type=Path, help="made when it is not there")
     commands = {"doctor": run_doctor, "new": run_new, "cite": run_cite}
     parser.set_defaults(command=commands[verb])
@@ -46,22 +46,22 @@ def run_doctor(arguments: argparse.Namespace) -> int:
 def run_new(arguments: argparse.Namespace) -> int:
     """Copy a shipped scene to FOLDER/scene.toml; a scene that is there already is kept."""
     from trackbed.scene_files import suggest_word
-    from trackbed.scenes import scene_names, scene_template, scene_verb
+    from trackbed.scenes import find_scene_verb, list_scenes, read_template
 
-    names = scene_names()
+    names = list_scenes()
     if arguments.name not in names:
         raise UsageError(f"there is no scene {arguments.name}{suggest_word(arguments.name, names)}")
     path: Path = arguments.folder / "scene.toml"
     path.parent.mkdir(parents=True, exist_ok=True)
     try:
         with path.open("x", encoding="utf-8") as stream:
-            stream.write(scene_template(arguments.name))
+            stream.write(read_template(arguments.name))
     except FileExistsError:
         raise UsageError(
             "this scene is there already and is kept", where=str(path),
             remedy="remove it first, or name another folder",
         ) from None  # fmt: skip
-    verb = scene_verb(arguments.name)
+    verb = find_scene_verb(arguments.name)
     control = " --control" if verb == "run" else ""
     print(f"{path}\nnext: trackbed {verb} {shlex.quote(str(path))}{control}")
     return 0

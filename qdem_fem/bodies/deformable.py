@@ -18,7 +18,7 @@ from qdem_fem.element import (
     compute_von_mises,
 )
 from qdem_fem.files import ConditionError, Floats, Integers, MaterialError
-from qdem_fem.mesh import TetMesh, element_gradients, find_surface_faces, read_mesh
+from qdem_fem.mesh import TetMesh, find_gradients, find_surface_faces, read_mesh
 
 Rigid = bool | Literal["lumped"]
 """Whether a body is rigid, and with which inertia; `Body` says what each means."""
@@ -82,7 +82,7 @@ class Body:
     @cached_property
     def gradients(self) -> tuple[Floats, Floats]:
         """Reference gradients of the shape functions [1/m], (m, 3, 3), and volumes [m^3], (m,)."""
-        return element_gradients(self.nodes, self.elements)
+        return find_gradients(self.nodes, self.elements)
 
     @cached_property
     def rigid_mass(self) -> RigidMass:

@@ -32,19 +32,19 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
 def advise_command(arguments: argparse.Namespace) -> int:
     """Tell what may be rigid."""
     from qdem_fem.files import UsageError
-    from qdem_fem.scene import advise, error_together, load_scene, simulation_of
+    from qdem_fem.scene import advise, load_scene, make_simulation, predict_error
 
     if not 0 < arguments.tolerance < 1:
         raise UsageError(
             f"{arguments.tolerance:g} is no share", where="--tolerance", remedy="give 0.01 or so"
         )
-    run, _ = simulation_of(load_scene(arguments.scene, arguments.overrides))
+    run, _ = make_simulation(load_scene(arguments.scene, arguments.overrides))
     advice = advise(run, arguments.tolerance)
     answer: dict[str, Any] = {
         "scene": str(arguments.scene),
         "tolerance": arguments.tolerance,
         "bodies": [asdict(one) for one in advice],
-        "predicted": error_together(advice),
+        "predicted": predict_error(advice),
     }
     print("\n".join(_lines(advice, answer["predicted"])))
     if arguments.json is not None:

@@ -27,10 +27,10 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
         parser, "a QDEM scene file (TOML)", "simulation.duration=0.1",
         "the last checkpoint, to the same bits",
     )  # fmt: skip
-    parser.set_defaults(command=qdem_command)
+    parser.set_defaults(command=run_qdem)
 
 
-def qdem_command(arguments: argparse.Namespace) -> int:
+def run_qdem(arguments: argparse.Namespace) -> int:
     """Run a scene, or tell what would run."""
     from qdem_fem.scene import load_scene
 
@@ -51,15 +51,15 @@ def _run(prepared: Prepared, path: Path, arguments: argparse.Namespace) -> dict[
     """The whole run with its report; its summary."""
     from qdem_fem.scene import (
         RunFolder,
+        make_simulation,
         run_dynamic,
         run_static,
-        simulation_of,
-        summary_of,
+        summarise_run,
         write_report,
     )
     from trackbed.run_files import RESULT, record_provenance, write_whole
 
-    run, bodies = simulation_of(prepared)  # what it refuses must not leave a folder behind
+    run, bodies = make_simulation(prepared)  # what it refuses must not leave a folder behind
     folder = RunFolder(path)
     manifest = {
         "scene": prepared.scene.parameters(),
@@ -77,7 +77,7 @@ def _run(prepared: Prepared, path: Path, arguments: argparse.Namespace) -> dict[
             done = run_static(prepared, run, bodies, folder)
         else:
             done = run_dynamic(prepared, run, bodies, folder, resume=goes_on, progress=Progress())
-        summary = summary_of(prepared, done, folder)
+        summary = summarise_run(prepared, done, folder)
         more: Iterable[tuple[Path, str]] = ()
         if "track" in prepared.text.data:  # other scenes do not pay for its import
             from qdem_fem.report import draw_track_pictures, list_track_facts
@@ -112,13 +112,13 @@ def _outlook(prepared: Prepared) -> dict[str, Any]:
         list_body_facts,
         list_mass_scaling_facts,
         make_plan,
-        simulation_of,
+        make_simulation,
     )
 
     outlook: dict[str, Any] = {
         "title": prepared.scene.title,
         "method": prepared.scene.simulation.method,
-        "left_out": prepared.scene.left_out(),
+        "left_out": prepared.scene.list_left_out(),
     }
     if "track" in prepared.text.data:
         from qdem_fem.track import TrackPrepared, foresee_bed
@@ -126,7 +126,7 @@ def _outlook(prepared: Prepared) -> dict[str, Any]:
         assert isinstance(prepared, TrackPrepared)
         if bed := foresee_bed(prepared):  # what follows it is known when it stands
             return outlook | {"bed": bed}
-    run, bodies = simulation_of(prepared)
+    run, bodies = make_simulation(prepared)
     outlook |= {
         "bodies": list_body_facts(bodies),
         "critical_step": describe_critical_step(run),
@@ -141,7 +141,7 @@ def _outlook(prepared: Prepared) -> dict[str, Any]:
             "step": plan.step,
             "steps": plan.total,
             "rows": plan.total // plan.sampling + 1,
-            "vtu_files": len(plan.field_files(plan.total)),
+            "vtu_files": len(plan.list_field_files(plan.total)),
             "estimated_s": seconds * plan.total,
         }
     return outlook

@@ -32,7 +32,7 @@ def _register_grains(parser: argparse.ArgumentParser) -> None:
         help="sieves, m, in place of EN 13450 31.5/50 A; 0.045 0.055: the paper's grains",
     )  # fmt: skip
     parser.add_argument("--workers", type=int, default=1, help="processes (default: %(default)s)")
-    parser.set_defaults(command=grains_command)
+    parser.set_defaults(command=make_grain_file)
 
 
 def _register_train(parser: argparse.ArgumentParser) -> None:
@@ -51,10 +51,10 @@ def _register_train(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--area", type=float, default=SEAT_AREA, help="of a rail seat, m^2 (default: %(default)g)"
     )
-    parser.set_defaults(command=train_command)
+    parser.set_defaults(command=make_train_file)
 
 
-def grains_command(arguments: argparse.Namespace) -> int:
+def make_grain_file(arguments: argparse.Namespace) -> int:
     """Make random ballast grains, of EN 13450 31.5/50 A or between two sieves, and save them."""
     import numpy as np
 
@@ -73,7 +73,7 @@ def grains_command(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def train_command(arguments: argparse.Namespace) -> int:
+def make_train_file(arguments: argparse.Namespace) -> int:
     """Write the made-up record of a passing train."""
     from qdem_fem.track.loads import Track, Train, WheelFlat, make_train_record, write_load_record
 

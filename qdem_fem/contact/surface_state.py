@@ -28,7 +28,7 @@ from qdem_fem.contact.surface import (
 )
 from qdem_fem.contact.system import System
 from qdem_fem.files import Floats, Integers
-from qdem_fem.mesh import face_area_vectors
+from qdem_fem.mesh import find_area_vectors
 
 TOUCH_ARRAYS = ("start", "position", "force", "account")
 WALL_ARRAYS = ("weight", "spring", "force")
@@ -58,14 +58,14 @@ class SurfaceContacts(Contacts):
             own = np.searchsorted(np.unique(body.surface), body.surface)
             nodes, first_face = self.reference[start : start + count], sum(map(len, faces))
             faces.append(own + start)
-            areas.append(np.linalg.norm(face_area_vectors(nodes, own), axis=1))
+            areas.append(np.linalg.norm(find_area_vectors(nodes, own), axis=1))
             sharp, across = find_sharp_edges(nodes, own)
             edges.append(sharp + start)
             opposite.append(across + start)
             by_edge = np.zeros(len(sharp))
             for k in range(2):  # a third of each of its two faces
                 three = np.column_stack([sharp, across[:, k]])
-                by_edge += np.linalg.norm(face_area_vectors(nodes, three), axis=1) / 3
+                by_edge += np.linalg.norm(find_area_vectors(nodes, three), axis=1) / 3
             edge_areas.append(by_edge)
             vertices = np.repeat(start + np.arange(count)[:, None], 3, axis=1)
             points += [np.repeat(own + start, len(share), axis=0), vertices]

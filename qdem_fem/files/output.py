@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from qdem_fem.files.errors import UsageError
-from trackbed.run_files import open_unlinked, refuse_writing, whole_file, write_whole
+from trackbed.run_files import open_unlinked, refuse_writing, replace_file, write_whole
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -38,15 +38,15 @@ def write_bodies_vtu(path: Path, bodies: Sequence[Any]) -> None:
         [("tetra", np.concatenate([b.elements + n for b, n in zip(bodies, first, strict=True)]))],
         {
             "displacement": np.concatenate([body.displacement for body in bodies]),
-            "velocity": velocities_of(bodies),
+            "velocity": join_velocities(bodies),
         },
         {"von_mises": [np.concatenate([body.von_mises() for body in bodies])], "body": [number]},
     )
-    with whole_file(path) as temporary:
+    with replace_file(path) as temporary:
         mesh.write(temporary, file_format="vtu", compression=None)
 
 
-def velocities_of(bodies: Sequence[Any]) -> Any:
+def join_velocities(bodies: Sequence[Any]) -> Any:
     """`Body.velocity` of bodies of one simulation or of none, one after the other, (n, 3) [m/s]."""
     run = bodies[0].mover
     if run is None:

@@ -17,15 +17,15 @@ from scipy.spatial import ConvexHull
 
 from qdem_fem.files import MeshError
 from qdem_fem.grains.measures import (
-    edge_angles,
+    find_edge_angles,
+    find_roundness,
+    find_sphericity,
+    find_surface_area,
     find_surface_edges,
-    polyhedron_integrals,
+    integrate_polyhedron,
     quarter_faces,
-    roundness_wadell,
-    sphericity_true,
-    surface_area,
 )
-from qdem_fem.grains.meshing import make_grain_elements, place_apex_and_spokes, radius_ratios
+from qdem_fem.grains.meshing import find_radius_ratios, make_grain_elements, place_apex_and_spokes
 from qdem_fem.mesh import FloatArray, IntArray
 
 CANDIDATES = 10
@@ -56,11 +56,11 @@ class GrainRecipe:
     """
 
     sphericity: float = 0.82
-    """psi, `qdem_fem.grains.sphericity_true` [-]."""
+    """psi, `qdem_fem.grains.find_sphericity` [-]."""
     sphericity_scatter: float = 0.03
     """Half the width of the uniform distribution of psi over the grains [-]."""
     roundness: float = 0.68
-    """`qdem_fem.grains.roundness_wadell` [-], about 0.62 to 0.85 at this mesh size."""
+    """`qdem_fem.grains.find_roundness` [-], about 0.62 to 0.85 at this mesh size."""
     roundness_scatter: float = 0.03
     corners: tuple[int, int] = (8, 9)
     """Fewest and most corners M; a grain has 8 (2 M - 4) tetrahedra and 5 M - 5 nodes."""
@@ -99,7 +99,7 @@ class GrainForm:
     roundness: float
 
 
-def corners_apart(generator: np.random.Generator, count: int) -> FloatArray:
+def place_corners_apart(generator: np.random.Generator, count: int) -> FloatArray:
     """Points on the unit sphere (count, 3), each the best of some random ones (Mitchell 1991)."""
     chosen = np.empty((0, 3))
     while len(chosen) < count:
@@ -160,22 +160,22 @@ def make_flat_form(points: FloatArray) -> GrainForm:
     faces = quarter_faces(corner_faces, edges)
     inner = place_apex_and_spokes(surface, faces, count)
     nodes = np.vstack([surface, inner]) - inner[0]
-    worst = radius_ratios(nodes, make_grain_elements(nodes, corner_faces)).min()
+    worst = find_radius_ratios(nodes, make_grain_elements(nodes, corner_faces)).min()
     if worst < RATIO_LEAST:
         raise MeshError(
             f"its flattest tetrahedron has a radius ratio of {worst:.2g}", where="grain shape",
             remedy=f"keep the corners farther apart: {RATIO_LEAST:g} is the least",
         )  # fmt: skip
-    volume = polyhedron_integrals(nodes, faces).volume
-    psi = sphericity_true(volume, surface_area(nodes, faces))
-    return GrainForm(corner_faces, nodes, psi, roundness_wadell(surface, faces))
+    volume = integrate_polyhedron(nodes, faces).volume
+    psi = find_sphericity(volume, find_surface_area(nodes, faces))
+    return GrainForm(corner_faces, nodes, psi, find_roundness(surface, faces))
 
 
 class _Drawn:
     """Random corners, direction and kind of stretch of one grain; lift and stretch open."""
 
     def __init__(self, generator: np.random.Generator, count: int) -> None:
-        points = corners_apart(generator, count)
+        points = place_corners_apart(generator, count)
         self.corner_faces = find_hull_faces(points)
         edges = find_surface_edges(self.corner_faces)
         middles = points[edges.nodes].mean(axis=1)
@@ -198,7 +198,7 @@ class _Drawn:
         for _ in range(1000):
             nodes = self.flat.copy()
             nodes[self.count :] += lifts[:, None] * self.outward
-            _, angle = edge_angles(nodes, self.faces, self.edges)
+            _, angle = find_edge_angles(nodes, self.faces, self.edges)
             inward = np.unique(self.edges.opposite[angle < -BENT_INWARD])
             inward = inward[inward >= self.count] - self.count
             if not len(inward):
@@ -211,11 +211,11 @@ class _Drawn:
 
         Stretches keep the volume.
         """
-        volume = polyhedron_integrals(nodes, self.faces).volume
+        volume = integrate_polyhedron(nodes, self.faces).volume
 
         def excess(size: float) -> float:
-            area = surface_area(nodes * np.exp(size * self.axes), self.faces)
-            return sphericity_true(volume, area) - psi
+            area = find_surface_area(nodes * np.exp(size * self.axes), self.faces)
+            return find_sphericity(volume, area) - psi
 
         if excess(0.0) < 0 or excess(STRETCH_MOST) > 0:
             return None
@@ -232,7 +232,7 @@ class _Drawn:
             nodes = self.stretched(self.lifted(lift), psi)
             if nodes is None:
                 return None
-            reached.append(roundness_wadell(nodes, self.faces, self.edges))
+            reached.append(find_roundness(nodes, self.faces, self.edges))
             return reached[-1] - roundness, nodes
 
         below: float | None = None
@@ -267,7 +267,7 @@ class _Drawn:
         turned = surface @ self.turn.T
         inner = place_apex_and_spokes(turned, self.faces, self.count)
         nodes = np.vstack([turned, inner]) - inner[0]
-        worst = radius_ratios(nodes, make_grain_elements(nodes, self.corner_faces)).min()
+        worst = find_radius_ratios(nodes, make_grain_elements(nodes, self.corner_faces)).min()
         return GrainForm(self.corner_faces, nodes, psi, roundness) if worst >= RATIO_LEAST else None
 
 

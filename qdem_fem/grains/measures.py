@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from qdem_fem.mesh import FloatArray, IntArray, face_area_vectors
+from qdem_fem.mesh import FloatArray, IntArray, find_area_vectors
 
 FIRST_PLANES = 1e3
 """Distance of the planes that the search for an inscribed sphere starts from, over the extent."""
@@ -29,7 +29,7 @@ class Solid:
     """integral x dV / V [m], (3,)."""
 
 
-def polyhedron_integrals(nodes: FloatArray, faces: IntArray) -> Solid:
+def integrate_polyhedron(nodes: FloatArray, faces: IntArray) -> Solid:
     """Integrals over the cones from one node to every face, which is exact.
 
     With D = det(a, b, c) of a cone's face: volume D/6, first moment D (a + b + c)/24.
@@ -42,12 +42,12 @@ def polyhedron_integrals(nodes: FloatArray, faces: IntArray) -> Solid:
     return Solid(float(volume), origin + first / volume)
 
 
-def surface_area(nodes: FloatArray, faces: IntArray) -> float:
+def find_surface_area(nodes: FloatArray, faces: IntArray) -> float:
     """Area of the surface [m^2]."""
-    return float(np.linalg.norm(face_area_vectors(nodes, faces), axis=1).sum())
+    return float(np.linalg.norm(find_area_vectors(nodes, faces), axis=1).sum())
 
 
-def sphericity_true(volume: float, area: float) -> float:
+def find_sphericity(volume: float, area: float) -> float:
     """psi = pi^(1/3) (6 V)^(2/3) / A [-]: Wadell's true sphericity (J. Geol. 40, 1932, 443-451).
 
     Area of the sphere of the same volume ``volume`` [m^3] over that of the body [m^2]: 1 for a
@@ -103,9 +103,11 @@ def number_edges(faces: IntArray, edges: Edges) -> IntArray:
     return np.asarray(order[np.searchsorted(key, wanted, sorter=order)])
 
 
-def edge_angles(nodes: FloatArray, faces: IntArray, edges: Edges) -> tuple[FloatArray, FloatArray]:
+def find_edge_angles(
+    nodes: FloatArray, faces: IntArray, edges: Edges
+) -> tuple[FloatArray, FloatArray]:
     """Lengths [m] and angles between the outward normals [rad], (e,); negative where concave."""
-    normal = face_area_vectors(nodes, faces)
+    normal = find_area_vectors(nodes, faces)
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     along = nodes[edges.nodes[:, 1]] - nodes[edges.nodes[:, 0]]
     length = np.sqrt((along * along).sum(axis=1))
@@ -114,7 +116,7 @@ def edge_angles(nodes: FloatArray, faces: IntArray, edges: Edges) -> tuple[Float
     return length, np.arctan2(sine, (one * other).sum(axis=1))
 
 
-def node_areas(nodes: FloatArray, faces: IntArray) -> FloatArray:
+def find_node_areas(nodes: FloatArray, faces: IntArray) -> FloatArray:
     """Area of the surface that is nearest to each node [m^2], (n,); they add up to the whole.
 
     Voronoi regions, of obtuse triangles half to the obtuse corner and a quarter to each other one
@@ -122,7 +124,7 @@ def node_areas(nodes: FloatArray, faces: IntArray) -> FloatArray:
     """
     p = nodes[faces]
     following, previous = np.roll(p, -1, axis=1) - p, np.roll(p, -2, axis=1) - p
-    twice = 2 * np.linalg.norm(face_area_vectors(nodes, faces), axis=1)[:, None]
+    twice = 2 * np.linalg.norm(find_area_vectors(nodes, faces), axis=1)[:, None]
     cotangent = (following * previous).sum(axis=2) / twice
     facing = ((previous - following) ** 2).sum(axis=2) * cotangent
     share = (np.roll(facing, -1, axis=1) + np.roll(facing, -2, axis=1)) / 8
@@ -132,26 +134,26 @@ def node_areas(nodes: FloatArray, faces: IntArray) -> FloatArray:
     return np.asarray(np.bincount(faces.reshape(-1), share.reshape(-1), len(nodes)), float)
 
 
-def greatest_curvatures(nodes: FloatArray, faces: IntArray, edges: Edges) -> FloatArray:
+def find_greatest_curvatures(nodes: FloatArray, faces: IntArray, edges: Edges) -> FloatArray:
     """Larger principal curvature at each node [1/m], (n,): H + sqrt(H^2 - K).
 
-    With the area A of `node_areas`: H = sum(L theta)/(4 A) over its edges, K = (2 pi - sum of the
-    angles around it)/A, with no root where H^2 < K (Meyer et al. 2003).  Curvature is smeared over
+    With the area A of `find_node_areas`: H = sum(L theta)/(4 A) over its edges, K = (2 pi - sum of
+    the angles around it)/A, with no root where H^2 < K (Meyer et al. 2003).  Curvature is smeared over
     that area: no edge is sharper than the mesh shows.
     """
     count = len(nodes)
-    own = node_areas(nodes, faces)
-    length, angle = edge_angles(nodes, faces, edges)
+    own = find_node_areas(nodes, faces)
+    length, angle = find_edge_angles(nodes, faces, edges)
     mean = np.bincount(edges.nodes.reshape(-1), np.repeat(length * angle / 4, 2), count) / own
     p = nodes[faces]
     u, v = np.roll(p, -1, axis=1) - p, np.roll(p, -2, axis=1) - p
-    twice = 2 * np.linalg.norm(face_area_vectors(nodes, faces), axis=1)[:, None]
+    twice = 2 * np.linalg.norm(find_area_vectors(nodes, faces), axis=1)[:, None]
     around = np.arctan2(twice, (u * v).sum(axis=2))
     gauss = (2 * np.pi - np.bincount(faces.reshape(-1), around.reshape(-1), count)) / own
     return np.asarray(mean + np.sqrt(np.maximum(mean**2 - gauss, 0.0)))
 
 
-def roundness_wadell(nodes: FloatArray, faces: IntArray, edges: Edges | None = None) -> float:
+def find_roundness(nodes: FloatArray, faces: IntArray, edges: Edges | None = None) -> float:
     """Mean radius of curvature of corners and ridges over that of the inscribed sphere [-].
 
     Wadell's roundness (J. Geol. 40, 1932) taken to space as by Bullard and Garboczi (Powder
@@ -160,13 +162,13 @@ def roundness_wadell(nodes: FloatArray, faces: IntArray, edges: Edges | None = N
     1 for a sphere, where no node or only round-off is; a body with edges tends to 0 as its mesh
     is refined, in proportion to the mesh size.  Two bodies are compared at like mesh size only.
     """
-    _, radius = inscribed_sphere(nodes, faces)
-    relative = radius * greatest_curvatures(nodes, faces, edges or find_surface_edges(faces))
+    _, radius = find_inscribed_sphere(nodes, faces)
+    relative = radius * find_greatest_curvatures(nodes, faces, edges or find_surface_edges(faces))
     sharp = relative > 1
     return float(np.mean(1 / relative[sharp])) if sharp.any() else 1.0
 
 
-def inscribed_sphere(nodes: FloatArray, faces: IntArray) -> tuple[FloatArray, float]:
+def find_inscribed_sphere(nodes: FloatArray, faces: IntArray) -> tuple[FloatArray, float]:
     """Centre [m], (3,), and radius [m] of the largest sphere inside the planes of all faces.
 
     The largest inscribed sphere of a convex body; of one that is not convex a smaller one, and
@@ -176,7 +178,7 @@ def inscribed_sphere(nodes: FloatArray, faces: IntArray) -> tuple[FloatArray, fl
     planes that hold a sphere between them the multipliers say which leaves, and the
     plane that cuts deepest into the sphere enters.
     """
-    normal = face_area_vectors(nodes, faces)
+    normal = find_area_vectors(nodes, faces)
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     origin = nodes.mean(axis=0)
     extent = float(np.ptp(nodes, axis=0).max())

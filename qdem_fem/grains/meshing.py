@@ -13,10 +13,10 @@ import numpy as np
 from qdem_fem.files import MeshError
 from qdem_fem.grains.measures import (
     find_surface_edges,
+    integrate_polyhedron,
     number_edges,
-    polyhedron_integrals,
 )
-from qdem_fem.mesh import FloatArray, IntArray, TetMesh, named
+from qdem_fem.mesh import FloatArray, IntArray, TetMesh, name_some
 
 SPOKE = 0.5
 """Where on a spoke from the apex its node lies."""
@@ -31,7 +31,7 @@ DIAGONALS = np.array([
 """The other four, around one of the three diagonals of the octahedron that is left."""
 
 
-def radius_ratios(nodes: FloatArray, elements: IntArray) -> FloatArray:
+def find_radius_ratios(nodes: FloatArray, elements: IntArray) -> FloatArray:
     """Three times the radius of the inscribed over that of the circumscribed sphere, (m,).
 
     1 for a regular tetrahedron, 0 for a flat one, negative where left-handed; ``nodes`` (n, 3) [m],
@@ -57,7 +57,7 @@ def radius_ratios(nodes: FloatArray, elements: IntArray) -> FloatArray:
 
 def place_apex_and_spokes(nodes: FloatArray, faces: IntArray, corners: int) -> FloatArray:
     """The inner nodes (M + 1, 3) [m] of a surface: its centroid, and one on each spoke."""
-    apex = polyhedron_integrals(nodes, faces).centroid
+    apex = integrate_polyhedron(nodes, faces).centroid
     return np.vstack([apex, apex + SPOKE * (nodes[:corners] - apex)])
 
 
@@ -65,7 +65,7 @@ def make_grain_elements(nodes: FloatArray, corner_faces: IntArray) -> IntArray:
     """Tetrahedra (8 (2 M - 4), 4) of a grain with ``nodes`` (5 M - 5, 3), right-handed.
 
     Of the three diagonals of each cone's octahedron the one that leaves the best worst
-    `radius_ratios`.
+    `find_radius_ratios`.
     """
     corners = int(corner_faces.max()) + 1
     middle = corners + number_edges(corner_faces, find_surface_edges(corner_faces))
@@ -74,7 +74,9 @@ def make_grain_elements(nodes: FloatArray, corner_faces: IntArray) -> IntArray:
         [corner_faces, middle, apex + 1 + corner_faces, np.full(len(corner_faces), apex)]
     )
     choices = local[:, DIAGONALS]
-    worst = radius_ratios(nodes, choices.reshape(-1, 4)).reshape(*choices.shape[:3]).min(axis=2)
+    worst = (
+        find_radius_ratios(nodes, choices.reshape(-1, 4)).reshape(*choices.shape[:3]).min(axis=2)
+    )
     best = choices[np.arange(len(local)), worst.argmax(axis=1)]
     return np.concatenate([local[:, CORNERS], best], axis=1).reshape(-1, 4)
 
@@ -86,10 +88,10 @@ def make_grain_tetrahedra(nodes: FloatArray, corner_faces: IntArray) -> TetMesh:
     """
     corners = int(corner_faces.max()) + 1
     elements = make_grain_elements(nodes, corner_faces)
-    bad = np.flatnonzero(radius_ratios(nodes, elements) <= 0)
+    bad = np.flatnonzero(find_radius_ratios(nodes, elements) <= 0)
     if len(bad):
         raise MeshError(
-            f"the surface is not seen from its centroid: {named('element', bad)} inside out",
+            f"the surface is not seen from its centroid: {name_some('element', bad)} inside out",
             where="grain",
             remedy="draw another shape",
         )

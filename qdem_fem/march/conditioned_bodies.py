@@ -12,7 +12,7 @@ from qdem_fem.contact.search import find_partners
 from qdem_fem.files import ConditionError, Driver, Floats, Integers, Value
 from qdem_fem.march.leapfrog import level_velocities
 from qdem_fem.march.state import State
-from qdem_fem.mesh import find_faces_within, pressure_forces
+from qdem_fem.mesh import find_faces_within, find_pressure_forces
 
 C = TypeVar("C", NodalLoad, Held, Roller)
 
@@ -87,7 +87,7 @@ class ConditionedBodies(State):
                 f"no surface face of {body.name} has all three nodes in the selection",
                 where="pressure",
             )
-        areas = pressure_forces(body.nodes, faces, len(body.nodes))[local]
+        areas = find_pressure_forces(body.nodes, faces, len(body.nodes))[local]
         driver = Driver(pressure, 1, "pressure")
         return self._add(self.conditions.loads, NodalLoad(chosen, areas, driver))
 

@@ -73,7 +73,7 @@ def take_nodes(raw: Any) -> tuple[FloatArray, list[Problem]]:
         extent = float(np.ptp(nodes, axis=0).max()) if len(nodes) else 1.0
     bad = np.flatnonzero(~np.isfinite(nodes).all(axis=1))
     if len(bad):
-        at = f"{named('node', bad)}; node {bad[0]} is at {nodes[bad[0]].tolist()}"
+        at = f"{name_some('node', bad)}; node {bad[0]} is at {nodes[bad[0]].tolist()}"
         return nodes, [
             Problem(f"coordinates that are not finite: {at}", "mend or remove these nodes")
         ]
@@ -103,7 +103,7 @@ def take_elements(raw: Any) -> tuple[IntArray, list[Problem]]:
         bad = np.flatnonzero(broken.any(axis=1))
         if len(bad):
             row = array[bad[0]].tolist()
-            text = f"no whole numbers in {named('element', bad)}; element {bad[0]} names {row}"
+            text = f"no whole numbers in {name_some('element', bad)}; element {bad[0]} names {row}"
             return none, [Problem(text, remedy)]
     return np.array(array, dtype=np.int64, order="C"), []
 
@@ -133,7 +133,7 @@ def take_sets(
     return taken, problems
 
 
-def indices_problems(elements: IntArray, n_nodes: int) -> tuple[BoolArray, list[Problem]]:
+def find_index_problems(elements: IntArray, n_nodes: int) -> tuple[BoolArray, list[Problem]]:
     """Which elements name four different nodes of the mesh (m,), and what is wrong with others."""
     problems = []
     # Seen as unsigned, a negative number is larger than any count.
@@ -142,7 +142,7 @@ def indices_problems(elements: IntArray, n_nodes: int) -> tuple[BoolArray, list[
     if len(bad):
         row = elements[bad[0]].tolist()
         text = (
-            f"indices out of range, as there are {n_nodes} nodes: {named('element', bad)}; "
+            f"indices out of range, as there are {n_nodes} nodes: {name_some('element', bad)}; "
             f"element {bad[0]} names nodes {row}"
         )
         one = elements.min() == 1 and elements.max() == n_nodes
@@ -154,14 +154,14 @@ def indices_problems(elements: IntArray, n_nodes: int) -> tuple[BoolArray, list[
     bad = np.flatnonzero(twice)
     if len(bad):
         text = (
-            f"a node named twice by one element: {named('element', bad)}; "
+            f"a node named twice by one element: {name_some('element', bad)}; "
             f"element {bad[0]} names {elements[bad[0]].tolist()}"
         )
         problems.append(Problem(text, "remove the elements that collapsed, and mesh again there"))
     return ~(out | twice), problems
 
 
-def duplicates_problems(elements: IntArray, usable: BoolArray) -> list[Problem]:
+def find_repeated_elements(elements: IntArray, usable: BoolArray) -> list[Problem]:
     """Usable elements of the same four nodes, in whatever order they name them."""
     numbers = np.flatnonzero(usable)
     rows = np.sort(elements[numbers], axis=1)
@@ -175,13 +175,13 @@ def duplicates_problems(elements: IntArray, usable: BoolArray) -> list[Problem]:
     again = again[np.argsort(order[again])]
     bad, same = numbers[order[again]], numbers[order[lead[again[0]]]]
     text = (
-        f"the same four nodes as an earlier element: {named('element', bad)}; "
+        f"the same four nodes as an earlier element: {name_some('element', bad)}; "
         f"element {bad[0]} repeats element {same}"
     )
     return [Problem(text, "keep one of the elements that repeat")]
 
 
-def flat_problems(
+def find_flat_elements(
     nodes: FloatArray, elements: IntArray, usable: BoolArray
 ) -> tuple[FloatArray, list[Problem]]:
     """Signed volume (m,) [m^3] of the usable elements, and those with none worth the name.
@@ -198,8 +198,8 @@ def flat_problems(
         return volume, []
     at = bad[0]
     text = (
-        f"no volume: {named('element', bad)}; element {at} of nodes {elements[at].tolist()} has "
-        f"{volume[at]:.3g} m^3, {abs(shape[at]):.1e} of the cube of its longest edge "
+        f"no volume: {name_some('element', bad)}; element {at} of nodes {elements[at].tolist()} "
+        f"has {volume[at]:.3g} m^3, {abs(shape[at]):.1e} of the cube of its longest edge "
         f"(at least {np.fmax(FLAT, noise[at]):.0e} is needed)"
     )
     return volume, [Problem(text, "remove the flat elements or mesh again there")]
@@ -225,7 +225,7 @@ def _volumes(
     return volume, shape, noise
 
 
-def named(kind: str, indices: IntArray) -> str:
+def name_some(kind: str, indices: IntArray) -> str:
     """`elements 3, 8, 9, 12, 40 and 7 more`."""
     shown = ", ".join(str(index) for index in indices[:_SHOWN])
     more = f" and {len(indices) - _SHOWN} more" if len(indices) > _SHOWN else ""

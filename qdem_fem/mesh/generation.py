@@ -9,7 +9,7 @@ import numpy as np
 
 from qdem_fem.files import MeshError
 from qdem_fem.mesh.surface import find_surface_faces
-from qdem_fem.mesh.tetrahedra import TetMesh, altitudes, element_gradients
+from qdem_fem.mesh.tetrahedra import TetMesh, find_altitudes, find_gradients
 
 Pattern = Literal["kuhn", "five"]
 Triple = tuple[float, float, float]
@@ -79,10 +79,10 @@ def jitter(mesh: TetMesh, fraction: float, seed: int) -> TetMesh:
         raise MeshError(
             f"fraction is {fraction}", where="jitter", remedy="use 0 or more, best below 0.25"
         )
-    gradients, _ = element_gradients(mesh.nodes, mesh.elements)
+    gradients, _ = find_gradients(mesh.nodes, mesh.elements)
     reach = np.full(len(mesh.nodes), np.inf)
     for corner in mesh.elements.T:
-        np.minimum.at(reach, corner, altitudes(gradients))
+        np.minimum.at(reach, corner, find_altitudes(gradients))
     reach[find_surface_faces(mesh.elements).reshape(-1)] = 0
     reach[~np.isfinite(reach)] = 0
 
@@ -91,5 +91,5 @@ def jitter(mesh: TetMesh, fraction: float, seed: int) -> TetMesh:
     move /= np.linalg.norm(move, axis=1)[:, None]
     radius = fraction * reach * np.cbrt(generator.random(len(mesh.nodes)))
     nodes = mesh.nodes + move * radius[:, None]
-    element_gradients(nodes, mesh.elements)  # refuses what was moved too far
+    find_gradients(nodes, mesh.elements)  # refuses what was moved too far
     return replace(mesh, nodes=nodes)

@@ -67,7 +67,7 @@ def _raise_overlap(face: IntArray, elements: IntArray, where: str) -> None:
     )
 
 
-def face_area_vectors(nodes: FloatArray, faces: IntArray) -> FloatArray:
+def find_area_vectors(nodes: FloatArray, faces: IntArray) -> FloatArray:
     """Area times unit normal of each face [m^2], (k, 3): (X1 - X0) x (X2 - X0) / 2.
 
     ``nodes`` (n, 3) [m], ``faces`` (k, 3); outward where the faces are `find_surface_faces`.
@@ -81,14 +81,14 @@ def find_faces_within(faces: IntArray, node_mask: BoolArray) -> IntArray:
     return faces[node_mask[faces].all(axis=1)]
 
 
-def pressure_forces(nodes: FloatArray, faces: IntArray, n_nodes: int) -> FloatArray:
+def find_pressure_forces(nodes: FloatArray, faces: IntArray, n_nodes: int) -> FloatArray:
     """Force on each node for a pressure of 1 Pa on outward ``faces`` (k, 3) [N/Pa = m^2], (n, 3).
 
     A uniform pressure acts along the inward normal, and the linear shape functions give a third
     of the force on a face to each of its nodes.  Not for a pressure that follows the deformed
     surface: ``nodes`` (n, 3) [m] are the reference configuration.
     """
-    third = -face_area_vectors(nodes, faces) / 3
+    third = -find_area_vectors(nodes, faces) / 3
     return np.stack(
         [
             sum(np.bincount(corner, weights=column, minlength=n_nodes) for corner in faces.T)

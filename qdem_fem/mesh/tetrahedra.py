@@ -14,10 +14,10 @@ from qdem_fem.mesh.checks import (
     FloatArray,
     IntArray,
     Problem,
-    duplicates_problems,
-    flat_problems,
-    indices_problems,
-    named,
+    find_flat_elements,
+    find_index_problems,
+    find_repeated_elements,
+    name_some,
     raise_problems,
     take_elements,
     take_nodes,
@@ -96,13 +96,13 @@ def read_mesh(source: Any, *, where: str = "") -> TetMesh:
     if len(nodes) == 0 or len(elements) == 0:
         raise_problems(problems, where)
 
-    sound, found = indices_problems(elements, len(nodes))
+    sound, found = find_index_problems(elements, len(nodes))
     problems += found
-    problems += duplicates_problems(elements, sound)
+    problems += find_repeated_elements(elements, sound)
     lost = np.flatnonzero(~np.isfinite(nodes).all(axis=1))
     if len(lost):
         sound &= ~np.isin(elements, lost).any(axis=1)
-    volume, found = flat_problems(nodes, elements, sound)
+    volume, found = find_flat_elements(nodes, elements, sound)
     problems += found
     node_sets, found = take_sets(parts.node_sets, "node", len(nodes))
     problems += found
@@ -118,7 +118,7 @@ def read_mesh(source: Any, *, where: str = "") -> TetMesh:
     return TetMesh(nodes, elements, flipped, np.flatnonzero(~used), node_sets, element_sets)
 
 
-def element_gradients(nodes: FloatArray, elements: IntArray) -> tuple[FloatArray, FloatArray]:
+def find_gradients(nodes: FloatArray, elements: IntArray) -> tuple[FloatArray, FloatArray]:
     """Gradients of the linear shape functions, and volumes: rows of dX^-1 (paper, eq. 1).
 
     ``nodes`` (n, 3) [m], right-handed ``elements`` (m, 4).  Returns ``gradients`` (m, 3, 3)
@@ -148,7 +148,7 @@ def element_gradients(nodes: FloatArray, elements: IntArray) -> tuple[FloatArray
     bad = np.flatnonzero(~(volumes > 0))
     if len(bad):
         raise MeshError(
-            f"no positive volume: {named('element', bad)}; "
+            f"no positive volume: {name_some('element', bad)}; "
             f"element {bad[0]} has {volumes[bad[0]]:.3g} m^3",
             where="mesh",
             remedy="pass the mesh through read_mesh first",
@@ -172,7 +172,7 @@ def _cofactors(x: npt.NDArray[Any]) -> tuple[npt.NDArray[Any], ...]:
     return gradient, sixfold, np.sqrt(squares[0]) * np.sqrt(squares[1]) * np.sqrt(squares[2])
 
 
-def altitudes(gradients: FloatArray) -> FloatArray:
+def find_altitudes(gradients: FloatArray) -> FloatArray:
     """Smallest of the four altitudes of each element [m], (m,), of ``gradients`` (m, 3, 3) [1/m].
 
     The altitude over the face opposite node a is 1 / |grad N_a|.
@@ -182,7 +182,7 @@ def altitudes(gradients: FloatArray) -> FloatArray:
     return np.asarray(1 / np.sqrt(np.max(squares, axis=0)))
 
 
-def lumped_mass(
+def lump_mass(
     elements: IntArray, volumes: FloatArray, density: float | FloatArray, n_nodes: int
 ) -> FloatArray:
     """Mass of each node [kg], (n,): a quarter of rho V_0 of each of its elements (paper, 2.4).

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from qdem_fem.report.figures import round_below, unit_of, write_figure
+from qdem_fem.report.figures import choose_unit, round_below, write_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,13 +43,13 @@ def draw_deformed(path: Path, bodies: Sequence[Any], magnification: float | None
     """
     if magnification is None:
         magnification = round_magnification(bodies)
-    frame = view_frame(AZIMUTH, ELEVATION)
-    stress = faces_stress(bodies)
+    frame = find_view(AZIMUTH, ELEVATION)
+    stress = average_stress(bodies)
     corners = [(b.nodes + magnification * b.displacement)[b.surface] for b in bodies]
     seen = np.concatenate(corners) @ frame.T
     across, _, up = np.ptp(seen.reshape(-1, 3), axis=0)
     wide = float(np.clip(HEIGHT * across / up + BAR_WIDTH, *WIDTHS))
-    unit, name = unit_of(float(stress.max()), "Pa")
+    unit, name = choose_unit(float(stress.max()), "Pa")
     with write_figure(path, (wide, HEIGHT)) as figure:
         panel = figure.subplots()
         _paint(panel, seen, stress / unit, f"von Mises stress ({name})")
@@ -65,7 +65,7 @@ def draw_deformed(path: Path, bodies: Sequence[Any], magnification: float | None
     return magnification
 
 
-def view_frame(azimuth: float, elevation: float) -> FloatArray:
+def find_view(azimuth: float, elevation: float) -> FloatArray:
     """Rows: right, away from the viewer, up; orthonormal (3, 3)."""
     a, e = np.radians([azimuth, elevation])
     right = np.array([-np.sin(a), np.cos(a), 0.0])
@@ -83,7 +83,7 @@ def round_magnification(bodies: Sequence[Any]) -> float:
     return max(1.0, round_below(SHOWN * size / moved))
 
 
-def faces_stress(bodies: Sequence[Any]) -> FloatArray:
+def average_stress(bodies: Sequence[Any]) -> FloatArray:
     """Von Mises stress of the surface faces of all bodies as it is drawn [Pa], (k,): the mean of
     their nodes', and of each node that of its elements."""
     stress = []
@@ -125,12 +125,14 @@ def _outline(panel: Axes, bodies: Sequence[Any], frame: FloatArray) -> None:
     """Sharp edges of the undeformed bodies."""
     from matplotlib.collections import LineCollection
 
-    lines = [(body.nodes @ frame.T)[feature_edges(body.nodes, body.surface)] for body in bodies]
+    lines = [
+        (body.nodes @ frame.T)[find_feature_edges(body.nodes, body.surface)] for body in bodies
+    ]
     places = np.concatenate(lines)[:, :, [0, 2]]
     panel.add_collection(LineCollection(list(places), colors="#555555", linewidths=0.5))
 
 
-def feature_edges(nodes: FloatArray, faces: IntArray) -> IntArray:
+def find_feature_edges(nodes: FloatArray, faces: IntArray) -> IntArray:
     """Edges (e, 2) whose two faces meet at a sharp angle, or that have not two faces."""
     normal = np.cross(
         nodes[faces[:, 1]] - nodes[faces[:, 0]], nodes[faces[:, 2]] - nodes[faces[:, 0]]
@@ -163,7 +165,7 @@ def _scale_bar(panel: Axes) -> None:
     """A bar of a round length of the reference shape."""
     low, high = panel.get_xlim()
     length = round_below((high - low) / 5)
-    unit, name = unit_of(length, "m")
+    unit, name = choose_unit(length, "m")
     bottom, top = panel.get_ylim()
     y = bottom - 0.04 * (top - bottom)
     panel.plot([high - length, high], [y, y], color="#333333", lw=1.5, clip_on=False)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from qdem_fem.report.spectra import Mode, amplitude_spectrum
+from qdem_fem.report.spectra import Mode, find_amplitudes
 from trackbed.report import STYLE, encode_figure
 from trackbed.run_files import write_whole
 
@@ -46,7 +46,7 @@ def draw_history(
 
     ``against``: what the first of each curve's arrays is; ``logarithmic``: of the values."""
     greatest = max(float(np.nanmax(np.abs(v), initial=0.0)) for _, v in curves.values())
-    scale, name = unit_of(greatest, unit)
+    scale, name = choose_unit(greatest, unit)
     with write_figure(path, (7.2, 3.2)) as figure:
         panel = figure.subplots()
         for (label, (time, values)), colour in zip(curves.items(), cycle(COLOURS), strict=False):
@@ -63,7 +63,7 @@ def draw_spectrum(path: Path, curves: Mapping[str, Curve], modes: Sequence[Mode]
         panel = figure.subplots()
         highest = 0.0
         for (label, (time, values)), colour in zip(curves.items(), cycle(COLOURS), strict=False):
-            frequency, amplitude = amplitude_spectrum(time, values)
+            frequency, amplitude = find_amplitudes(time, values)
             panel.plot(frequency[1:], amplitude[1:], color=colour, label=label)
             highest = max(highest, float(frequency[-1]))
         for mode in modes:
@@ -85,7 +85,7 @@ def draw_energy(path: Path, energy: Mapping[str, FloatArray]) -> None:
     """Draw the energies [J] of a run against ``energy["time"]``."""
     time = energy["time"]
     names = [name for name in energy if name != "time"]
-    scale, unit = unit_of(max(float(np.abs(energy[n]).max(initial=0.0)) for n in names), "J")
+    scale, unit = choose_unit(max(float(np.abs(energy[n]).max(initial=0.0)) for n in names), "J")
     with write_figure(path, (7.2, 2.8)) as figure:
         panel = figure.subplots()
         for number, (name, colour) in enumerate(zip(names, cycle(COLOURS), strict=False)):
@@ -97,7 +97,7 @@ def draw_energy(path: Path, energy: Mapping[str, FloatArray]) -> None:
         panel.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=4)
 
 
-def unit_of(greatest: float, unit: str) -> tuple[float, str]:
+def choose_unit(greatest: float, unit: str) -> tuple[float, str]:
     """SI multiple in which a quantity is shown: its size, and its name such as ``kPa``."""
     for size, prefix in PREFIXES:
         if greatest >= size:

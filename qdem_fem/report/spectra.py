@@ -42,7 +42,7 @@ class Mode:
     """[rad]"""
 
 
-def amplitude_spectrum(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+def find_amplitudes(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Frequencies [Hz] and amplitudes [unit of values], (k // 2 + 1,) each, of a record (k,).
 
     The mean is taken off; the window is Hann's.  A cosine of amplitude A peaks at A when its
@@ -57,14 +57,14 @@ def amplitude_spectrum(time: FloatArray, values: FloatArray) -> tuple[FloatArray
     return np.asarray(np.fft.rfftfreq(len(values), step), float), amplitude
 
 
-def fourier_spectrum(time: FloatArray, values: FloatArray) -> tuple[FloatArray, ComplexArray]:
+def transform_record(time: FloatArray, values: FloatArray) -> tuple[FloatArray, ComplexArray]:
     """Frequencies [Hz] and the Fourier spectrum X(f) [unit s] of a record, mean left in."""
     step, values = _record(time, values)
     frequency = np.asarray(np.fft.rfftfreq(len(values), step), float)
     return frequency, step * np.fft.rfft(values) * np.exp(-2j * pi * frequency * time[0])
 
 
-def parzen_smoothed(
+def smooth_spectrum(
     frequency: FloatArray, amplitude: FloatArray, bandwidth: float = 20.0
 ) -> FloatArray:
     """An amplitude spectrum smoothed by a Parzen window, as in Figs. 9-12 of the paper.
@@ -85,7 +85,7 @@ def parzen_smoothed(
     return np.sqrt(np.convolve(power, weight / weight.sum(), mode="valid"))
 
 
-def frequency_response(
+def find_mobility(
     time: FloatArray, force: FloatArray, velocity: FloatArray, bandwidth: float = 20.0
 ) -> tuple[FloatArray, FloatArray]:
     """Frequencies [Hz] and mobility |H| = |V| / |F| [m/(s N)] (Fig. 12 of the paper).
@@ -94,10 +94,10 @@ def frequency_response(
     smoothed by a Parzen window of ``bandwidth`` [Hz].  Nan where the force holds less than 1e-9 of
     its greatest amplitude: there it says nothing.
     """
-    frequency, force_spectrum = fourier_spectrum(time, force)
-    _, velocity_spectrum = fourier_spectrum(time, velocity)
+    frequency, force_spectrum = transform_record(time, force)
+    _, velocity_spectrum = transform_record(time, velocity)
     of_force, of_velocity = (
-        parzen_smoothed(frequency, np.abs(one), bandwidth)
+        smooth_spectrum(frequency, np.abs(one), bandwidth)
         for one in (force_spectrum, velocity_spectrum)
     )
     silent = of_force <= 1e-9 * of_force.max(initial=0.0)

@@ -1,4 +1,4 @@
-"""What a track run shows, after section 4: settlement, accelerations, spectra, mobility.
+"""What a track run shows, after section 4: settlement, find_accelerations, spectra, mobility.
 
 Displacements are counted from the prepared state.  Velocities and accelerations are first and
 second differences of displacements sampled at 10 kHz: of a harmonic motion they are short by
@@ -19,7 +19,7 @@ import numpy as np
 from qdem_fem.files import Series, read_table
 from qdem_fem.mesh import FloatArray
 from qdem_fem.report import figures as pictures
-from qdem_fem.report.spectra import fourier_spectrum, frequency_response, parzen_smoothed
+from qdem_fem.report.spectra import find_mobility, smooth_spectrum, transform_record
 
 GRAINS = ("B1", "B2", "B3", "B2a")
 SENSORS = ("S1", "S2", "S3")
@@ -31,18 +31,20 @@ FEWEST_SAMPLES = 5
 """Samples of a record that has spectra: with rest before them, second differences leave four."""
 
 
-def velocities(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+def find_velocities(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Times half-way between samples and velocity [m/s] there, (k - 1,) each, of an even series of
     displacements (k,) [m]."""
     return (time[1:] + time[:-1]) / 2, np.diff(values) / _interval(time)
 
 
-def accelerations(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+def find_accelerations(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Times and acceleration [m/s2], (k - 2,) each, of an even series of displacements (k,) [m]."""
     return time[1:-1], np.diff(values, 2) / _interval(time) ** 2
 
 
-def acceleration_spectrum(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+def find_acceleration_spectrum(
+    time: FloatArray, values: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Frequencies [Hz] and smoothed linear spectrum [m/s] of the acceleration of a point that is
     displaced by ``values`` [m] from rest; up to `HIGHEST`.
 
@@ -52,18 +54,20 @@ def acceleration_spectrum(time: FloatArray, values: FloatArray) -> tuple[FloatAr
     """
     begin = time[0] - _interval(time)
     rested = np.concatenate([[begin], time]), np.concatenate([values[:1], values])
-    frequency, spectrum = fourier_spectrum(*accelerations(*rested))
+    frequency, spectrum = transform_record(*find_accelerations(*rested))
     size = np.abs(spectrum) / np.sinc(frequency * _interval(time)) ** 2
     seen = frequency <= HIGHEST
-    return frequency[seen], parzen_smoothed(frequency, size, BANDWIDTH)[seen]
+    return frequency[seen], smooth_spectrum(frequency, size, BANDWIDTH)[seen]
 
 
-def mobility(time: FloatArray, values: FloatArray, load: Series) -> tuple[FloatArray, FloatArray]:
+def find_grain_mobility(
+    time: FloatArray, values: FloatArray, load: Series
+) -> tuple[FloatArray, FloatArray]:
     """Frequencies [Hz] and |V|/|F| [m/(s N)] of a grain displaced by ``values`` [m] under a load
     (k, 3) [N] (Fig. 12), smoothed as spectra are; nan where the load is silent."""
-    when, velocity = velocities(time, values)
+    when, velocity = find_velocities(time, values)
     force = average_between(time, load.times, load.values[:, 2])
-    frequency, ratio = frequency_response(when, force, velocity, BANDWIDTH)
+    frequency, ratio = find_mobility(when, force, velocity, BANDWIDTH)
     seen = frequency <= HIGHEST
     return frequency[seen], ratio[seen]
 
@@ -82,7 +86,7 @@ def _interval(time: FloatArray) -> float:
     return float(time[-1] - time[0]) / (len(time) - 1)
 
 
-def peaks_of(frequency: FloatArray, size: FloatArray, count: int = 5) -> list[float]:
+def find_peaks(frequency: FloatArray, size: FloatArray, count: int = 5) -> list[float]:
     """Frequencies of the greatest local peaks of a smooth spectrum [Hz], by height."""
     inner = size[1:-1]
     at = 1 + np.flatnonzero((inner > size[:-2]) & (inner >= size[2:]))
@@ -107,11 +111,11 @@ def list_track_facts(path: Path, load: Series) -> dict[str, Any]:
         if len(time) < FEWEST_SAMPLES:
             continue
         if name != "sleeper":
-            _, acceleration = accelerations(time, up)
+            _, acceleration = find_accelerations(time, up)
             facts[name]["acceleration_greatest"] = float(np.abs(acceleration).max())
-            facts[name]["peaks"] = peaks_of(*acceleration_spectrum(time, up))
+            facts[name]["peaks"] = find_peaks(*find_acceleration_spectrum(time, up))
         if name in GRAINS:
-            facts[name]["mobility_peaks"] = peaks_of(*mobility(time, up, load))
+            facts[name]["mobility_peaks"] = find_peaks(*find_grain_mobility(time, up, load))
     return facts
 
 
@@ -135,12 +139,14 @@ def draw_track_pictures(path: Path, load: Series) -> Iterator[tuple[Path, str]]:
     if len(time) < FEWEST_SAMPLES:
         return
     target = path / "picture-track-acceleration.png"
-    curves = {s: accelerations(time, moved[f"{s} z"]) for s in SENSORS}
+    curves = {s: find_accelerations(time, moved[f"{s} z"]) for s in SENSORS}
     pictures.draw_history(target, curves, quantity="acceleration", unit="m/s²")
     yield target, "Vertical acceleration of the sleeper, sampled at the output's rate (Fig. 9a)."
-    smooth = smoothing(time)
-    spectra = {name: acceleration_spectrum(time, moved[f"{name} z"]) for name in SENSORS + GRAINS}
-    mobilities = {g: mobility(time, moved[f"{g} z"], load) for g in GRAINS}
+    smooth = describe_smoothing(time)
+    spectra = {
+        name: find_acceleration_spectrum(time, moved[f"{name} z"]) for name in SENSORS + GRAINS
+    }
+    mobilities = {g: find_grain_mobility(time, moved[f"{g} z"], load) for g in GRAINS}
     for name, curves, quantity, unit, caption in (
         ("spectra", {s: spectra[s] for s in SENSORS}, "spectrum", "m/s",
          f"Linear spectra of these, {smooth} (Figs. 9b, 10)."),
@@ -157,7 +163,7 @@ def draw_track_pictures(path: Path, load: Series) -> Iterator[tuple[Path, str]]:
         yield target, caption
 
 
-def smoothing(time: FloatArray) -> str:
+def describe_smoothing(time: FloatArray) -> str:
     """How spectra of a record at these times [s] are smoothed, in words."""
     apart = 1 / (time[-1] - time[0])
     if apart > BANDWIDTH:

@@ -1,7 +1,7 @@
 """A scene run from its file: build, march, report, advice."""
 
-from qdem_fem.scene.advise import Advice, advise, error_together
-from qdem_fem.scene.build import simulation_of
+from qdem_fem.scene.advise import Advice, advise, predict_error
+from qdem_fem.scene.build import make_simulation
 from qdem_fem.scene.checks import load_scene
 from qdem_fem.scene.page import write_report
 from qdem_fem.scene.run import RunFolder, make_plan, run_dynamic, run_static
@@ -9,11 +9,22 @@ from qdem_fem.scene.summary import (
     describe_critical_step,
     list_body_facts,
     list_mass_scaling_facts,
-    summary_of,
+    summarise_run,
 )
 
 __all__ = [
-    "Advice", "RunFolder", "advise", "describe_critical_step", "error_together", "list_body_facts",
-    "list_mass_scaling_facts", "load_scene", "make_plan", "run_dynamic", "run_static",
-    "simulation_of", "summary_of", "write_report",
+    "Advice",
+    "RunFolder",
+    "advise",
+    "describe_critical_step",
+    "list_body_facts",
+    "list_mass_scaling_facts",
+    "load_scene",
+    "make_plan",
+    "make_simulation",
+    "predict_error",
+    "run_dynamic",
+    "run_static",
+    "summarise_run",
+    "write_report",
 ]  # fmt: skip

@@ -2,7 +2,7 @@
 
 A body that touches others through springs of stiffness k is, to them, a spring more in the row.
 A force f at one of its surface vertices, balanced by the inertia of the body as a whole, moves the
-vertex by ``C f`` more than the rigid body would (inertia relief, `compliance_of`): a contact then
+vertex by ``C f`` more than the rigid body would (inertia relief, `find_compliance`): a contact then
 has the compliance ``1/k + C``, and the rigid body leaves
 
     e = k C/(1 + k C)
@@ -15,7 +15,7 @@ about one over the double transit time ``2 L/c``, answers a load of frequency f 
 ``1/(1 - (f/f1)^2)`` of its static share, a load that comes at once with twice.  A load whose
 frequency is above f1/2 is too fast for any rigid body.
 
-Errors of two bodies in one contact add: `error_together`.  The estimate says nothing of where many
+Errors of two bodies in one contact add: `predict_error`.  The estimate says nothing of where many
 contacts slip or open, which may be sensitive to any change, nor of the vibration within a body.
 """
 
@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 
 from qdem_fem.bodies import Body, NodalLoad, make_cross_matrix
 from qdem_fem.files import ConditionError, Series
-from qdem_fem.mesh import lumped_mass
+from qdem_fem.mesh import lump_mass
 from qdem_fem.rigid import find_hold
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ class Advice:
     elements: int
 
 
-def stiffness_matrix(body: Body) -> Any:
+def assemble_stiffness(body: Body) -> Any:
     """K of linear elasticity [N/m], sparse (3 v, 3 v), of the v nodes of elements, in order."""
     import skfem
     from skfem.models.elasticity import linear_elasticity
@@ -95,7 +95,7 @@ def stiffness_matrix(body: Body) -> Any:
     return linear_elasticity(first, second).assemble(basis).tocsc()[at][:, at]
 
 
-def compliance_of(body: Body) -> BodyCompliance:
+def find_compliance(body: Body) -> BodyCompliance:
     """Compliance, lowest frequency and transit time of a free body.
 
     With rigid motions R and lumped masses M, ``P = 1 - M R (R^T M R)^-1 R^T`` takes the resultant
@@ -105,10 +105,10 @@ def compliance_of(body: Body) -> BodyCompliance:
     from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
     used = np.unique(body.elements)
-    stiffness = stiffness_matrix(body)
+    stiffness = assemble_stiffness(body)
     arm = body.nodes[used] - body.rigid_mass.centre
     density, volume = np.asarray(body.material.density), body.gradients[1]
-    weight = np.repeat(lumped_mass(body.elements, volume, density, len(body.nodes))[used], 3)
+    weight = np.repeat(lump_mass(body.elements, volume, density, len(body.nodes))[used], 3)
     motion = np.concatenate([np.tile(np.eye(3), (len(arm), 1, 1)), -make_cross_matrix(arm)], axis=2)
     motion = motion.reshape(-1, 6)
     resultant = np.linalg.inv(motion.T @ (weight[:, None] * motion))
@@ -157,7 +157,7 @@ def _vertices_sampled(arm: Floats, vertices: Integers) -> Integers:
     return np.unique(np.concatenate([order[:VERTICES_TRIED], evenly]))
 
 
-def contact_stiffness(run: Simulation) -> list[float]:
+def find_contact_stiffness(run: Simulation) -> list[float]:
     """Stiffness k of the stiffest contact of one vertex of each body [N/m]; 0 without contact.
 
     To a wall it is twice that of a pair, as a mirror makes it.
@@ -169,7 +169,7 @@ def contact_stiffness(run: Simulation) -> list[float]:
     return [float(k) for k in factor * np.maximum.reduceat(run.contacts.one, starts)]
 
 
-def load_frequency(loads: Sequence[NodalLoad]) -> float:
+def find_load_frequency(loads: Sequence[NodalLoad]) -> float:
     """Frequency of the fastest load [Hz]: greatest slope over 2 pi times the greatest value.
 
     Infinite for a load that a function gives, which is not looked into.  A constant has none.
@@ -191,16 +191,16 @@ def load_frequency(loads: Sequence[NodalLoad]) -> float:
 
 def advise(run: Simulation, tolerance: float = 0.01) -> list[Advice]:
     """What may be rigid in a simulation of deformable bodies; ``tolerance`` on e [-]."""
-    stiffness = contact_stiffness(run)
+    stiffness = find_contact_stiffness(run)
     _, held = run.pack_lists()
     node = run.assembly.packed.node_order[held.node_at // 4]
     found: list[Advice] = []
     for number, body in enumerate(run.bodies):
         start, stop = run.first_node[number : number + 2]
-        own = compliance_of(body)
+        own = find_compliance(body)
         mine = (node >= start) & (node < stop)
         loads = [c for c in run.conditions.loads if ((c.nodes >= start) & (c.nodes < stop)).any()]
-        frequency = load_frequency(loads)
+        frequency = find_load_frequency(loads)
         sudden = 2.0 if any(load.driver.varying is None for load in loads) else 1.0
         share = stiffness[number] * own.vertex
         slow = 1 - min((frequency / own.frequency) ** 2, 1.0)
@@ -244,7 +244,7 @@ def _why(
     return ""
 
 
-def error_together(advice: Sequence[Advice]) -> float:
+def predict_error(advice: Sequence[Advice]) -> float:
     """Predicted error where all that may be rigid are [-]: the two greatest meet in a contact."""
     errors = sorted((one.error for one in advice if one.rigid), reverse=True)
     return min(1.0, sum(errors[:2]))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from qdem_fem.files import ConditionError, QdemError, Series
-from qdem_fem.tables import BodyTable, contact_of
+from qdem_fem.tables import BodyTable, choose_contact
 from trackbed.scene_files import Problem, describe_error
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from qdem_fem.tables import Prepared
 
 
-def simulation_of(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
+def make_simulation(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
     """The `qdem_fem.Simulation` of a scene and its bodies by name.
 
     In a static scene each series gives its last value.  Raises `SceneError` with every condition
@@ -50,7 +50,7 @@ def simulation_of(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
         threads=table.threads,
         device=table.device,
         mass_scaling=table.mass_scaling,
-        contact=contact_of(scene.contact),
+        contact=choose_contact(scene.contact),
     )
     problems = []
     for step in prepared.conditions:

@@ -26,15 +26,15 @@ from qdem_fem.tables import (
     SimulationTable,
     Step,
     WrongKey,
-    contact_faults,
+    find_contact_faults,
     find_named_nodes,
     find_output_faults,
     list_named_files,
     list_tables,
     make_body_mesh,
+    make_series,
+    make_unit_vector,
     read_tables,
-    series_of,
-    unit_vector,
 )
 from trackbed.scene_files import Problem, SceneText, describe_error, suggest_word
 
@@ -52,9 +52,9 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Prepared:
     """
     text = read_tables(path, overrides, choose_model)
     if "track" in text.data:
-        from qdem_fem.track import track_load
+        from qdem_fem.track import check_track_scene
 
-        return track_load(text)
+        return check_track_scene(text)
     problems = list(text.problems)
     folder = text.path.parent
     meshes, found = _meshes(text, folder)
@@ -78,7 +78,7 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Prepared:
     problems += find_output_faults(text)
     problems += find_motion_faults(text)
     for _, contact in list_tables(text, ContactTable):
-        faults = contact_faults(contact, text.tables.get("simulation"), names)
+        faults = find_contact_faults(contact, text.tables.get("simulation"), names)
         problems += [Problem(*fault) for fault in faults]
     text.refuse(problems)
     scene = Scene.model_validate(text.data)
@@ -159,9 +159,9 @@ def _condition(
             if isinstance(value, Nodes):
                 value = None if mesh is None else find_named_nodes(value, mesh, where)
             elif name == "normal":
-                value = unit_vector(value, where)
+                value = make_unit_vector(value, where)
             elif name in ("force", "pressure", "value"):
-                value = series_of(value, where, folder, vector=name == "force")
+                value = make_series(value, where, folder, vector=name == "force")
         except WrongKey as wrong:
             found.append(wrong.problem)
         if name != "body":

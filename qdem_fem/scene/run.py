@@ -65,12 +65,12 @@ class Plan:
     every_field: bool
     """Whether fields are written on the way, or only at the end."""
 
-    def next_stop(self, done: int) -> int:
+    def find_next_stop(self, done: int) -> int:
         """Steps at which the computation comes back next."""
         strides = [self.chunk, self.energy, *([self.fields] if self.every_field else [])]
         return min(self.total, *(done - done % stride + stride for stride in strides))
 
-    def field_files(self, done: int) -> list[tuple[int, float, str]]:
+    def list_field_files(self, done: int) -> list[tuple[int, float, str]]:
         """Step, time [s] and name of all VTU files of a run that has done so many steps."""
         steps = list(range(0, done + 1, self.fields)) if self.every_field else []
         if done == self.total and self.total not in steps:
@@ -125,7 +125,8 @@ def run_dynamic(
 ) -> Done:
     """Advance a scene to its duration, from its start or from the last checkpoint.
 
-    ``run`` and ``bodies`` are those of `simulation_of`, ``progress`` a `qdem_fem.cli.run.Progress`.
+    ``run`` and ``bodies`` are those of `make_simulation`, ``progress`` is a
+    `qdem_fem.cli.run.Progress`.
     Every row and field is the same, bit by bit, however often the run was interrupted.  SIGINT
     and SIGTERM save the state and raise `Interrupted`.
     """
@@ -144,7 +145,7 @@ def run_dynamic(
     saved = time.monotonic()
     with note_signals() as stop:
         while run.steps_done < plan.total:
-            record.advance(plan.next_stop(run.steps_done) - run.steps_done)
+            record.advance(plan.find_next_stop(run.steps_done) - run.steps_done)
             progress.at(run.steps_done, plan.total, run.time)
             late = time.monotonic() - saved >= prepared.scene.output.checkpoint_interval
             if stop.name or late or run.steps_done == plan.total:
@@ -191,7 +192,7 @@ class _Record:
         self.audit, self.account = audit, EnergyAccount()
         names = [f"{name}_{axis}" for name in probes for axis in "xyz"]
         self.rows = Table(path / "probes.csv", ["time", *names])
-        self.energies = Table(path / "energy.csv", ["time", *energy_names(self.run)])
+        self.energies = Table(path / "energy.csv", ["time", *list_energies(self.run)])
 
     def begin(self) -> None:
         """First rows and fields, at t = 0."""
@@ -210,7 +211,7 @@ class _Record:
         at_end = done == plan.total and done % plan.energy > 0
         self.energies.cut(now, done // plan.energy + 1 + at_end)
         self.account.take(read_table(self.energies.path))
-        kept = {name for _, _, name in self.plan.field_files(self.run.steps_done)}
+        kept = {name for _, _, name in self.plan.list_field_files(self.run.steps_done)}
         for path in self.path.glob("fields_*.vtu"):
             if path.name not in kept:
                 path.unlink()
@@ -229,17 +230,17 @@ class _Record:
         self.rows.append(np.column_stack([number * plan.step, *columns]))
         if run.steps_done % plan.energy == 0 or run.steps_done == plan.total:
             self.take_energy(run.steps_done * plan.step)
-            self.audit_hold()
+            self.check_audit()
         self.write_fields()
 
     def take_energy(self, when: float) -> None:
         """A row of energies at a time [s], into its file and the account."""
-        energy, names = self.run.energy(), energy_names(self.run)
+        energy, names = self.run.energy(), list_energies(self.run)
         row = np.array([[when, *(float(getattr(energy, name)) for name in names)]])
         self.energies.append(row)
         self.account.take(dict(zip(names, row[:, 1:].T, strict=True)))
 
-    def audit_hold(self) -> None:
+    def check_audit(self) -> None:
         """Raise `EnergyLost` where the account of energies so far does not close."""
         missing = self.account.relative
         if self.audit is not None and missing > self.audit:
@@ -253,7 +254,7 @@ class _Record:
 
     def write_fields(self) -> None:
         """Write the VTU file that is due now, and the list of all."""
-        files = self.plan.field_files(self.run.steps_done)
+        files = self.plan.list_field_files(self.run.steps_done)
         if files and files[-1][0] == self.run.steps_done:
             write_bodies_vtu(self.path / files[-1][2], list(self.done.bodies.values()))
             write_pvd(self.path / "fields.pvd", [(when, name) for _, when, name in files])
@@ -266,7 +267,7 @@ class _Record:
         write_whole(self.path / COST, json.dumps(self.done.cost) + "\n")
 
 
-def energy_names(run: Any) -> tuple[str, ...]:
+def list_energies(run: Any) -> tuple[str, ...]:
     """Columns of energy.csv beside the time; of what the scene has and counts."""
     touching = () if run.contact is None else CONTACT_ENERGIES
     return ENERGIES + touching + VISCOUS_ENERGY * run.viscous

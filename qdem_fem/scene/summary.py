@@ -22,7 +22,7 @@ FREE_SAMPLES = 50
 """Least number of samples of free motion in which modes are sought."""
 
 
-def summary_of(prepared: Prepared, done: Done, folder: RunFolder) -> dict[str, Any]:
+def summarise_run(prepared: Prepared, done: Done, folder: RunFolder) -> dict[str, Any]:
     """All figures of a finished run; SI units, ready for JSON."""
     run, cost = done.run, done.cost
     static = done.plan is None
@@ -53,10 +53,10 @@ def summary_of(prepared: Prepared, done: Done, folder: RunFolder) -> dict[str, A
         },
         "modes": {
             label: [vars(mode) for mode in modes]
-            for label, modes in modes_of(prepared, rows).items()
+            for label, modes in find_modes(prepared, rows).items()
         },
         "static": done.static,
-        "left_out": prepared.scene.left_out(),
+        "left_out": prepared.scene.list_left_out(),
     }
 
 
@@ -79,18 +79,18 @@ def list_mass_scaling_facts(run: Any) -> dict[str, float]:
     """Mass that scaling added [kg], and its share of the bodies' own; empty without scaling."""
     if run.mass_scaling is None:
         return {}
-    own = {body.name: body_facts(body)["mass"] for body in run.bodies}
+    own = {body.name: describe_body(body)["mass"] for body in run.bodies}
     added = sum(own[name] * share for name, share in run.added_mass.items())
     return {"added_mass": float(added), "share": float(added / sum(own.values()))}
 
 
 def list_body_facts(bodies: dict[str, Any]) -> dict[str, Any]:
-    """`body_facts` by name; of bodies that are named alike but for a number behind a dash, one
+    """`describe_body` by name; of bodies that are named alike but for a number behind a dash, one
     entry: sums, and the smallest altitude."""
     kinds: dict[str, dict[str, dict[str, Any]]] = {}
     for name, body in bodies.items():
         stem, _, number = name.rpartition("-")
-        kinds.setdefault(stem if number.isdecimal() else name, {})[name] = body_facts(body)
+        kinds.setdefault(stem if number.isdecimal() else name, {})[name] = describe_body(body)
     found: dict[str, Any] = {}
     for kind, by_name in kinds.items():
         if len(by_name) == 1:
@@ -104,12 +104,12 @@ def list_body_facts(bodies: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-def body_facts(body: Any) -> dict[str, Any]:
+def describe_body(body: Any) -> dict[str, Any]:
     """Figures of a body's mesh: counts, what was mended, smallest altitude [m], mass [kg]."""
-    from qdem_fem.mesh import altitudes
+    from qdem_fem.mesh import find_altitudes
 
     gradients, volumes = body.gradients
-    altitude = altitudes(gradients)
+    altitude = find_altitudes(gradients)
     thinnest = int(np.argmin(altitude))
     return {
         "nodes": len(body.nodes),
@@ -131,7 +131,7 @@ def find_moving_components(rows: dict[str, FloatArray]) -> list[str]:
     return [name for name, extent in ranges.items() if extent > least]
 
 
-def free_from(prepared: Prepared) -> float:
+def find_free_start(prepared: Prepared) -> float:
     """Time [s] from which no load, pressure or prescribed displacement changes any more."""
     series = [
         value
@@ -142,10 +142,10 @@ def free_from(prepared: Prepared) -> float:
     return max((float(one.times[-1]) for one in series), default=0.0)
 
 
-def modes_of(prepared: Prepared, rows: dict[str, FloatArray]) -> dict[str, list[Mode]]:
+def find_modes(prepared: Prepared, rows: dict[str, FloatArray]) -> dict[str, list[Mode]]:
     """Modes in the free motion of each probe's strongest component, by column name."""
     count = prepared.scene.output.modes
-    free = rows["time"] >= free_from(prepared)
+    free = rows["time"] >= find_free_start(prepared)
     found: dict[str, list[Mode]] = {}
     if not count or free.sum() < FREE_SAMPLES:
         return found

@@ -1,6 +1,6 @@
 """The tables of a scene file, and what is checked of them."""
 
-from qdem_fem.tables.contact import ContactTable, PeriodicTable, contact_faults, contact_of
+from qdem_fem.tables.contact import ContactTable, PeriodicTable, choose_contact, find_contact_faults
 from qdem_fem.tables.keys import (
     BodyTable,
     Condition,
@@ -14,7 +14,7 @@ from qdem_fem.tables.keys import (
     SeriesTable,
     SimulationTable,
 )
-from qdem_fem.tables.nodes import find_named_nodes, make_body_mesh, unit_vector
+from qdem_fem.tables.nodes import find_named_nodes, make_body_mesh, make_unit_vector
 from qdem_fem.tables.prepared import (
     Prepared,
     Step,
@@ -23,13 +23,36 @@ from qdem_fem.tables.prepared import (
     list_tables,
     read_tables,
 )
-from qdem_fem.tables.series import series_of
+from qdem_fem.tables.series import make_series
 from qdem_fem.tables.types import Cells, Share, WrongKey
 
 __all__ = [
-    "BodyTable", "Cells", "Condition", "ContactTable", "MaterialTable", "Mesh", "Nodes", "Output",
-    "Periodic", "PeriodicTable", "Prepared", "Probe", "Scene", "SeriesTable", "Share",
-    "SimulationTable", "Step", "WrongKey", "contact_faults", "contact_of", "find_named_nodes",
-    "find_output_faults", "list_named_files", "list_tables", "make_body_mesh", "read_tables",
-    "series_of", "unit_vector",
+    "BodyTable",
+    "Cells",
+    "Condition",
+    "ContactTable",
+    "MaterialTable",
+    "Mesh",
+    "Nodes",
+    "Output",
+    "Periodic",
+    "PeriodicTable",
+    "Prepared",
+    "Probe",
+    "Scene",
+    "SeriesTable",
+    "Share",
+    "SimulationTable",
+    "Step",
+    "WrongKey",
+    "choose_contact",
+    "find_contact_faults",
+    "find_named_nodes",
+    "find_output_faults",
+    "list_named_files",
+    "list_tables",
+    "make_body_mesh",
+    "make_series",
+    "make_unit_vector",
+    "read_tables",
 ]  # fmt: skip

@@ -71,7 +71,7 @@ NEEDED = {"spheres": ("radius", "normal_stiffness"), "surface": ("modulus",)}
 OPTIONS = {"spheres": ("skin", "contacts"), "surface": ("points", "depth", "contacts")}
 
 
-def contact_of(table: ContactTable | None) -> Contact | None:
+def choose_contact(table: ContactTable | None) -> Contact | None:
     """The contact that a scene asks for."""
     if table is None:
         return None
@@ -84,7 +84,7 @@ def contact_of(table: ContactTable | None) -> Contact | None:
     return made(friction=table.friction, planes=planes, **given)
 
 
-def contact_faults(
+def find_contact_faults(
     table: ContactTable, simulation: Any, names: Sequence[str]
 ) -> Iterator[tuple[str, str]]:
     """Key and sentence of what does not fit the rest of the scene.

@@ -270,7 +270,7 @@ class Scene(Table):
         default = None if self.contact is None else AUDIT
         return default if self.output.audit is None else self.output.audit
 
-    def left_out(self) -> list[str]:
+    def list_left_out(self) -> list[str]:
         """Physics that is not in this run, because the scene does not name it."""
         viscous = any(
             _is_viscous(body.material) or any(map(_is_viscous, body.regions.values()))

@@ -43,7 +43,7 @@ def make_body_mesh(table: Mesh, folder: Path, key: str) -> TetMesh:
     return read_mesh(make_box_mesh(*dict(table.box).values()))
 
 
-def node_sets(mesh: TetMesh) -> dict[str, IntArray]:
+def list_node_sets(mesh: TetMesh) -> dict[str, IntArray]:
     """The mesh's own node sets, and x-min ... z-max where it has none of these names."""
     used = np.ones(len(mesh.nodes), bool)
     used[mesh.unused] = False
@@ -71,7 +71,7 @@ def find_named_nodes(nodes: Nodes, mesh: TetMesh, key: str) -> IntArray:
     used = np.ones(len(x), bool)
     used[mesh.unused] = False
     if nodes.set is not None:
-        sets = node_sets(mesh)
+        sets = list_node_sets(mesh)
         if nodes.set not in sets:
             near = suggest_word(nodes.set, sets)
             known = f" (sets of this mesh: {', '.join(sorted(sets)[:20])})"
@@ -85,7 +85,7 @@ def find_named_nodes(nodes: Nodes, mesh: TetMesh, key: str) -> IntArray:
             raise WrongKey(f"{key}.box", "min must not be above max")
         chosen = np.asarray(((x >= low) & (x <= high)).all(axis=1), bool)
     elif nodes.plane is not None:
-        normal = unit_vector(nodes.plane.normal, f"{key}.plane.normal")
+        normal = make_unit_vector(nodes.plane.normal, f"{key}.plane.normal")
         height = (x - np.array(nodes.plane.point)) @ normal
         chosen = (height >= -nodes.plane.tolerance) & (height <= nodes.plane.tolerance)
     elif nodes.nearest is not None:
@@ -103,7 +103,7 @@ def find_named_nodes(nodes: Nodes, mesh: TetMesh, key: str) -> IntArray:
     return found
 
 
-def unit_vector(vector: tuple[float, float, float], key: str) -> FloatArray:
+def make_unit_vector(vector: tuple[float, float, float], key: str) -> FloatArray:
     """The vector over its length; raises `WrongKey` for zero."""
     length = float(np.linalg.norm(vector))
     if length == 0:

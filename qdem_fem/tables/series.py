@@ -16,7 +16,7 @@ WAYS = {"ramp": ("ramp", "value"), "times": ("times", "values"), "csv": ("csv", 
 """First key of each way to give a series, and the keys that it needs."""
 
 
-def series_of(
+def make_series(
     table: SeriesTable | float | tuple[float, ...], key: str, folder: Path, *, vector: bool
 ) -> Series:
     """The series that a scene gives at ``key``; a relative CSV path counts from ``folder``.

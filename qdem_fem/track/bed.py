@@ -43,7 +43,7 @@ from qdem_fem.files import CheckpointError, NotConverged
 from qdem_fem.grains import GrainSet
 from qdem_fem.march import Damping, Rest, find_rest, read_checkpoint, write_checkpoint
 from qdem_fem.track.bodies import GAP, place_grain_nodes
-from qdem_fem.track.recipe import SLEEPER, BedRecipe, grains_of, make_bed_bodies
+from qdem_fem.track.recipe import SLEEPER, BedRecipe, make_bed_bodies, make_bed_grains
 from trackbed.run_files import write_whole
 
 if TYPE_CHECKING:
@@ -102,20 +102,24 @@ def prepare_bed(
     equilibrium, `MeshError` where grains have no room below or beside the sleeper.
     """
     bed = read_bed(path, recipe) if path.exists() else None
-    grains = grains_of(recipe)
+    grains = make_bed_grains(recipe)
     if bed is None:  # refused before grains fall for hours
-        recipe.layout.grains_beside(place_grain_nodes(grains)[recipe.below :], 0.0, recipe.seed + 1)
+        recipe.layout.place_grains_beside(
+            place_grain_nodes(grains)[recipe.below :], 0.0, recipe.seed + 1
+        )
     for number, stage in enumerate(STAGES):
         if bed is not None and STAGES.index(bed.stage) >= number:
             continue
-        bed = run_stage(recipe, grains, stage, bed, threads, progress, part_of(path, stage))
+        bed = run_stage(
+            recipe, grains, stage, bed, threads, progress, place_stage_part(path, stage)
+        )
         write_bed(path, recipe, bed)
-        part_of(path, stage).unlink(missing_ok=True)
+        place_stage_part(path, stage).unlink(missing_ok=True)
     assert bed is not None
     return bed
 
 
-def part_of(path: Path, stage: str) -> Path:
+def place_stage_part(path: Path, stage: str) -> Path:
     """Where a stage of the bed in ``path`` is saved: a kill may leave that of one that is done."""
     return path.with_suffix(f".{stage.replace(' ', '-').replace('/', '-of-')}.part.npz")
 
@@ -227,14 +231,14 @@ def begin_nodes(
     """Where the bodies of a stage begin [m]."""
     layout, loose = recipe.layout, place_grain_nodes(grains)
     if before is None:
-        return layout.grains_below(loose[: recipe.below], recipe.seed)
+        return layout.place_grains_below(loose[: recipe.below], recipe.seed)
     if stage != "crib":
         return before.positions
     below, radius = before.positions, recipe.radius
     every = np.concatenate(below)
     bottom = float(every[layout.under(every), 2].max()) + 2 * radius + GAP
     top = float(every[:, 2].max()) + radius + GAP
-    beside = layout.grains_beside(loose[recipe.below :], top, recipe.seed + 1)
+    beside = layout.place_grains_beside(loose[recipe.below :], top, recipe.seed + 1)
     return [*below, *beside, layout.sleeper(bottom).nodes]
 
 

@@ -16,7 +16,7 @@ from qdem_fem.track.loads import (
     Train,
     WheelFlat,
     find_flat_forces,
-    seat_share,
+    find_seat_share,
 )
 
 RISE = 0.01
@@ -37,7 +37,7 @@ def make_bogie_series(
     record would hold it.
     """
     axles = train.axles[:2]
-    end = passing_time(train, lead)
+    end = find_passing_time(train, lead)
     if lead < RISE * train.speed:
         raise ConditionError(
             f"from {lead:g} m before the sleeper it is there before its load has grown, within "
@@ -52,19 +52,19 @@ def make_bogie_series(
         )
     time = np.arange(int(np.ceil((end + rest) * rate)) + 1) / rate
     front = train.speed * time - lead
-    of_wheels = sum(seat_share(front - axle, track) for axle in axles)
+    of_wheels = sum(find_seat_share(front - axle, track) for axle in axles)
     ramp = np.clip(np.minimum(time, end - time) / RISE, 0.0, 1.0)
     force = train.first_share * train.axle_load * of_wheels
     if flats:
         force += find_flat_forces(front, axles, train.speed, track, flats)
-    return Series(time, down(share * force * (1 - np.cos(np.pi * ramp)) / 2))
+    return Series(time, point_down(share * force * (1 - np.cos(np.pi * ramp)) / 2))
 
 
-def passing_time(train: Train, lead: float) -> float:
+def find_passing_time(train: Train, lead: float) -> float:
     """From the front axle ``lead`` [m] before the sleeper to the rear one as far behind it [s]."""
     return float(2 * lead + train.axles[1]) / train.speed
 
 
-def down(size: FloatArray) -> FloatArray:
+def point_down(size: FloatArray) -> FloatArray:
     """Forces of these sizes (k,) [N] along -z, (k, 3)."""
     return np.outer(size, [0.0, 0.0, -1.0])

@@ -1,6 +1,6 @@
 """Scenes with a table ``[track]``: ballast and a sleeper, or part of it, in place of ``[[body]]``.
 
-``track-small.toml`` explains every key.  `track_load` checks such a scene; `enter_track`
+``track-small.toml`` explains every key.  `check_track_scene` checks such a scene; `enter_track`
 prepares the bed, or takes it from its file, and gives the simulation that begins there.
 """
 
@@ -29,15 +29,15 @@ from qdem_fem.tables import (
     Scene,
     Step,
     WrongKey,
-    contact_faults,
+    find_contact_faults,
     find_output_faults,
     list_named_files,
 )
 from qdem_fem.track.bed import Bed, list_stages_ahead, prepare_bed
 from qdem_fem.track.bodies import TrackBox
-from qdem_fem.track.recipe import SLEEPER, BedRecipe, names_of
+from qdem_fem.track.recipe import SLEEPER, BedRecipe, name_bodies
 from qdem_fem.track.sleeper_mesh import SleeperShape
-from qdem_fem.track.table import TrackTable, loads_of, track_faults
+from qdem_fem.track.table import TrackTable, find_track_faults, make_seat_loads
 from trackbed.scene_files import Problem, SceneText, describe_error
 
 BELOW = 0.1
@@ -51,12 +51,14 @@ class TrackScene(Scene):
     body: Annotated[tuple[BodyTable, ...], Field(strict=False)] = ()
     track: TrackTable
 
-    def left_out(self) -> list[str]:
+    def list_left_out(self) -> list[str]:
         """Physics that is not in this run."""
         track = self.track
         viscous = any(m.shear_viscosity or m.bulk_viscosity for m in (track.ballast, track.sleeper))
         elastic = ["viscosity: the materials are elastic"] * (not viscous)
-        missing = [text for text in super().left_out() if not text.startswith(("viscosity", "any"))]
+        missing = [
+            text for text in super().list_left_out() if not text.startswith(("viscosity", "any"))
+        ]
         missing += ["deformation of grains, said to be rigid"] * bool(track.rigid)
         missing += ["rail, pads and all other sleepers: a force acts on the rail seat"]
         duration = self.simulation.duration or 0.0
@@ -83,14 +85,14 @@ class TrackPrepared(Prepared):
         return self.loads[0]
 
 
-def track_load(text: SceneText) -> TrackPrepared:
+def check_track_scene(text: SceneText) -> TrackPrepared:
     """Check a scene with ``[track]``; raises `SceneError` with all that is wrong."""
     problems = list(text.problems) + list(_faults(text))
     loads: tuple[Series, ...] = ()
     track = text.tables.get("track")
     if isinstance(track, TrackTable):
         try:
-            loads = loads_of(track, text.path.parent)
+            loads = make_seat_loads(track, text.path.parent)
         except WrongKey as wrong:
             problems.append(wrong.problem)
         except ConditionError as error:
@@ -117,12 +119,12 @@ def _faults(text: SceneText) -> Iterator[Problem]:
         if name in text.data:
             yield Problem(name, "[track] makes the bodies and their conditions")
     if isinstance(track, TrackTable):
-        yield from track_faults(track)
+        yield from find_track_faults(track)
     if contact is None and "contact" not in text.data:
         yield Problem("contact", "missing: a track needs it")
     if isinstance(contact, ContactTable):
         names = ("ballast", SLEEPER)
-        for fault in contact_faults(contact, simulation, names):
+        for fault in find_contact_faults(contact, simulation, names):
             yield Problem(*fault)
         stiffness = contact.normal_stiffness
         if contact.model != "spheres" or contact.radius is None or contact.plane:
@@ -179,11 +181,11 @@ def make_bed_recipe(scene: TrackScene) -> BedRecipe:
     )  # fmt: skip
 
 
-def contact_of(prepared: TrackPrepared) -> SphereContact:
+def choose_contact(prepared: TrackPrepared) -> SphereContact:
     """Contact of the run: that of the bed, with the scene's own friction, skin and step."""
     table, recipe = prepared.scene.contact, prepared.recipe
     assert table is not None
-    every = recipe.contact(names_of(recipe.below + recipe.beside, sleeper=True))
+    every = recipe.contact(name_bodies(recipe.below + recipe.beside, sleeper=True))
     contacts = every.contacts if table.contacts is None else table.contacts
     return replace(every, friction=table.friction, skin=table.skin, contacts=contacts)
 
@@ -213,7 +215,7 @@ def enter_track(prepared: TrackPrepared) -> tuple[Any, dict[str, Any]]:
     assert isinstance(scene, TrackScene)
     table, track = scene.simulation, scene.track
     bed = prepare_bed(recipe, prepared.bed_file, table.threads, _Report())
-    contact = contact_of(prepared)
+    contact = choose_contact(prepared)
     stand = judge_bed(
         recipe, bed, prepared.bed_file, contact, track.stand, track.creep, table.threads,
         track.rigid,
@@ -230,11 +232,11 @@ def enter_track(prepared: TrackPrepared) -> tuple[Any, dict[str, Any]]:
         run.load(sleeper, seat, load)
     prepared.stand.update(asdict(stand), creep=stand.creep, words=stand.describe())
     prepared.meshes.update({name: body.mesh for name, body in bodies.items()})
-    prepared.probes.update(points_of(recipe, bed, bodies))
+    prepared.probes.update(find_watched_points(recipe, bed, bodies))
     return run, bodies
 
 
-def points_of(
+def find_watched_points(
     recipe: BedRecipe, bed: Bed, bodies: dict[str, Any]
 ) -> dict[str, tuple[str, IntArray]]:
     """Bodies and nodes that are watched: grains at B1 to B3, S1 to S3 on the sleeper, all of it.
@@ -253,7 +255,7 @@ def points_of(
         body = next(f"grain-{i}" for i in order if f"grain-{i}" != but)
         found[name] = (body, np.arange(len(bodies[body].nodes)))
 
-    for name, x in recipe.layout.watched().items():
+    for name, x in recipe.layout.list_watched().items():
         watch(name, np.array([x, 0.0, max(bottom - BELOW, bottom / 2)]))
     second = found["B2"][0]
     watch("B2a", centres[int(second.removeprefix("grain-"))], second)

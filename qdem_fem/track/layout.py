@@ -80,7 +80,7 @@ class TrackLayout:
         away = places[:, 1] - self.box.width / 2
         return np.asarray(away - self.box.width * np.round(away / self.box.width))
 
-    def grains_below(self, grains: Sequence[FloatArray], seed: int) -> list[FloatArray]:
+    def place_grains_below(self, grains: Sequence[FloatArray], seed: int) -> list[FloatArray]:
         """Loose grains on the ground, nodes of each [m]: as high as the flat top reaches, and from
         there lower by degrees to the foot."""
         if self.shoulder is None:
@@ -92,7 +92,7 @@ class TrackLayout:
 
         return make_loose_lattice(grains, [self._room(foot)], 0.0, self.radius, seed, share)
 
-    def grains_beside(
+    def place_grains_beside(
         self, grains: Sequence[FloatArray], bottom: float, seed: int
     ) -> list[FloatArray]:
         """Loose grains from a height [m] on, beside the sleeper and beyond its ends; nodes.
@@ -119,7 +119,7 @@ class TrackLayout:
         start, end = self.span
         return max(start - reach, 0.0), min(end + reach, self.box.length), 0.0, self.box.width
 
-    def watched(self) -> dict[str, float]:
+    def list_watched(self) -> dict[str, float]:
         """x of the grains that are watched [m]: B1 below S1, the end, B2 below the rail seat, B3
         below S3, the centre; of a slice at `SLICE_POINTS`."""
         if self.part == "slice":

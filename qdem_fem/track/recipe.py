@@ -106,7 +106,7 @@ class BedRecipe:
         return json.dumps(written, sort_keys=True, default=np.ndarray.tolist)
 
 
-def grains_of(recipe: BedRecipe) -> GrainSet:
+def make_bed_grains(recipe: BedRecipe) -> GrainSet:
     """The grains of a bed."""
     return _grains_made(recipe.below + recipe.beside, recipe.seed, recipe.sizes)
 
@@ -116,7 +116,7 @@ def _grains_made(count: int, seed: int, sizes: tuple[float, float]) -> GrainSet:
     return make_grains(count, seed, None, Grading(np.array(sizes), np.array([0.0, 1.0])))
 
 
-def names_of(count: int, sleeper: bool) -> list[str]:
+def name_bodies(count: int, sleeper: bool) -> list[str]:
     """Names of the bodies: ``grain-0`` and so on, and the sleeper."""
     return [f"grain-{number}" for number in range(count)] + [SLEEPER] * sleeper
 
@@ -127,7 +127,7 @@ def make_bed_bodies(
 ) -> dict[str, Body]:  # fmt: skip
     """Bodies by name: grains ``rigid`` or not, the sleeper as they are if nothing else is said."""
     sleeper = len(nodes) > recipe.below + recipe.beside
-    names = names_of(len(nodes) - sleeper, sleeper)
+    names = name_bodies(len(nodes) - sleeper, sleeper)
     other = rigid if sleeper_rigid is None else sleeper_rigid
     bodies = {}
     for number, (name, x) in enumerate(zip(names, nodes, strict=True)):

@@ -21,7 +21,7 @@ from qdem_fem.files import NotConverged, StepWarning
 from qdem_fem.march import Simulation
 from qdem_fem.mesh import FloatArray
 from qdem_fem.track.bed import Bed, enter_bed, guide_sleeper, write_bed
-from qdem_fem.track.recipe import SLEEPER, BedRecipe, grains_of, make_bed_bodies
+from qdem_fem.track.recipe import SLEEPER, BedRecipe, make_bed_bodies, make_bed_grains
 
 NEARLY = 0.99
 """Of Coulomb's limit, what counts as being there."""
@@ -63,7 +63,7 @@ class Stand:
         )
 
 
-def mobilised(run: Simulation, recipe: BedRecipe, friction: float) -> FloatArray:
+def find_friction_in_use(run: Simulation, recipe: BedRecipe, friction: float) -> FloatArray:
     """Friction in use ``|F_t|/(mu F_n)`` of each pair that touches [-], (p,).
 
     ``F_n`` is k_n times the overlap; what else there is of the force is across it.
@@ -88,7 +88,9 @@ def begin_bed(
     strain: no force is another.
     """
     nodes = [*bed.positions[:-1], bed.nodes[-1]] if rigid else bed.nodes
-    bodies = make_bed_bodies(recipe, grains_of(recipe), nodes, rigid=rigid, sleeper_rigid=False)
+    bodies = make_bed_bodies(
+        recipe, make_bed_grains(recipe), nodes, rigid=rigid, sleeper_rigid=False
+    )
     run = Simulation(list(bodies.values()), gravity=recipe.gravity, contact=contact, **options)
     guide_sleeper(run, bodies[SLEEPER], upright=False)
     enter_bed(run, bed)
@@ -101,7 +103,7 @@ def let_bed_stand(
 ) -> Stand:  # fmt: skip
     """Let a bed go without its load for ``time`` [s]; warnings of its step are left to the run."""
     run, bodies = begin_bed(recipe, bed, contact, rigid, threads=threads)
-    used = mobilised(run, recipe, contact.friction)
+    used = find_friction_in_use(run, recipe, contact.friction)
     before, energy = bodies[SLEEPER].displacement[:, 2].mean(), run.energy()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StepWarning)

@@ -13,8 +13,8 @@ from pydantic import Field
 
 from qdem_fem.bodies import Rigid
 from qdem_fem.files import Series
-from qdem_fem.tables import Cells, MaterialTable, SeriesTable, Share, series_of
-from qdem_fem.track.bogie import down, make_bogie_series, passing_time
+from qdem_fem.tables import Cells, MaterialTable, SeriesTable, Share, make_series
+from qdem_fem.track.bogie import find_passing_time, make_bogie_series, point_down
 from qdem_fem.track.layout import Part
 from qdem_fem.track.loads import Track, Train, WheelFlat
 from qdem_fem.track.sleeper_mesh import SleeperShape
@@ -58,7 +58,7 @@ class BogieTable(Table):
     @property
     def passing(self) -> float:
         """Time from its beginning to the end of its load [s]."""
-        return passing_time(self.train, self.lead)
+        return find_passing_time(self.train, self.lead)
 
 
 class TrackTable(Table):
@@ -115,7 +115,7 @@ class TrackTable(Table):
     bogie: BogieTable | None = None
 
 
-def track_faults(track: TrackTable) -> Iterator[Problem]:
+def find_track_faults(track: TrackTable) -> Iterator[Problem]:
     """What keys of the table demand of one another."""
     if (track.pressure is None) == (track.bogie is None):
         yield Problem("track", "give one of pressure, bogie")
@@ -144,7 +144,7 @@ def track_faults(track: TrackTable) -> Iterator[Problem]:
         yield Problem("track.cells", f"at least {3 * ends} along")
 
 
-def loads_of(track: TrackTable, folder: Path) -> tuple[Series, ...]:
+def make_seat_loads(track: TrackTable, folder: Path) -> tuple[Series, ...]:
     """Force on each rail seat over time [N], (k, 3)."""
     share, seats = track.share or 1.0, 2 if track.part == "whole" else 1
     if track.bogie is not None:
@@ -158,6 +158,6 @@ def loads_of(track: TrackTable, folder: Path) -> tuple[Series, ...]:
         if table is None:
             found += found
             continue
-        given = series_of(table, f"track.{name}", folder, vector=False)
-        found.append(Series(given.times, down(share * track.seat_area * given.values)))
+        given = make_series(table, f"track.{name}", folder, vector=False)
+        found.append(Series(given.times, point_down(share * track.seat_area * given.values)))
     return tuple(found)

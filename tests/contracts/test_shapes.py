@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from qdem_fem.grains.hulls import GrainForm, GrainRecipe
-from qdem_fem.grains.measures import find_surface_edges, polyhedron_integrals, quarter_faces
+from qdem_fem.grains.measures import find_surface_edges, integrate_polyhedron, quarter_faces
 from qdem_fem.grains.meshing import make_grain_tetrahedra
 from qdem_fem.grains.sets import get_shape as get_deformable
 from qdem_fem.grains.sets import make_grains
@@ -38,7 +38,7 @@ def test_surface_is_closed_and_filled(name: str) -> None:
         ways = {(a, b) for face in faces for a, b in zip(face, np.roll(face, -1), strict=True)}
         assert len(ways) == 3 * len(faces), f"{name}: two faces run alike along an edge"
         assert ways == {(b, a) for a, b in ways}, f"{name}: the surface is open"
-        solid = polyhedron_integrals(form.nodes, faces)
+        solid = integrate_polyhedron(form.nodes, faces)
         assert np.linalg.norm(solid.centroid) < 1e-9 * np.ptp(form.nodes)
         x = make_grain_tetrahedra(form.nodes, form.corner_faces)
         edges = x.nodes[x.elements[:, 1:]] - x.nodes[x.elements[:, :1]]

@@ -33,7 +33,7 @@ from tests.engine_sample import (
 )
 from tests.forked_commands import Commands, processes_in
 from trackbed import command
-from trackbed.scenes import scene_template
+from trackbed.scenes import read_template
 
 ROOT = Path(__file__).parents[2]
 HISTORY = 7
@@ -307,7 +307,7 @@ with_decks = pytest.mark.parametrize(
 @pytest.mark.long
 def test_box(name: str, tmp_path: Path, symmetry: str) -> None:
     """A box, with a mirror plane and without, is prepared, loaded, jumped; grains stay inside."""
-    lines = scene_template("karrech-coarse").replace('"cylinder"', '"box"').splitlines()
+    lines = read_template("karrech-coarse").replace('"cylinder"', '"box"').splitlines()
     lines = [line for line in lines if not line.startswith("radius =")]
     at = lines.index("[sample]") + 1
     lines[at:at] = ["size_x = 0.02", "size_y = 0.016"]
@@ -329,7 +329,7 @@ def test_load_series_across_a_jump(name: str, tmp_path: Path) -> None:
     stress = 3000 + 11000 * np.array([0, 0.3, 1.0, 0.5, 0.1, 0])
     rows = (f"{t:.17g},{s:.17g}" for t, s in zip(np.linspace(0, 0.02, 6), stress, strict=True))
     (tmp_path / "load.csv").write_text("time,stress\n" + "\n".join(rows) + "\n")
-    head, _, rest = scene_template("karrech-coarse").partition("[loading]")
+    head, _, rest = read_template("karrech-coarse").partition("[loading]")
     path = tmp_path / "scene.toml"
     loading = '[loading]\nwaveform = "series"\nseries = "load.csv"\npiston_mass = 0.001\n\n'
     path.write_text(head + loading + rest[rest.index("[procedure]") :])

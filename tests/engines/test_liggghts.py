@@ -31,7 +31,7 @@ from tests.engine_sample import at_rest, start_of, window_of
 from tests.engines.test_engine_contract import engine_started, gone
 from tests.forked_commands import Commands
 from trackbed import command
-from trackbed.scenes import scene_template
+from trackbed.scenes import read_template
 
 pytestmark = pytest.mark.engine("liggghts")
 
@@ -57,7 +57,7 @@ FIRST, SECOND, JUMP, AFTER = "window_000000", "window_000003", "jump_000007_1", 
 def scene_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The coarse scene, made tiny."""
     path = tmp_path_factory.mktemp("scene") / "scene.toml"
-    path.write_text(scene_template("karrech-coarse"))
+    path.write_text(read_template("karrech-coarse"))
     return path
 
 

@@ -19,7 +19,7 @@ from adapters.files.window import Window, read_state, read_window
 from adapters.scene.file import load_scene
 from adapters.scene.tables import Scene
 from tests.yade_few_grains import track_run
-from trackbed.scenes import scene_template
+from trackbed.scenes import read_template
 from validation.bench.few_grains import (
     RADIUS,
     Track,
@@ -120,7 +120,7 @@ def test_walls_are_flat_and_hertzian(name: str) -> None:
 def test_polygon_stands_for_the_cylinder() -> None:
     """Sides are tangent, corners stand out by at most 1 % of a mean radius, mirrors cut corners."""
     for name in ("karrech", "karrech-coarse"):
-        scene = scene_load_text(scene_template(name), 'engine.name="yade"')
+        scene = scene_load_text(read_template(name), 'engine.name="yade"')
         container, mean = scene.container, scene.sample.grain_radius.mean
         assert container.sides % 4 == 0
         corner = container.radius / np.cos(np.pi / container.sides)
@@ -153,7 +153,7 @@ class Bed:
 
     def __init__(self, folder: Path, *overrides: str) -> None:
         self.folder = folder
-        self.scene = scene_load_text(scene_template("karrech-coarse"), *TINY, *overrides)
+        self.scene = scene_load_text(read_template("karrech-coarse"), *TINY, *overrides)
         from adapters.bed.radii import sample_radii
         from adapters.bed.sample import draw_sample_start
 

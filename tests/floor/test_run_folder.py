@@ -15,7 +15,7 @@ import pytest
 
 from trackbed.errors import DiskFull, UsageError
 from trackbed.run_files.folder import RunFolder, lock_folder
-from trackbed.run_files.whole import append_line, seal_file, whole_file, write_whole
+from trackbed.run_files.whole import append_line, replace_file, seal_file, write_whole
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("adapters.files.run_folder", "qdem_fem.scene.run", "rigid_lcp.scene.run_folder")
@@ -143,7 +143,7 @@ def test_a_failed_write_leaves_the_old_file(
     write_whole(path, "old")
 
     def die() -> None:
-        with whole_file(path) as temporary:
+        with replace_file(path) as temporary:
             temporary.write_text("new")
             raise RuntimeError
 

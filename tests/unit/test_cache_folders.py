@@ -77,7 +77,7 @@ def test_a_taken_name_is_not_used(
     else:
         path.mkdir()
         path.chmod(0o770)
-    found = Path(cache_folders.private_folder())
+    found = Path(cache_folders.make_private_folder())
     assert found != path
     assert found.stat().st_mode & 0o777 == 0o700
 

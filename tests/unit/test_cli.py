@@ -16,7 +16,7 @@ import pytest
 
 import trackbed
 from adapters import errors
-from trackbed.command import VERBS, explained, main
+from trackbed.command import VERBS, explain_error, main
 
 ROOT = Path(__file__).parents[2]
 
@@ -65,7 +65,7 @@ def test_help_loads_nothing_heavy() -> None:
     assert (run.returncode, run.stdout) == (0, f"trackbed {trackbed.__version__}\n")
     code = (
         "import sys; from trackbed import command\n"
-        "[command.parser_build(verb) for verb in command.VERBS]\n"
+        "[command.build_parser(verb) for verb in command.VERBS]\n"
         "print(*sorted({name.partition('.')[0] for name in sys.modules}))"
     )
     run = subprocess.run(
@@ -394,11 +394,11 @@ def test_a_full_disk_has_one_exit_code(tmp_path: Path) -> None:
     def code(number: int, told: Callable[[Path], AbstractContextManager[None]]) -> int:
         with pytest.raises(Exception, match=os.strerror(number)) as caught, told(tmp_path):
             raise OSError(number, os.strerror(number))
-        return explained(caught.value)[1]
+        return explain_error(caught.value)[1]
 
     for number, wanted in (
         (errno.ENOSPC, 5), (errno.EDQUOT, 5), (errno.EFBIG, 5), (errno.EACCES, 2), (errno.EIO, 2)
     ):  # fmt: skip
         assert code(number, name_full_disk) == wanted
         assert code(number, refuse_writing) == wanted
-        assert explained(OSError(number, os.strerror(number)))[1] == wanted
+        assert explain_error(OSError(number, os.strerror(number)))[1] == wanted

@@ -24,7 +24,7 @@ from adapters.procedure.record import read_run_record
 from adapters.procedure.run import run_scene
 from adapters.scene.file import load_scene
 from trackbed import command
-from trackbed.scenes import scene_template
+from trackbed.scenes import read_template
 
 CYCLES = [0, 1, 2, 3, 4, 5, 7, 8, 9, 10, 11]
 """Instants of the fixture's run, which jumps from 5 to 7."""
@@ -43,7 +43,7 @@ TINY = (
 @pytest.fixture(scope="module")
 def scene_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("scene") / "scene.toml"
-    path.write_text(scene_template("karrech-coarse"))
+    path.write_text(read_template("karrech-coarse"))
     return path
 
 

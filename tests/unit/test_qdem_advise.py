@@ -13,8 +13,8 @@ from scipy.spatial.transform import Rotation
 
 import qdem_fem as q
 from qdem_fem.mesh.generation import make_box_mesh
-from qdem_fem.scene.advise import advise, compliance_of, error_together, stiffness_matrix
-from qdem_fem.scene.build import simulation_of
+from qdem_fem.scene.advise import advise, assemble_stiffness, find_compliance, predict_error
+from qdem_fem.scene.build import make_simulation
 from qdem_fem.scene.checks import load_scene
 from trackbed import command
 
@@ -35,12 +35,12 @@ def test_compliance_against_all_modes() -> None:
     body = beam()
     mass = np.repeat(q.Simulation([body]).assembly.mass, 3)
     own = q.Body(body.mesh, STONE)
-    scaled = stiffness_matrix(own).toarray() / np.sqrt(mass) / np.sqrt(mass)[:, None]
+    scaled = assemble_stiffness(own).toarray() / np.sqrt(mass) / np.sqrt(mass)[:, None]
     value, vector = np.linalg.eigh(scaled)
     shape = vector[:, 6:] / np.sqrt(mass)[:, None]
     flexible = ((shape / value[6:]) @ shape.T).reshape(len(own.nodes), 3, -1, 3)
     each = [np.linalg.eigvalsh(flexible[i, :, i])[-1] for i in range(len(own.nodes))]
-    found = compliance_of(own)
+    found = find_compliance(own)
     assert found.vertex == pytest.approx(max(each), rel=1e-6)
     assert found.frequency == pytest.approx(np.sqrt(value[6]) / 2 / np.pi, rel=1e-3)
     assert found.transit == pytest.approx(0.08 / STONE.wave_speed)
@@ -48,9 +48,9 @@ def test_compliance_against_all_modes() -> None:
 
 def test_compliance_knows_no_direction_and_goes_with_the_modulus() -> None:
     """Turned anyhow the same; half as stiff, twice as compliant."""
-    first = compliance_of(beam())
-    turned = compliance_of(beam(turn=Rotation.from_rotvec([1.0, 2, 3])))
-    softer = compliance_of(beam(15e9))
+    first = find_compliance(beam())
+    turned = find_compliance(beam(turn=Rotation.from_rotvec([1.0, 2, 3])))
+    softer = find_compliance(beam(15e9))
     assert turned.vertex == pytest.approx(first.vertex, rel=1e-7)
     assert softer.vertex == pytest.approx(2 * first.vertex, rel=1e-7)
     assert softer.frequency == pytest.approx(first.frequency / np.sqrt(2), rel=1e-3)
@@ -83,14 +83,14 @@ def test_reasons() -> None:
 def test_two_runs_tell_that_the_prediction_bounds() -> None:
     """Stones on a pad, deformable and as advised: what their probes differ by is below what was
     predicted, and not far below.  Rigid ones have the inertia of their mesh, as the others do."""
-    advice = advise(simulation_of(load_scene(STONES))[0], 0.05)
+    advice = advise(make_simulation(load_scene(STONES))[0], 0.05)
     assert [one.rigid for one in advice] == [False, True, True]
     marks = ['body.1.rigid="lumped"', 'body.2.rigid="lumped"']
-    runs = [simulation_of(load_scene(STONES, words)) for words in ([], marks)]
+    runs = [make_simulation(load_scene(STONES, words)) for words in ([], marks)]
     step, moved = min(run.step for run, _ in runs), []
     for words in ([], marks):
         prepared = load_scene(STONES, [*words, f"simulation.step={step!r}"])
-        run, bodies = simulation_of(prepared)
+        run, bodies = make_simulation(prepared)
         duration = prepared.scene.simulation.duration
         assert duration is not None
         probes = {name: (bodies[body], nodes) for name, (body, nodes) in prepared.probes.items()}
@@ -100,9 +100,9 @@ def test_two_runs_tell_that_the_prediction_bounds() -> None:
     soft, hard = moved
     measured = max(np.linalg.norm(hard[n] - soft[n]) / np.linalg.norm(soft[n]) for n in soft)
     assert soft
-    assert error_together(advice) / 10 < measured < error_together(advice)
+    assert predict_error(advice) / 10 < measured < predict_error(advice)
     nobody = [replace(one, rigid=False) for one in advice]
-    assert error_together(nobody) == 0.0
+    assert predict_error(nobody) == 0.0
 
 
 def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -168,7 +168,7 @@ def test_frequency_of_the_run_is_that_of_its_own_matrices(scene: Path) -> None:
     """
     from scipy.linalg import eigh
 
-    from qdem_fem.mesh.tetrahedra import element_gradients, lumped_mass
+    from qdem_fem.mesh.tetrahedra import find_gradients, lump_mass
 
     size = (0.4, 0.1, 0.3)
     words = (
@@ -178,8 +178,8 @@ def test_frequency_of_the_run_is_that_of_its_own_matrices(scene: Path) -> None:
     result = find_result(scene, "run", *words)
     found, step = result["modes"]["tip_z"][0]["frequency"], result["step"]
     mesh, stiffness = stiffness_of(size)
-    volumes = element_gradients(mesh.nodes, mesh.elements)[1]
-    mass = np.repeat(lumped_mass(mesh.elements, volumes, 1e3, len(mesh.nodes)), 3)
+    volumes = find_gradients(mesh.nodes, mesh.elements)[1]
+    mass = np.repeat(lump_mass(mesh.elements, volumes, 1e3, len(mesh.nodes)), 3)
     free = np.flatnonzero(np.repeat(mesh.nodes[:, 0] > 0, 3))
     square = eigh(stiffness.toarray()[np.ix_(free, free)], np.diag(mass[free]), eigvals_only=True)
     expected = np.arcsin(np.sqrt(square[:4]) * step / 2) / (np.pi * step)
@@ -339,13 +339,13 @@ def test_warnings_of_what_comes_before_the_run_are_sentences(
     scene: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The bed of a track is prepared there: no file, line and code of ours on the way."""
-    make = scene_room.simulation_of
+    make = scene_room.make_simulation
 
     def made(prepared: Any) -> Any:
         warnings.warn("the step is short", StepWarning, stacklevel=1)
         return make(prepared)
 
-    monkeypatch.setattr(scene_room, "simulation_of", made)
+    monkeypatch.setattr(scene_room, "make_simulation", made)
     with warnings.catch_warnings():
         warnings.simplefilter("always")
         assert command(scene, "--no-pictures", "--set", "simulation.duration=0.004") == 0

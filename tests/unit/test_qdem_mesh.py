@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from qdem_fem.files.errors import LibraryMissing, MeshError
 from qdem_fem.mesh.checks import FLAT
 from qdem_fem.mesh.generation import jitter, make_box_mesh
-from qdem_fem.mesh.tetrahedra import TetMesh, element_gradients, read_mesh
+from qdem_fem.mesh.tetrahedra import TetMesh, find_gradients, read_mesh
 
 pytestmark = pytest.mark.lowest
 
@@ -97,7 +97,7 @@ def test_left_handed_elements_are_mended_and_named() -> None:
     elements[wrong] = elements[wrong][:, [1, 0, 2, 3]]
     mesh = read_mesh((NODES, elements))
     np.testing.assert_array_equal(mesh.flipped, wrong)
-    _, volumes = element_gradients(mesh.nodes, mesh.elements)
+    _, volumes = find_gradients(mesh.nodes, mesh.elements)
     assert volumes.min() > 0
     np.testing.assert_array_equal(np.sort(mesh.elements, axis=1), np.sort(ELEMENTS, axis=1))
     np.testing.assert_array_equal(read_mesh(mesh).flipped, wrong)
@@ -284,7 +284,7 @@ def test_whatever_is_damaged_is_read_rightly_or_refused(
         assert broken or "no volume" in refusal
         return
     assert not broken
-    _, volumes = element_gradients(mesh.nodes, mesh.elements)
+    _, volumes = find_gradients(mesh.nodes, mesh.elements)
     assert volumes.min() > 0
     np.testing.assert_array_equal(np.sort(mesh.elements, axis=1), np.sort(elements, axis=1))
 

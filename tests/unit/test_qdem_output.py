@@ -21,7 +21,7 @@ from qdem_fem.report.deformed import (
     draw_deformed,
     round_magnification,
 )
-from qdem_fem.report.figures import draw_energy, draw_history, draw_spectrum, unit_of
+from qdem_fem.report.figures import choose_unit, draw_energy, draw_history, draw_spectrum
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 
@@ -142,7 +142,7 @@ def test_magnification_is_round_and_never_below_one(scale: float) -> None:
 )
 def test_units_are_shown_in_a_fitting_multiple(value: float, expected: tuple[float, str]) -> None:
     """The multiple that leaves one to three digits before the point."""
-    assert unit_of(value, "m") == expected
+    assert choose_unit(value, "m") == expected
 
 
 @pytest.mark.long

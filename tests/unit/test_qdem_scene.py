@@ -18,7 +18,7 @@ import pytest
 from qdem_fem.files.errors import LibraryMissing, QdemError, SceneError
 from qdem_fem.files.series import Series
 from qdem_fem.mesh.generation import make_box_mesh
-from qdem_fem.scene.build import simulation_of
+from qdem_fem.scene.build import make_simulation
 from qdem_fem.scene.checks import load_scene
 from qdem_fem.tables.keys import Scene
 from qdem_fem.tables.prepared import Prepared
@@ -169,7 +169,7 @@ def test_regions_change_the_material_of_their_elements(tmp_path: Path) -> None:
     )
     text = text.replace("[simulation]", "[body.regions.core]\nyoung = 3e9\n[simulation]")
     prepared = load(tmp_path, text)
-    _, bodies = simulation_of(prepared)
+    _, bodies = make_simulation(prepared)
     young = np.asarray(bodies["beam"].material.young)
     assert (young[:10] == 3e9).all()
     assert (young[10:] == 1e9).all()
@@ -183,18 +183,18 @@ def test_regions_change_the_material_of_their_elements(tmp_path: Path) -> None:
 
 def test_left_out_names_what_the_scene_does_not(tmp_path: Path) -> None:
     """Viscosity and gravity are left out unless named; contact always is."""
-    words = " ".join(load(tmp_path, BASE).scene.left_out())
+    words = " ".join(load(tmp_path, BASE).scene.list_left_out())
     assert "viscosity" in words
     assert "gravity" in words
     overrides = ("body.beam.material.shear_viscosity=5.0", "simulation.gravity=[0, 0, -9.81]")
-    words = " ".join(load(tmp_path, BASE, *overrides).scene.left_out())
+    words = " ".join(load(tmp_path, BASE, *overrides).scene.list_left_out())
     assert "viscosity" not in words
     assert "gravity" not in words
     assert "contact" in words
     assert "cause of motion" not in words
     still = BASE.replace("[0, 0, -1]", "[0, 0, 0]").replace("[[load]]", "[[roller]]")
     still = still.replace("force = ", "normal = [1, 0, 0] #")
-    assert "any cause of motion" in " ".join(load(tmp_path, still).scene.left_out())
+    assert "any cause of motion" in " ".join(load(tmp_path, still).scene.list_left_out())
 
 
 # ---------------------------------------------------------------------------- wrong scenes
@@ -301,7 +301,7 @@ def test_what_the_simulation_refuses_has_its_key(tmp_path: Path) -> None:
     pressure = '[[pressure]]\nbody = "beam"\nnodes = { nearest = [1, 0, 0] }\npressure = 5\n[output.probes]'
     prepared = load(tmp_path, BASE.replace("[output.probes]", pressure))
     with pytest.raises(SceneError, match=r"scene.toml:17: pressure.0: no surface face"):
-        simulation_of(prepared)
+        make_simulation(prepared)
 
 
 def test_conditions_that_contradict_one_another_are_problems_of_the_scene(tmp_path: Path) -> None:
@@ -312,10 +312,10 @@ def test_conditions_that_contradict_one_another_are_problems_of_the_scene(tmp_pa
     roller = '[[roller]]\nbody = "beam"\nnodes = { set = "x-max" }\nnormal = [1, 0, 0]\n'
     prepared = load(tmp_path, BASE.replace("[output.probes]", moved + roller + "[output.probes]"))
     with pytest.raises(SceneError, match=r"roller: a node is moved along x out of its plane"):
-        simulation_of(prepared)
+        make_simulation(prepared)
     prepared = load(tmp_path, BASE, 'simulation.method="static"', 'fix.0.components="xy"')
     with pytest.raises(SceneError, match=r"fix: beam has no static answer: 1 of the 6"):
-        simulation_of(prepared)
+        make_simulation(prepared)
 
 
 def test_same_name_twice(tmp_path: Path) -> None:
@@ -367,7 +367,7 @@ def loads_or_refuses(path: Path) -> bool:
     Damage may take the # from `device = "cuda"`: a sound scene, for another machine.
     """
     try:
-        simulation_of(load_scene(path))
+        make_simulation(load_scene(path))
     except LibraryMissing:
         return True
     except QdemError as error:

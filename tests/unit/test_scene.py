@@ -19,11 +19,11 @@ from adapters.jumps.schedule import schedule_jumps
 from adapters.scene.file import load_scene
 from adapters.scene.tables import Loading, Procedure, Scene
 from trackbed.scene_files.lines import find_key_lines
-from trackbed.scenes import scene_names, scene_path, scene_template, scene_verb
+from trackbed.scenes import find_scene_verb, list_scenes, read_template, scene_path
 
 pytestmark = pytest.mark.lowest
 
-KARRECH = scene_template("karrech")
+KARRECH = read_template("karrech")
 
 
 def write(folder: Path, text: str) -> Path:
@@ -76,14 +76,14 @@ def scene_or_refusal(path: Path) -> Scene | None:
 
 def test_shipped_scenes_load_without_doubts() -> None:
     """Every scene that ships is valid and free of warnings, on whichever engine there is."""
-    names = [name for name in scene_names() if scene_verb(name) == "run"]
+    names = [name for name in list_scenes() if find_scene_verb(name) == "run"]
     assert names == ["cluster", "karrech", "karrech-coarse", "karrech-partial"]
     for name in names:
         scene = load_scene(Path(__file__).parents[2] / "trackbed" / "scenes" / f"{name}.toml")
         assert scene.warnings == ()
         assert scene.engine.name == "auto"
     with pytest.raises(KeyError, match="karrech-coarse"):
-        scene_template("carrech")
+        read_template("carrech")
 
 
 def test_new_names_the_verb_that_reads_the_scene() -> None:
@@ -92,8 +92,8 @@ def test_new_names_the_verb_that_reads_the_scene() -> None:
     from rigid_lcp.scene.file import scene_read as rigid_scene
 
     readers = {"run": load_scene, "qdem": qdem_scene, "rigid": rigid_scene}
-    for name in scene_names():
-        readers[scene_verb(name)](scene_path(name))
+    for name in list_scenes():
+        readers[find_scene_verb(name)](scene_path(name))
 
 
 def test_shipped_scenes_are_what_they_say(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ import qdem_fem as q
 from qdem_fem.contact.search.pairs import find_near_pairs, find_periodic_pairs
 from qdem_fem.files.errors import CheckpointError, ConditionError, SceneError
 from qdem_fem.mesh.generation import make_box_mesh
-from qdem_fem.scene.build import simulation_of
+from qdem_fem.scene.build import make_simulation
 from qdem_fem.scene.checks import load_scene
 
 Floats = NDArray[np.float64]
@@ -223,7 +223,7 @@ def test_a_scene_names_the_width(tmp_path: Path) -> None:
     """The keys reach the contact; what does not fit them is named with its key."""
     path = tmp_path / "scene.toml"
     path.write_text(SCENE)
-    run, _ = simulation_of(load_scene(path))
+    run, _ = make_simulation(load_scene(path))
     assert run.contact.periodic == ACROSS
     for change, words in (
         ("contact.periodic.width=0.04", "contact.periodic.width: stone is 0.03 m long"),
@@ -233,5 +233,5 @@ def test_a_scene_names_the_width(tmp_path: Path) -> None:
         ('contact.model="surface"', "contact.periodic: a width is for spheres"),
     ):
         with pytest.raises(SceneError) as told:
-            simulation_of(load_scene(path, [change]))
+            make_simulation(load_scene(path, [change]))
         assert words in str(told.value), change

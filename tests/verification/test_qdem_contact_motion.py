@@ -28,7 +28,7 @@ from qdem_fem.files.errors import (
     StepWarning,
 )
 from qdem_fem.mesh.generation import make_box_mesh
-from qdem_fem.scene.build import simulation_of
+from qdem_fem.scene.build import make_simulation
 from qdem_fem.scene.checks import load_scene
 from tests.qdem_slopes import slope_gain
 
@@ -471,21 +471,21 @@ def scene_of(folder: Path, change: Callable[[str], str] = str) -> Any:
 def test_a_scene_names_its_contact(tmp_path: Path) -> None:
     """The table becomes the simulation's contact, and what is left out says so."""
     prepared = scene_of(tmp_path)
-    run, _ = simulation_of(prepared)
+    run, _ = make_simulation(prepared)
     assert run.contact.of_body("above", "radius") == 0.005
     assert run.contact.planes[0].friction == 0.2
-    assert not [text for text in prepared.scene.left_out() if "contact" in text]
+    assert not [text for text in prepared.scene.list_left_out() if "contact" in text]
     surface = scene_of(
         tmp_path,
         lambda text: re.sub("radius.*|normal_stiff.*", "", text).replace(
             '"spheres"', '"surface"\nmodulus = { below = 1e12, above = 2e12 }\npoints = 3'
         ),
     )
-    contact = simulation_of(surface)[0].contact
+    contact = make_simulation(surface)[0].contact
     assert (contact.of_body("above", "modulus"), contact.points) == (2e12, 3)
     without = scene_of(tmp_path, lambda text: text[: text.index("[contact]")])
-    assert simulation_of(without)[0].contact is None
-    assert [text for text in without.scene.left_out() if "contact" in text]
+    assert make_simulation(without)[0].contact is None
+    assert [text for text in without.scene.list_left_out() if "contact" in text]
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ import qdem_fem as q
 from qdem_fem.bodies.rigid_mass import make_cross_matrix
 from qdem_fem.files.errors import ConditionError, StepWarning, Unstable
 from qdem_fem.mesh.generation import make_box_mesh
-from qdem_fem.tables.contact import ContactTable, contact_faults
+from qdem_fem.tables.contact import ContactTable, find_contact_faults
 
 SIDE, RADIUS, STIFFNESS = 0.03, 0.006, 1e8
 JELLY = q.Material(1e3, 0.2, 2700.0)
@@ -158,7 +158,7 @@ def test_near_is_refused_where_it_tells_nothing() -> None:
     with pytest.raises(ConditionError, match="'far' contacts"):
         q.SphereContact(RADIUS, 1e8, 0.5, contacts="far")  # type: ignore[arg-type]
     table = ContactTable(model="surface", friction=0.5, contacts="near", modulus=1e12)
-    assert list(contact_faults(table, None, [])) == [
+    assert list(find_contact_faults(table, None, [])) == [
         ("contact.contacts", "'near' is for spheres: give a number")
     ]
 

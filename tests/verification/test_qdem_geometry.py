@@ -15,12 +15,12 @@ from qdem_fem.files.errors import MeshError
 from qdem_fem.kernel.cpu.ordering import order_for_locality
 from qdem_fem.mesh.generation import jitter, make_box_mesh
 from qdem_fem.mesh.surface import (
-    face_area_vectors,
+    find_area_vectors,
     find_faces_within,
+    find_pressure_forces,
     find_surface_faces,
-    pressure_forces,
 )
-from qdem_fem.mesh.tetrahedra import TetMesh, altitudes, element_gradients, lumped_mass, read_mesh
+from qdem_fem.mesh.tetrahedra import TetMesh, find_altitudes, find_gradients, lump_mass, read_mesh
 from tests.qdem_rings import make_ring_mesh
 
 EPS = float(np.finfo(np.float64).eps)
@@ -61,18 +61,18 @@ def body(request: pytest.FixtureRequest) -> tuple[TetMesh, float, int]:
 def divergence_volume(nodes: np.ndarray, faces: np.ndarray) -> float:
     """V = 1/3 sum x . A: divergence theorem for the field x, exact on planar faces."""
     middle = nodes[faces].mean(axis=1)
-    return float((middle * face_area_vectors(nodes, faces)).sum() / 3)
+    return float((middle * find_area_vectors(nodes, faces)).sum() / 3)
 
 
 def test_volumes_fill_the_body_and_agree_with_its_surface(
     body: tuple[TetMesh, float, int],
 ) -> None:
     mesh, volume, _ = body
-    _, volumes = element_gradients(mesh.nodes, mesh.elements)
+    _, volumes = find_gradients(mesh.nodes, mesh.elements)
     faces = find_surface_faces(mesh.elements)
     assert volumes.sum() == pytest.approx(volume, rel=1e-13)
     assert divergence_volume(mesh.nodes, faces) == pytest.approx(volume, rel=1e-13)
-    assert np.abs(face_area_vectors(mesh.nodes, faces).sum(axis=0)).max() < 1e-14
+    assert np.abs(find_area_vectors(mesh.nodes, faces).sum(axis=0)).max() < 1e-14
 
 
 def test_euler_characteristic(body: tuple[TetMesh, float, int]) -> None:
@@ -127,7 +127,7 @@ def test_surface_that_overlaps_itself_is_refused() -> None:
 
 def test_no_elements_have_no_surface() -> None:
     assert find_surface_faces(np.zeros((0, 4), np.int64)).shape == (0, 3)
-    assert pressure_forces(KUHN.nodes, np.zeros((0, 3), np.int64), 120).shape == (120, 3)
+    assert find_pressure_forces(KUHN.nodes, np.zeros((0, 3), np.int64), 120).shape == (120, 3)
 
 
 def gradients_exact(x: np.ndarray) -> tuple[np.ndarray, float]:
@@ -160,7 +160,7 @@ def test_gradients_of_slivers(seed: int, digits: float) -> None:
     exact, volume = gradients_exact(x[element])
     edges = np.linalg.norm(x[element[1:]] - x[element[0]], axis=1)
     kappa = edges.prod() / (6 * volume)
-    gradients, volumes = element_gradients(x, np.array([element]))
+    gradients, volumes = find_gradients(x, np.array([element]))
     bound = 4 * EPS + 30 * kappa * (EXTENDED if kappa > 100 else EPS)
     assert np.abs(gradients[0] - exact).max() <= bound * np.abs(exact).max()
     assert abs(volumes[0] - volume) <= bound * volume
@@ -172,7 +172,7 @@ def test_gradients_reproduce_linear_fields(flatness: float) -> None:
     mesh = jitter(KUHN, 0.24, 3)
     nodes = mesh.nodes * [1, 1, flatness]
     slope = np.random.default_rng(4).standard_normal((3, 3))
-    gradients, _ = element_gradients(nodes, mesh.elements)
+    gradients, _ = find_gradients(nodes, mesh.elements)
     u = (nodes @ slope.T)[mesh.elements]
     found = np.einsum("mai,maj->mij", u[:, 1:] - u[:, :1], gradients)
     reach = np.abs(nodes).max() * np.abs(slope).max()
@@ -183,49 +183,51 @@ def test_gradients_reproduce_linear_fields(flatness: float) -> None:
 def test_gradients_follow_the_unit_of_length_exactly() -> None:
     """A power of two as the new unit changes no digit: 1/m, m^3, m."""
     mesh = MESHES["kuhn jittered"][0]
-    gradients, volumes = element_gradients(mesh.nodes, mesh.elements)
-    scaled, scaled_volumes = element_gradients(mesh.nodes * 1024, mesh.elements)
+    gradients, volumes = find_gradients(mesh.nodes, mesh.elements)
+    scaled, scaled_volumes = find_gradients(mesh.nodes * 1024, mesh.elements)
     np.testing.assert_array_equal(scaled * 1024, gradients)
     np.testing.assert_array_equal(scaled_volumes, volumes * 1024**3)
-    np.testing.assert_array_equal(altitudes(scaled), altitudes(gradients) * 1024)
+    np.testing.assert_array_equal(find_altitudes(scaled), find_altitudes(gradients) * 1024)
 
 
 def test_gradients_refuse_elements_without_volume() -> None:
     nodes = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0]])
     for bad in ([0, 1, 3, 2], [0, 1, 2, 4]):
         with pytest.raises(MeshError, match="element 1 has"):
-            element_gradients(nodes, np.array([[0, 1, 2, 3], bad]))
+            find_gradients(nodes, np.array([[0, 1, 2, 3], bad]))
 
 
 def test_altitudes_are_three_volumes_over_the_largest_face() -> None:
     mesh = MESHES["ring jittered"][0]
-    gradients, volumes = element_gradients(mesh.nodes, mesh.elements)
+    gradients, volumes = find_gradients(mesh.nodes, mesh.elements)
     areas = [
-        np.linalg.norm(face_area_vectors(mesh.nodes, mesh.elements[:, list(face)]), axis=1)
+        np.linalg.norm(find_area_vectors(mesh.nodes, mesh.elements[:, list(face)]), axis=1)
         for face in combinations(range(4), 3)
     ]
-    np.testing.assert_allclose(altitudes(gradients), 3 * volumes / np.max(areas, axis=0), 1e-12)
+    np.testing.assert_allclose(
+        find_altitudes(gradients), 3 * volumes / np.max(areas, axis=0), 1e-12
+    )
 
 
 def test_lumped_mass_keeps_mass_and_centre_of_mass(body: tuple[TetMesh, float, int]) -> None:
     """Quarters at the corners have the element's mass and, by symmetry, its centre of mass."""
     mesh, volume, _ = body
-    _, volumes = element_gradients(mesh.nodes, mesh.elements)
+    _, volumes = find_gradients(mesh.nodes, mesh.elements)
     n = len(mesh.nodes)
-    mass = lumped_mass(mesh.elements, volumes, 2350.0, n + 2)
+    mass = lump_mass(mesh.elements, volumes, 2350.0, n + 2)
     assert mass.sum() == pytest.approx(2350 * volume, rel=1e-13)
     assert mass[:n].min() > 0
     np.testing.assert_array_equal(mass[n:], 0)
     moment = volumes @ mesh.nodes[mesh.elements].mean(axis=1) * 2350
     np.testing.assert_allclose(mass[:n] @ mesh.nodes, moment, rtol=1e-13, atol=1e-11)
-    each = lumped_mass(mesh.elements, volumes, np.full(len(volumes), 2350.0), n + 2)
+    each = lump_mass(mesh.elements, volumes, np.full(len(volumes), 2350.0), n + 2)
     np.testing.assert_array_equal(mass, each)
 
 
 def test_pressure_on_a_closed_surface_is_in_balance(body: tuple[TetMesh, float, int]) -> None:
     """No force, no moment; and sum f x X = -V I, Gauss's theorem for the field X."""
     mesh, volume, _ = body
-    force = pressure_forces(mesh.nodes, find_surface_faces(mesh.elements), len(mesh.nodes))
+    force = find_pressure_forces(mesh.nodes, find_surface_faces(mesh.elements), len(mesh.nodes))
     assert np.abs(force.sum(axis=0)).max() < 1e-14
     assert np.abs(np.cross(mesh.nodes, force).sum(axis=0)).max() < 1e-14
     np.testing.assert_allclose(force.T @ mesh.nodes, -volume * np.eye(3), atol=1e-14)
@@ -237,7 +239,7 @@ def test_pressure_on_one_side_pushes_inward_at_its_middle() -> None:
     side[KUHN.node_sets["x-max"]] = True
     faces = find_faces_within(find_surface_faces(KUHN.elements), side)
     assert len(faces) == 2 * 4 * 3
-    force = pressure_forces(KUHN.nodes, faces, len(KUHN.nodes))
+    force = find_pressure_forces(KUHN.nodes, faces, len(KUHN.nodes))
     total = np.array([-0.3 * 0.2, 0, 0])
     np.testing.assert_allclose(force.sum(axis=0), total, atol=1e-15)
     np.testing.assert_array_equal(force[~side], 0)
@@ -271,7 +273,7 @@ def test_generated_meshes_are_sound(cells: tuple[int, int, int], around: int, se
             assert len(read.flipped) == len(read.unused) == 0
             np.testing.assert_array_equal(read.elements, mesh.elements)
         faces = find_surface_faces(mesh.elements)
-        volume = element_gradients(moved.nodes, moved.elements)[1].sum()
+        volume = find_gradients(moved.nodes, moved.elements)[1].sum()
         assert divergence_volume(mesh.nodes, faces) == pytest.approx(volume, rel=1e-12)
         surface = np.unique(faces)
         np.testing.assert_array_equal(moved.nodes[surface], mesh.nodes[surface])
@@ -282,8 +284,8 @@ def test_jitter_moves_every_interior_node_and_repeats() -> None:
     inside = np.setdiff1d(np.arange(len(KUHN.nodes)), find_surface_faces(KUHN.elements))
     distance = np.linalg.norm(moved.nodes - KUHN.nodes, axis=1)
     assert distance[inside].min() > 0
-    gradients, _ = element_gradients(KUHN.nodes, KUHN.elements)
-    assert distance.max() <= 0.2 * altitudes(gradients).max()
+    gradients, _ = find_gradients(KUHN.nodes, KUHN.elements)
+    assert distance.max() <= 0.2 * find_altitudes(gradients).max()
     np.testing.assert_array_equal(moved.nodes, jitter(KUHN, 0.2, 8).nodes)
     assert moved.node_sets is KUHN.node_sets
 

@@ -18,30 +18,30 @@ from qdem_fem.grains.hulls import (
     RATIO_LEAST,
     ROUNDNESS_WITHIN,
     GrainRecipe,
-    corners_apart,
     draw_grain,
     find_hull_faces,
+    place_corners_apart,
 )
 from qdem_fem.grains.measures import (
-    edge_angles,
+    find_edge_angles,
+    find_inscribed_sphere,
+    find_node_areas,
+    find_roundness,
+    find_sphericity,
+    find_surface_area,
     find_surface_edges,
-    inscribed_sphere,
-    node_areas,
-    polyhedron_integrals,
+    integrate_polyhedron,
     quarter_faces,
-    roundness_wadell,
-    sphericity_true,
-    surface_area,
 )
 from qdem_fem.grains.meshing import (
+    find_radius_ratios,
     make_grain_tetrahedra,
-    radius_ratios,
 )
 from qdem_fem.grains.sets import GrainSet, load_grains, make_grains, save_grains
 from qdem_fem.grains.sieve import find_sieve_size
 from qdem_fem.mesh.checks import FloatArray, IntArray
 from qdem_fem.mesh.surface import find_surface_faces
-from qdem_fem.mesh.tetrahedra import element_gradients
+from qdem_fem.mesh.tetrahedra import find_gradients
 from trackbed.command import main
 
 CUBE = np.array([[i, j, k] for i in (0.0, 1.0) for j in (0.0, 1.0) for k in (0.0, 1.0)]) - 0.5
@@ -62,7 +62,9 @@ def halved(nodes: FloatArray, faces: IntArray, sphere: bool) -> tuple[FloatArray
 
 
 def sphericity(nodes: FloatArray, faces: IntArray) -> float:
-    return sphericity_true(polyhedron_integrals(nodes, faces).volume, surface_area(nodes, faces))
+    return find_sphericity(
+        integrate_polyhedron(nodes, faces).volume, find_surface_area(nodes, faces)
+    )
 
 
 # --- surfaces -----------------------------------------------------------------------------------
@@ -71,7 +73,7 @@ def sphericity(nodes: FloatArray, faces: IntArray) -> float:
 def test_box_volume_and_centroid_are_exact_wherever_it_lies() -> None:
     size = np.array([3.0, 2.0, 0.5])
     nodes = (CUBE * size) @ TURN.T + [10.0, -4.0, 2.0]
-    solid = polyhedron_integrals(nodes, find_hull_faces(CUBE))
+    solid = integrate_polyhedron(nodes, find_hull_faces(CUBE))
     assert solid.volume == pytest.approx(size.prod(), rel=1e-13)
     np.testing.assert_allclose(solid.centroid, [10, -4, 2], rtol=1e-13)
 
@@ -90,7 +92,7 @@ def test_sphericity_and_inscribed_sphere(nodes: FloatArray, psi: float, inscribe
         moved = size * nodes @ TURN.T + shift
         # relative round-off of coordinates: shift/size in units of 1e-16
         assert sphericity(moved, faces) == pytest.approx(psi, rel=1e-12)
-        assert inscribed_sphere(moved, faces)[1] == pytest.approx(size * inscribed, rel=1e-11)
+        assert find_inscribed_sphere(moved, faces)[1] == pytest.approx(size * inscribed, rel=1e-11)
 
 
 def test_sphere_has_roundness_and_sphericity_one_in_the_limit() -> None:
@@ -101,12 +103,14 @@ def test_sphere_has_roundness_and_sphericity_one_in_the_limit() -> None:
     nodes, faces = ICOSAHEDRON, find_hull_faces(ICOSAHEDRON)
     lacks = []
     for _ in range(5):
-        lacks.append((1 - sphericity(nodes, faces), 1 - roundness_wadell(nodes, faces)))
+        lacks.append((1 - sphericity(nodes, faces), 1 - find_roundness(nodes, faces)))
         nodes, faces = halved(nodes, faces, sphere=True)
     orders = np.log2(np.array(lacks[-2]) / lacks[-1])
     np.testing.assert_allclose(orders, [2, 1], atol=0.1)
     assert lacks[-1][1] < 0.02
-    assert node_areas(nodes, faces).sum() == pytest.approx(surface_area(nodes, faces), rel=1e-12)
+    assert find_node_areas(nodes, faces).sum() == pytest.approx(
+        find_surface_area(nodes, faces), rel=1e-12
+    )
 
 
 def test_rounded_cube_has_the_roundness_of_its_edges() -> None:
@@ -122,17 +126,17 @@ def test_rounded_cube_has_the_roundness_of_its_edges() -> None:
         core = np.clip(nodes, -(1 - q), 1 - q)
         away = nodes - core
         rounded = core + q * away / np.linalg.norm(away, axis=1)[:, None]
-        assert inscribed_sphere(rounded, faces)[1] == pytest.approx(1, rel=1e-3)
-        assert roundness_wadell(rounded, faces) == pytest.approx(q, rel=0.1)
+        assert find_inscribed_sphere(rounded, faces)[1] == pytest.approx(1, rel=1e-3)
+        assert find_roundness(rounded, faces) == pytest.approx(q, rel=0.1)
 
 
 @settings(max_examples=15)
 @given(seed=st.integers(0, 10**6), count=st.integers(6, 30))
 def test_inscribed_sphere_touches_four_planes_and_cuts_none(seed: int, count: int) -> None:
     """The optimum of the linear programme, by its own conditions."""
-    nodes = corners_apart(np.random.default_rng(seed), count) * [1.5, 1.0, 0.6]
+    nodes = place_corners_apart(np.random.default_rng(seed), count) * [1.5, 1.0, 0.6]
     faces = find_hull_faces(nodes)
-    centre, radius = inscribed_sphere(nodes, faces)
+    centre, radius = find_inscribed_sphere(nodes, faces)
     a, b, c = nodes[faces].transpose(1, 0, 2)
     normal = np.cross(b - a, c - a)
     distance = np.einsum("fi,fi->f", a - centre, normal) / np.linalg.norm(normal, axis=1)
@@ -160,7 +164,7 @@ def test_sieve_size_closed_forms(nodes: FloatArray, size: float) -> None:
 
 def test_sieve_size_of_a_sphere_and_scaling() -> None:
     """A polyhedron with corners on a sphere passes 2 r at most; lengths scale."""
-    nodes = corners_apart(np.random.default_rng(1), 300)
+    nodes = place_corners_apart(np.random.default_rng(1), 300)
     size = find_sieve_size(nodes)
     assert 1.9 < size <= 2
     assert find_sieve_size(0.01 * nodes) == pytest.approx(0.01 * size, rel=1e-6)
@@ -216,15 +220,15 @@ def test_a_grain_is_what_was_asked(seed: int, psi: float, roundness: float) -> N
     faces = quarter_faces(form.corner_faces, find_surface_edges(form.corner_faces))
     surface = form.nodes[: 4 * corners - 6]
     assert sphericity(surface, faces) == pytest.approx(psi, rel=1e-9)
-    assert roundness_wadell(surface, faces) == pytest.approx(roundness, abs=ROUNDNESS_WITHIN)
-    _, angle = edge_angles(surface, faces, find_surface_edges(faces))
+    assert find_roundness(surface, faces) == pytest.approx(roundness, abs=ROUNDNESS_WITHIN)
+    _, angle = find_edge_angles(surface, faces, find_surface_edges(faces))
     # 1e-9 before the stretch, which may magnify it by the squared ratio of the axes, e^7.2
     assert angle.min() > -2e-6
     mesh = make_grain_tetrahedra(form.nodes, form.corner_faces)
     assert len(mesh.elements) == 8 * (2 * corners - 4)
-    assert radius_ratios(mesh.nodes, mesh.elements).min() >= RATIO_LEAST
-    _, volumes = element_gradients(mesh.nodes, mesh.elements)
-    solid = polyhedron_integrals(surface, faces)
+    assert find_radius_ratios(mesh.nodes, mesh.elements).min() >= RATIO_LEAST
+    _, volumes = find_gradients(mesh.nodes, mesh.elements)
+    solid = integrate_polyhedron(surface, faces)
     assert volumes.sum() == pytest.approx(solid.volume, rel=1e-12)
     np.testing.assert_allclose(solid.centroid, 0, atol=1e-12)
     outer = {tuple(np.roll(f, -f.argmin())) for f in find_surface_faces(mesh.elements)}
@@ -234,9 +238,9 @@ def test_a_grain_is_what_was_asked(seed: int, psi: float, roundness: float) -> N
 def test_radius_ratio_closed_forms() -> None:
     """1 for a regular tetrahedron; corner of a cube: 3 r/R = 3 (3 - sqrt 3)/6 / (sqrt 3/2)."""
     nodes = np.vstack([TETRAHEDRON, np.zeros(3), np.eye(3)])
-    ratios = radius_ratios(nodes, np.array([[0, 1, 2, 3], [4, 5, 6, 7]]))
+    ratios = find_radius_ratios(nodes, np.array([[0, 1, 2, 3], [4, 5, 6, 7]]))
     np.testing.assert_allclose(np.abs(ratios), [1, (3 - sqrt(3)) / sqrt(3)], rtol=1e-12)
-    assert radius_ratios(nodes, np.array([[4, 6, 5, 7]])) == pytest.approx(-ratios[1])
+    assert find_radius_ratios(nodes, np.array([[4, 6, 5, 7]])) == pytest.approx(-ratios[1])
 
 
 def test_out_of_reach_says_what_was_reached() -> None:

@@ -16,9 +16,9 @@ from qdem_fem.cli.track import SEAT_AREA
 from qdem_fem.element.material import Material
 from qdem_fem.files.errors import ConditionError, MeshError
 from qdem_fem.files.output import read_table
-from qdem_fem.mesh.tetrahedra import element_gradients, lumped_mass
-from qdem_fem.report.spectra import fourier_spectrum
-from qdem_fem.track.loads.rail import Track, seat_share
+from qdem_fem.mesh.tetrahedra import find_gradients, lump_mass
+from qdem_fem.report.spectra import transform_record
+from qdem_fem.track.loads.rail import Track, find_seat_share
 from qdem_fem.track.loads.train import (
     SEATS,
     LoadRecord,
@@ -58,7 +58,7 @@ def train_spectrum(frequency: np.ndarray, train: Train, track: Track) -> np.ndar
 def test_mesh_fills_the_shape(top: float, along: int) -> None:
     """The faces of a sleeper are planes, so its tetrahedra fill it exactly."""
     mesh = make_sleeper_mesh(SleeperShape(top_width=top), along, 3, 2)
-    _, volumes = element_gradients(mesh.nodes, mesh.elements)
+    _, volumes = find_gradients(mesh.nodes, mesh.elements)
     assert volumes.sum() == pytest.approx(2.0 * 0.174 * (0.24 + top) / 2, rel=1e-12)
     np.testing.assert_allclose(np.ptp(mesh.nodes, axis=0), [2.0, 0.24, 0.174], rtol=1e-12)
 
@@ -92,7 +92,7 @@ def test_sleepers_share_a_wheel_load(
     """The shares of all sleepers add up to one, wherever the wheel is."""
     track = Track(stiffness, modulus, spacing)
     reach = int(40 * track.elastic_length / spacing) + 20
-    shares = seat_share(place + spacing * np.arange(-reach, reach + 1), track)
+    shares = find_seat_share(place + spacing * np.arange(-reach, reach + 1), track)
     assert shares.sum() == pytest.approx(1, abs=1e-12)
 
 
@@ -101,13 +101,13 @@ def test_share_is_that_of_zimmermann_s_beam() -> None:
     a finite difference of itself; at the wheel P/(2 L) a."""
     track = Track(spacing=1e-3)
     length = track.elastic_length
-    assert seat_share(np.zeros(1), track)[0] == pytest.approx(1e-3 / 2 / length, rel=1e-3)
+    assert find_seat_share(np.zeros(1), track)[0] == pytest.approx(1e-3 / 2 / length, rel=1e-3)
     x, h = np.linspace(0.5, 3, 6), 0.02
-    w = [seat_share(x + k * h, track) for k in (-2, -1, 0, 1, 2)]
+    w = [find_seat_share(x + k * h, track) for k in (-2, -1, 0, 1, 2)]
     fourth = (w[0] - 4 * w[1] + 6 * w[2] - 4 * w[3] + w[4]) / h**4
     bent, carried = track.rail_stiffness * fourth, track.modulus * w[2]
     np.testing.assert_allclose(bent, -carried, atol=2e-3 * np.abs(carried).max())
-    assert seat_share(np.array([3.2 * pi / 4 * length]), track)[0] < 0  # the rail lifts
+    assert find_seat_share(np.array([3.2 * pi / 4 * length]), track)[0] < 0  # the rail lifts
 
 
 def test_integral_over_time_is_axle_load_times_spacing_over_speed() -> None:
@@ -123,7 +123,7 @@ def test_integral_over_time_is_axle_load_times_spacing_over_speed() -> None:
     time = np.arange(-20000, 80000) / 1e5
     flat = WheelFlat(axle=0, peak=60e3, duration=1e-3, place=-0.5e-3 * train.speed)
     added = find_seat_forces(time, train, TRACK, [flat]) - find_seat_forces(time, train, TRACK)
-    struck = seat_share(2 * pi * 0.43 * np.arange(-3, 9), TRACK).sum()
+    struck = find_seat_share(2 * pi * 0.43 * np.arange(-3, 9), TRACK).sum()
     got = trapezoid(added[:, 0], time)
     assert got == pytest.approx(2 / pi * 60e3 * 1e-3 * struck, rel=2e-3)  # it moves 32 mm meanwhile
 
@@ -135,7 +135,7 @@ def test_spectrum_is_the_closed_form() -> None:
     lead = (12 * TRACK.elastic_length + 0.3) / train.speed
     time = np.arange(-round(lead * 10000) - 5000, 45000) / 10000
     force = find_seat_forces(time, train, TRACK)[:, 0]
-    frequency, got = fourier_spectrum(time, force)
+    frequency, got = transform_record(time, force)
     exact = train_spectrum(frequency, train, TRACK)
     assert np.abs(got - exact).max() < 3e-6 * np.abs(exact[0])
     assert abs(exact[0]) == pytest.approx(20 * 50e3 * 0.6 / 32, rel=1e-12)
@@ -186,8 +186,8 @@ def test_a_free_sleeper_takes_up_the_impulse_of_the_record() -> None:
     duration = 3e-4
     simulation.advance(duration)
     time = simulation.time
-    _, volumes = element_gradients(body.nodes, body.elements)
-    mass = lumped_mass(body.elements, volumes, 2350.0, len(body.nodes))
+    _, volumes = find_gradients(body.nodes, body.elements)
+    mass = lump_mass(body.elements, volumes, 2350.0, len(body.nodes))
     momentum = mass @ body.velocity
     # forces grow in proportion to time: integral q t^2/2, of a sum over steps to their length
     slope = 0.0221 * 3e5 / 1e-4
@@ -219,7 +219,7 @@ def test_command_gives_wheels_flats(tmp_path: Path, capsys: pytest.CaptureFixtur
     for path, more in zip(paths, ([], flat), strict=True):
         assert main(["train", "--cars", "1", *more, "--out", str(path)]) == 0
     even, struck = (read_table(path)["rp1"] for path in paths)
-    centre = 60e3 * seat_share(np.zeros(1), TRACK)[0] / (0.13 * 0.17)
+    centre = 60e3 * find_seat_share(np.zeros(1), TRACK)[0] / (0.13 * 0.17)
     assert (struck - even).max() == pytest.approx(centre, rel=0.01)
     for axle in ("4", "0.5", "-1", "nan"):
         assert main(["train", "--cars", "1", "--flat", axle, *flat[2:], "--out", str(path)]) == 3

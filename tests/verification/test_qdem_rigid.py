@@ -27,7 +27,7 @@ from qdem_fem.files.errors import (
     Unstable,
 )
 from qdem_fem.mesh.generation import make_box_mesh
-from qdem_fem.scene.build import simulation_of
+from qdem_fem.scene.build import make_simulation
 from qdem_fem.scene.checks import load_scene
 from tests.qdem_slopes import slope_gain
 from trackbed import command
@@ -582,10 +582,10 @@ def test_a_scene_names_its_rigid_bodies(tmp_path: Path, capsys: pytest.CaptureFi
     file = tmp_path / "scene.toml"
     file.write_text(SCENE, encoding="utf-8")
     prepared = load_scene(file)
-    run, bodies = simulation_of(prepared)
+    run, bodies = make_simulation(prepared)
     assert bodies["stone"].rigid is True
     assert not run.viscous
-    left = prepared.scene.left_out()
+    left = prepared.scene.list_left_out()
     assert any("deformation" in text for text in left)
     assert any(text.startswith("viscosity") for text in left)
     assert command.main(["qdem", str(file), "--no-pictures"]) == 0
@@ -597,13 +597,13 @@ def test_a_scene_names_its_rigid_bodies(tmp_path: Path, capsys: pytest.CaptureFi
     assert json.loads(capsys.readouterr().out)["critical_step"]["value"] is None
     file.write_text(SCENE, encoding="utf-8")
     lumped = load_scene(file, ['body.0.rigid="lumped"'])
-    assert simulation_of(lumped)[1]["stone"].rigid == "lumped"
+    assert make_simulation(lumped)[1]["stone"].rigid == "lumped"
     with pytest.raises(SceneError, match="rigid"):
         load_scene(file, ['body.0.rigid="stiff"'])
     hinge = SCENE + '[[fix]]\nbody = "stone"\nnodes = { nearest = [0, 0, 0] }\n'
     file.write_text(hinge, encoding="utf-8")
     with pytest.raises(SceneError, match=r"body.0: what is held leaves the rigid body a motion"):
-        simulation_of(load_scene(file))
+        make_simulation(load_scene(file))
     file.write_text(alone, encoding="utf-8")
     with pytest.raises(ConditionError, match="double precision"):
-        simulation_of(load_scene(file, ['simulation.precision="float32"']))
+        make_simulation(load_scene(file, ['simulation.precision="float32"']))

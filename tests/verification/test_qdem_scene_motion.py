@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from qdem_fem.files.errors import SceneError
-from qdem_fem.scene.build import simulation_of
+from qdem_fem.scene.build import make_simulation
 from qdem_fem.scene.checks import load_scene
 
 SIDES = np.array([0.02, 0.03, 0.05])
@@ -40,7 +40,7 @@ def loaded(folder: Path, velocity: Any = None, spin: Any = None, *overrides: str
         )
     path = folder / "scene.toml"
     path.write_text(text)
-    run, bodies = simulation_of(load_scene(path, overrides))
+    run, bodies = make_simulation(load_scene(path, overrides))
     return run, bodies["brick"]
 
 
@@ -82,14 +82,15 @@ def test_nothing_moves_where_the_scene_names_no_motion(tmp_path: Path) -> None:
     parameters = load_scene(tmp_path / "scene.toml").scene.parameters()
     assert not {"velocity", "spin"} & set(parameters["body"][0])
     assert any(
-        "cause of motion" in text for text in load_scene(tmp_path / "scene.toml").scene.left_out()
+        "cause of motion" in text
+        for text in load_scene(tmp_path / "scene.toml").scene.list_left_out()
     )
 
 
 def test_motion_is_a_cause_of_motion(tmp_path: Path) -> None:
     """The report does not say that nothing moves it."""
     loaded(tmp_path, (1.0, 0.0, 0.0))
-    left_out = load_scene(tmp_path / "scene.toml").scene.left_out()
+    left_out = load_scene(tmp_path / "scene.toml").scene.list_left_out()
     assert not any("cause of motion" in text for text in left_out)
 
 
@@ -117,7 +118,7 @@ def test_a_body_joined_to_its_images_does_not_turn(tmp_path: Path) -> None:
         text = SCENE.replace("VELOCITY", "velocity = [1, 0, 0]")
         path.write_text(text.replace("SPIN", "spin = [0, 0, 1]" * spin) + sides)
         if not spin:
-            assert simulation_of(load_scene(path, []))[0].energy().kinetic > 0
+            assert make_simulation(load_scene(path, []))[0].energy().kinetic > 0
             continue
         with pytest.raises(SceneError, match=r"body\.0\.spin: a body that \[\[periodic\]\] joins"):
             load_scene(path, [])

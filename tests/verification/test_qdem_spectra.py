@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from qdem_fem.files.errors import UsageError
 from qdem_fem.report.spectra import (
     FloatArray,
-    amplitude_spectrum,
+    find_amplitudes,
     find_peak_frequencies,
-    fourier_spectrum,
-    parzen_smoothed,
+    smooth_spectrum,
+    transform_record,
 )
 
 
@@ -28,7 +28,7 @@ def damped(
 def test_amplitude_of_a_cosine() -> None:
     """A cosine of whole periods peaks at its amplitude and frequency; its mean is taken off."""
     time = np.arange(1000) * 1e-3
-    frequency, amplitude = amplitude_spectrum(time, 5 + damped(time, 40, amplitude=3e-4))
+    frequency, amplitude = find_amplitudes(time, 5 + damped(time, 40, amplitude=3e-4))
     assert frequency[np.argmax(amplitude)] == pytest.approx(40, rel=1e-12)
     assert amplitude.max() == pytest.approx(3e-4, rel=1e-12)
     assert amplitude[0] < 1e-12
@@ -39,7 +39,7 @@ def test_fourier_spectrum_of_an_exponential() -> None:
     time, rate = np.arange(200_000) * 1e-5, 60.0
     values = np.exp(-rate * time)
     values[0] = 0.5  # trapezoidal rule; its error is dt^2/12 |a + i w|^2 relative
-    frequency, spectrum = fourier_spectrum(time, values)
+    frequency, spectrum = transform_record(time, values)
     low = frequency < 100
     exact = 1 / (rate + 2j * np.pi * frequency[low])
     bound = (1e-5 * np.abs(1 / exact)) ** 2 / 12 + 1e-12
@@ -54,7 +54,7 @@ def test_parzen_window_has_the_bandwidth_it_is_asked_for() -> None:
     frequency = np.arange(40_001) * 0.05
     line = np.zeros(len(frequency))
     line[20_000] = 1.0
-    smooth = parzen_smoothed(frequency, line, 20.0) ** 2 / 0.05
+    smooth = smooth_spectrum(frequency, line, 20.0) ** 2 / 0.05
     assert 0.05 * smooth.sum() == pytest.approx(1, rel=1e-6)
     assert 1 / (0.05 * (smooth**2).sum()) == pytest.approx(20, rel=1e-3)
     u = 280 / (151 * 20.0)
@@ -122,4 +122,4 @@ def test_nothing_is_found_in_nothing() -> None:
 def test_uneven_records_are_refused(time: list[float], words: str) -> None:
     """A record that is no even, finite series of four samples is refused."""
     with pytest.raises(UsageError, match=words):
-        amplitude_spectrum(np.array(time, float), np.ones(len(time)))
+        find_amplitudes(np.array(time, float), np.ones(len(time)))

@@ -20,9 +20,9 @@ from qdem_fem.grains.sets import make_grains
 from qdem_fem.march import energies, kinetic_damping
 from qdem_fem.mesh.generation import make_box_mesh
 from qdem_fem.report.track import (
-    mobility,
+    find_grain_mobility,
 )
-from qdem_fem.scene.build import simulation_of
+from qdem_fem.scene.build import make_simulation
 from qdem_fem.scene.checks import load_scene
 from qdem_fem.scene.energy_account import EnergyAccount, list_energy_facts
 from qdem_fem.scene.run import RunFolder, run_dynamic
@@ -35,9 +35,9 @@ from qdem_fem.track.bodies import (
 )
 from qdem_fem.track.bogie import RISE, make_bogie_series
 from qdem_fem.track.enter import TrackPrepared
-from qdem_fem.track.loads.rail import Track, seat_share
+from qdem_fem.track.loads.rail import Track, find_seat_share
 from qdem_fem.track.loads.train import Train
-from qdem_fem.track.recipe import BedRecipe, grains_of
+from qdem_fem.track.recipe import BedRecipe, make_bed_grains
 from qdem_fem.track.sleeper_mesh import SleeperShape
 from qdem_fem.track.table import BogieTable, TrackTable
 from trackbed.command import main
@@ -248,7 +248,7 @@ def shaken(folder: Path, text: str = "") -> tuple[object, ...]:
         encoding="utf-8",
     )
     prepared = load_scene(path)
-    return prepared, *simulation_of(prepared), RunFolder(folder / "run")
+    return prepared, *make_simulation(prepared), RunFolder(folder / "run")
 
 
 def test_what_viscosity_takes_closes_the_account(tmp_path: Path) -> None:
@@ -316,7 +316,7 @@ def test_where_bodies_touch_the_account_is_looked_at(
 
 def test_loose_grains_touch_neither_each_other_nor_walls_nor_sleeper() -> None:
     band = (0.13, 0.29)
-    grains = place_grain_nodes(grains_of(RECIPE))
+    grains = place_grain_nodes(make_bed_grains(RECIPE))
     rooms = [(0.0, 0.2, 0.0, band[0]), (0.0, 0.2, band[1], 0.42)]
     placed = make_loose_lattice(grains, rooms, 0.0, RECIPE.radius, 5)
     assert len(placed) == 8
@@ -362,7 +362,11 @@ def test_the_load_of_a_bogie_is_that_of_its_axles_and_begins_and_ends_at_rest() 
     assert force[0] == 0.0
     assert not force[series.times > (6.0 + 2.1) / 32.0].any()
     at = 3.0 / 32.0  # the front axle stands over the sleeper
-    expected = 0.4 * 50e3 * (seat_share(np.zeros(1), track) + seat_share(np.array([-2.1]), track))
+    expected = (
+        0.4
+        * 50e3
+        * (find_seat_share(np.zeros(1), track) + find_seat_share(np.array([-2.1]), track))
+    )
     assert np.interp(at, series.times, force) == pytest.approx(float(expected[0]), rel=1e-3)
     inside = (series.times > RISE) & (series.times < (6.0 + 2.1) / 32.0 - RISE)
     impulse = np.trapezoid(force[inside], series.times[inside])
@@ -382,7 +386,7 @@ def test_mobility_of_a_grain_that_drops_off(samples: int, interval: float) -> No
     force = np.zeros((samples, 3))
     force[middle - 1 : middle + 1, 2] = impulse / interval  # one sample half-way between them
     drop = np.where(np.arange(samples) < samples - 1, 0.0, slip)  # in the last interval
-    frequency, ratio = mobility(time, drop, q.Series(time, force))
+    frequency, ratio = find_grain_mobility(time, drop, q.Series(time, force))
     assert frequency[-1] > 1000.0 - 1 / (samples * interval) - 1e-6
     blow = impulse * (1 + np.cos(2 * np.pi * frequency * interval))
     exact = slip / blow

@@ -15,7 +15,7 @@ from qdem_fem.track import enter as track_scene
 from qdem_fem.track import stand as track_stand
 from qdem_fem.track.bogie import RISE, make_bogie_series
 from qdem_fem.track.enter import TrackPrepared
-from qdem_fem.track.loads.rail import QUIET, Track, seat_share
+from qdem_fem.track.loads.rail import QUIET, Track, find_seat_share
 from qdem_fem.track.loads.train import Train
 from trackbed.command import main
 from validation.bench.track_trials import SCENE
@@ -53,7 +53,7 @@ def test_flats_of_a_scene_are_those_of_the_command(tmp_path: Path) -> None:
     _, flat_load = load_of(tmp_path, f"lead = {LEAD}, flat = [{table}]")
     full = (time > RISE) & (time < (2 * LEAD + 2.1) / SPEED - RISE)
     expected = SHARE * SEAT_AREA * (pressures[1] - pressures[0])[: len(time)][full]
-    assert np.abs(expected).max() > 0.9 * SHARE * 60e3 * seat_share(np.zeros(1), Track())[0]
+    assert np.abs(expected).max() > 0.9 * SHARE * 60e3 * find_seat_share(np.zeros(1), Track())[0]
     digit = SHARE * SEAT_AREA * 3e6 * 1e-8
     np.testing.assert_allclose((flat_load - round_load)[full], expected, atol=digit)
 
@@ -68,7 +68,7 @@ def test_a_flat_strikes_the_seat_at_every_turn_of_its_wheel(tmp_path: Path) -> N
     for turn in (-1, 0, 1):
         place = turn * TURN + half
         middle = (4.0 + Train().axle_distance + place) / SPEED
-        expected = SHARE * 60e3 * seat_share(np.array([place]), Track())[0]
+        expected = SHARE * 60e3 * find_seat_share(np.array([place]), Track())[0]
         found = added[int(np.argmin(np.abs(time - middle)))]
         assert found == pytest.approx(expected, rel=5e-3, abs=1.0)
     place = SPEED * time - 4.0 - Train().axle_distance
@@ -128,7 +128,7 @@ def test_a_bogie_that_no_record_holds_is_refused_by_its_key(
 def test_a_bogie_as_near_as_may_be_has_all_of_its_load(tmp_path: Path) -> None:
     """Over the sleeper the front axle's share is there to the last part of the half-cosine."""
     time, force = load_of(tmp_path, f"lead = {RISE * SPEED + 1e-9}")
-    expected = SHARE * 50e3 * seat_share(np.array([0.0, -2.1]), Track()).sum()
+    expected = SHARE * 50e3 * find_seat_share(np.array([0.0, -2.1]), Track()).sum()
     assert np.interp(RISE, time, force) == pytest.approx(expected, rel=1e-3)
 
 

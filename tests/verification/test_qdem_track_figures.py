@@ -11,19 +11,19 @@ from scipy.signal import periodogram
 
 from qdem_fem.files.output import Table
 from qdem_fem.files.series import Series
-from qdem_fem.report.spectra import fourier_spectrum, frequency_response, parzen_smoothed
+from qdem_fem.report.spectra import find_mobility, smooth_spectrum, transform_record
 from qdem_fem.report.track import (
     BANDWIDTH,
     FEWEST_SAMPLES,
     GRAINS,
     SENSORS,
-    acceleration_spectrum,
     average_between,
+    describe_smoothing,
     draw_track_pictures,
+    find_acceleration_spectrum,
+    find_grain_mobility,
+    find_peaks,
     list_track_facts,
-    mobility,
-    peaks_of,
-    smoothing,
 )
 
 STEP = 1e-4
@@ -54,7 +54,7 @@ def test_mobility_of_a_damped_spring_under_noise() -> None:
     force = np.random.default_rng(1).standard_normal(count)
     force *= np.sin(np.pi * np.clip(np.arange(count) / 3000, 0, 1)) ** 2
     time = STEP * np.arange(count)
-    frequency, ratio = mobility(time, pushed(force, spring, damper), load_of(force))
+    frequency, ratio = find_grain_mobility(time, pushed(force, spring, damper), load_of(force))
     seen = frequency >= 200
     omega = 2 * np.pi * frequency[seen]
     exact = np.abs(1j * omega / (spring + 1j * omega * damper))
@@ -83,12 +83,12 @@ def test_smoothing_leaves_silence_silent() -> None:
     round-off, which transforms would leave everywhere."""
     frequency = np.arange(2001) * 0.5
     amplitude = np.where(frequency < 200, 1e3, 0.0)
-    smooth = parzen_smoothed(frequency, amplitude)
+    smooth = smooth_spectrum(frequency, amplitude)
     assert not smooth[frequency > 375].any()
     time = 1e-3 * np.arange(2000)
     force = np.exp(-(((time - 1.0) / 0.01) ** 2))  # |F| < 1e-17 of its greatest from 200 Hz on
     shaken = np.random.default_rng(2).standard_normal(2000)
-    found, ratio = frequency_response(time, force, shaken)
+    found, ratio = find_mobility(time, force, shaken)
     assert np.isnan(ratio[found > 400]).all()
     assert np.isfinite(ratio[found < 20]).all()
 
@@ -100,7 +100,7 @@ def test_a_grain_that_rings_at_once_has_no_low_frequencies_of_its_own() -> None:
     time = STEP * np.arange(4000)
     ringing, decay, aside = 2 * np.pi * 3500.0, 100.0, 1e-9
     moved = aside * (1 - np.exp(-decay * time) * np.cos(ringing * time))
-    frequency, size = acceleration_spectrum(time, moved)
+    frequency, size = find_acceleration_spectrum(time, moved)
     seen = (frequency >= 100) & (frequency <= 400)
     assert size[seen] == pytest.approx(2 * np.pi * frequency[seen] * aside, rel=0.025)
     assert moved[1] / STEP > 20 * size[seen].min()
@@ -113,7 +113,7 @@ def test_density_of_a_spectrum_is_scipys_and_holds_the_variance() -> None:
     count = 8000
     time = STEP * np.arange(count)
     noise = 3.0 * np.random.default_rng(5).standard_normal(count)
-    frequency, spectrum = fourier_spectrum(time, noise)
+    frequency, spectrum = transform_record(time, noise)
     duration = count * STEP
     density = 2 * np.abs(spectrum) ** 2 / duration
     density[[0, -1]] /= 2
@@ -121,7 +121,7 @@ def test_density_of_a_spectrum_is_scipys_and_holds_the_variance() -> None:
     assert frequency == pytest.approx(other)
     assert density == pytest.approx(expected, rel=1e-9)
     assert density.sum() / duration == pytest.approx((noise**2).mean(), rel=1e-12)
-    smooth = 2 * parzen_smoothed(frequency, np.abs(spectrum), BANDWIDTH) ** 2 / duration
+    smooth = 2 * smooth_spectrum(frequency, np.abs(spectrum), BANDWIDTH) ** 2 / duration
     apart = len(smooth) / (BANDWIDTH * duration)
     level = 2 * 9.0 * STEP
     assert smooth[5:-5].mean() == pytest.approx(
@@ -131,9 +131,9 @@ def test_density_of_a_spectrum_is_scipys_and_holds_the_variance() -> None:
 
 def test_peaks_at_the_edges_and_in_constants_are_none() -> None:
     frequency = np.arange(6.0)
-    assert peaks_of(frequency, np.array([9.0, 1, 2, 1, 1, 9])) == [2.0]
-    assert peaks_of(frequency, np.full(6, 3.0)) == []
-    assert peaks_of(frequency, np.array([0.0, 1, np.nan, 1, 2, 0])) == [4.0]
+    assert find_peaks(frequency, np.array([9.0, 1, 2, 1, 1, 9])) == [2.0]
+    assert find_peaks(frequency, np.full(6, 3.0)) == []
+    assert find_peaks(frequency, np.array([0.0, 1, np.nan, 1, 2, 0])) == [4.0]
 
 
 def rows_written(folder: Path, count: int) -> None:
@@ -160,4 +160,4 @@ def test_a_run_too_short_for_spectra_ends_with_the_rest(tmp_path: Path, count: i
     told = dict(draw_track_pictures(tmp_path, load))
     assert len(told) == (6 if count >= FEWEST_SAMPLES else 2)
     assert any("not smoothed" in caption for caption in told.values()) == (count >= FEWEST_SAMPLES)
-    assert smoothing(np.linspace(0.0, 0.05, 9)) == "Parzen window of 20 Hz"
+    assert describe_smoothing(np.linspace(0.0, 0.05, 9)) == "Parzen window of 20 Hz"

@@ -23,7 +23,7 @@ from qdem_fem.track.bed import Bed, guide_sleeper
 from qdem_fem.track.bodies import TrackBox, place_grain_nodes
 from qdem_fem.track.enter import TrackPrepared, enter_track
 from qdem_fem.track.layout import TrackLayout
-from qdem_fem.track.recipe import grains_of
+from qdem_fem.track.recipe import make_bed_grains
 from qdem_fem.track.sleeper_mesh import SleeperShape
 from validation.bench.qdem import judge
 from validation.bench.track_trials import SCENE, scene_at
@@ -99,8 +99,8 @@ def scene_of(folder: Path, part: str, *changes: tuple[str, str]) -> TrackPrepare
 def test_loose_ballast_keeps_to_its_shoulder_and_off_the_sleeper(
     layout: TrackLayout, tmp_path: Path
 ) -> None:
-    grains = 40 * place_grain_nodes(grains_of(scene_of(tmp_path, "half").recipe))
-    below = np.concatenate(layout.grains_below(grains, 1))
+    grains = 40 * place_grain_nodes(make_bed_grains(scene_of(tmp_path, "half").recipe))
+    below = np.concatenate(layout.place_grains_below(grains, 1))
     out = layout.beyond(below[:, 0])
     assert out.max() + layout.radius <= 1.3 + 1e-9
     top, near, foot = (
@@ -108,7 +108,7 @@ def test_loose_ballast_keeps_to_its_shoulder_and_off_the_sleeper(
     )
     assert top > near > foot  # half and a quarter of it, in whole grains
     sleeper = layout.sleeper(0.5).nodes
-    beside = np.concatenate(layout.grains_beside(grains, 0.5, 2))
+    beside = np.concatenate(layout.place_grains_beside(grains, 0.5, 2))
     out = layout.beyond(beside[:, 0])
     assert 0.4 < out.max() <= 0.5 - layout.radius + 1e-9
     low, high = sleeper.min(axis=0), sleeper.max(axis=0)
@@ -127,9 +127,9 @@ def test_each_rail_seat_takes_its_own_pressure(
     two += "\npressure_other = { times = [0.0, 1.0], values = [2e6, 2e6] }" * (seats - 1)
     prepared = scene_of(tmp_path, part, (one, two))
     layout, recipe = prepared.recipe.layout, prepared.recipe
-    grains = place_grain_nodes(grains_of(recipe))
-    nodes = layout.grains_below(grains[: recipe.below], 1)
-    nodes += layout.grains_beside(grains[recipe.below :], 0.5, 2)
+    grains = place_grain_nodes(make_bed_grains(recipe))
+    nodes = layout.place_grains_below(grains[: recipe.below], 1)
+    nodes += layout.place_grains_beside(grains[recipe.below :], 0.5, 2)
     nodes.append(layout.sleeper(0.5).nodes)
     bed = Bed("rest", nodes, np.zeros((sum(map(len, nodes)), 3)), {}, {})
     monkeypatch.setattr(track_scene, "prepare_bed", lambda *given: bed)

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from qdem_fem.files.errors import SceneError, StepWarning
-from qdem_fem.scene.build import simulation_of
+from qdem_fem.scene.build import make_simulation
 from qdem_fem.scene.checks import load_scene
 from qdem_fem.track.bed import prepare_bed, read_bed
-from qdem_fem.track.enter import TrackPrepared, contact_of
+from qdem_fem.track.enter import TrackPrepared, choose_contact
 from qdem_fem.track.stand import begin_bed
 from trackbed import command
 from validation.bench.track_trials import SCENE, scene_at
@@ -39,7 +39,7 @@ def prepared_in(folder: Path, *overrides: str) -> TrackPrepared:
 def test_rigid_grains_begin_with_the_forces_of_deformable_ones(folder: Path) -> None:
     """To the bit: they lie where those lay.  The sleeper keeps its strain, grains have none."""
     prepared = prepared_in(folder)
-    bed, contact = read_bed(prepared.bed_file, prepared.recipe), contact_of(prepared)
+    bed, contact = read_bed(prepared.bed_file, prepared.recipe), choose_contact(prepared)
     runs = [begin_bed(prepared.recipe, bed, contact, kind, threads=1)[0] for kind in (False, True)]
     for run in runs:
         assert run.contacts is not None
@@ -72,9 +72,9 @@ def test_a_run_of_rigid_grains_says_what_it_leaves_out_and_stands_for_itself(fol
     kinds = {"false": "", "true": ", grains rigid", '"lumped"': ", grains rigid (lumped)"}
     for kind in kinds:
         prepared = prepared_in(folder, f"track.rigid={kind}", "track.stand=1e-5")
-        told = " ".join(prepared.scene.left_out())
+        told = " ".join(prepared.scene.list_left_out())
         assert ("deformation of grains" in told) == (kind != "false")
-        simulation_of(prepared)
+        make_simulation(prepared)
     stands = read_bed(prepared.bed_file, prepared.recipe).stands
     keys = {f"friction 0.577, 1e-05 s{kind}" for kind in kinds.values()}
     assert keys <= set(stands)

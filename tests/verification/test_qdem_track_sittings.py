@@ -16,8 +16,16 @@ from qdem_fem.march.kinetic_damping import Rest
 from qdem_fem.rigid.holds import find_hold
 from qdem_fem.rigid.step import FREE, STILL
 from qdem_fem.track import bed as track_bed
-from qdem_fem.track.bed import STAGES, Bed, part_of, prepare_bed, read_bed, run_stage, write_bed
-from qdem_fem.track.recipe import BedRecipe, grains_of
+from qdem_fem.track.bed import (
+    STAGES,
+    Bed,
+    place_stage_part,
+    prepare_bed,
+    read_bed,
+    run_stage,
+    write_bed,
+)
+from qdem_fem.track.recipe import BedRecipe, make_bed_grains
 from validation.bench.track_trials import scene_at
 
 JUDGEMENTS = 3
@@ -43,7 +51,7 @@ def fallen(recipe: BedRecipe, part: Path | None, killed_after: int | None = None
         if seen == killed_after:
             raise Killed
 
-    return run_stage(recipe, grains_of(recipe), "bed", None, 1, progress, part)
+    return run_stage(recipe, make_bed_grains(recipe), "bed", None, 1, progress, part)
 
 
 def told(bed: Bed) -> tuple[bytes, dict[str, Any]]:
@@ -106,13 +114,13 @@ def test_what_a_kill_left_of_a_stage_that_is_done_is_not_read(
     """Between the bed's file and the removal of the part: the next stages begin all the same."""
     recipe, path = recipe_at(tmp_path), tmp_path / "bed.npz"
     write_bed(path, recipe, whole)
-    parts = {part_of(path, stage) for stage in STAGES}
+    parts = {place_stage_part(path, stage) for stage in STAGES}
     assert len(parts) == len(STAGES)
-    part_of(path, "bed").write_bytes(b"left by a kill")
+    place_stage_part(path, "bed").write_bytes(b"left by a kill")
     nothing = Rest(0.0, 0.0, 0.0, 0, 0, 0, 0.0)
     monkeypatch.setattr(track_bed, "find_rest", lambda *given, **more: nothing)
     assert prepare_bed(recipe, path, 1).stage == "rest"
-    assert not [part for part in parts - {part_of(path, "bed")} if part.exists()]
+    assert not [part for part in parts - {place_stage_part(path, "bed")} if part.exists()]
 
 
 def test_patience_is_no_part_of_a_bed(whole: Bed, tmp_path: Path) -> None:

@@ -20,13 +20,13 @@ from qdem_fem.contact.sphere_state import SphereContacts
 from qdem_fem.files.errors import NotConverged
 from qdem_fem.march.kinetic_damping import compute_masses, find_rest
 from qdem_fem.mesh.generation import make_box_mesh
-from qdem_fem.scene.build import simulation_of
+from qdem_fem.scene.build import make_simulation
 from qdem_fem.scene.checks import load_scene
 from qdem_fem.track import stand as track_stand
 from qdem_fem.track.bed import Bed, read_bed, write_bed
 from qdem_fem.track.bodies import place_grain_nodes
-from qdem_fem.track.enter import TrackPrepared, contact_of
-from qdem_fem.track.recipe import grains_of
+from qdem_fem.track.enter import TrackPrepared, choose_contact
+from qdem_fem.track.recipe import make_bed_grains
 from qdem_fem.track.stand import begin_bed, judge_bed, let_bed_stand
 from tests.verification.test_qdem_track import RADIUS, RECIPE, STIFFNESS, STONE
 from validation.bench.track_trials import SCENE
@@ -57,7 +57,7 @@ def bed(monkeypatch: pytest.MonkeyPatch) -> Bed:
 
     monkeypatch.setattr(track_stand, "make_bed_bodies", bodies)
     monkeypatch.setattr(track_stand, "guide_sleeper", hold)
-    monkeypatch.setattr(track_stand, "grains_of", lambda recipe: None)
+    monkeypatch.setattr(track_stand, "make_bed_grains", lambda recipe: None)
     nodes = [body.nodes for body in bodies().values()]
     run, _ = begin_bed(SLOPING, Bed("rest", nodes, np.zeros((16, 3)), {}, {}), contact(0.5))
     find_rest(run, 1e-3, 1e-4, 0.0, 2.0, look=5)
@@ -106,9 +106,9 @@ def scene_in_the_air(folder: Path, text: Callable[[str], str]) -> TrackPrepared:
     prepared = load_scene(path)
     assert isinstance(prepared, TrackPrepared)
     layout, recipe = prepared.recipe.layout, prepared.recipe
-    grains = place_grain_nodes(grains_of(recipe))
-    nodes: list[Any] = layout.grains_below(grains[: recipe.below], 1)
-    nodes += layout.grains_beside(grains[recipe.below :], 0.6, 2)
+    grains = place_grain_nodes(make_bed_grains(recipe))
+    nodes: list[Any] = layout.place_grains_below(grains[: recipe.below], 1)
+    nodes += layout.place_grains_beside(grains[recipe.below :], 0.6, 2)
     nodes.append(layout.sleeper(0.6).nodes)
     moved = np.zeros((sum(map(len, nodes)), 3))
     write_bed(prepared.bed_file, recipe, Bed("rest", nodes, moved, {}, {}))
@@ -118,8 +118,8 @@ def scene_in_the_air(folder: Path, text: Callable[[str], str]) -> TrackPrepared:
 def test_skin_and_friction_of_a_scene_are_the_runs(tmp_path: Path) -> None:
     prepared = scene_in_the_air(tmp_path, lambda text: text.replace(
         "radius = 0.012", "radius = 0.012\nskin = 1.5e-3"))  # fmt: skip
-    assert contact_of(prepared).skin == 1.5e-3
-    run, _ = simulation_of(prepared)
+    assert choose_contact(prepared).skin == 1.5e-3
+    run, _ = make_simulation(prepared)
     assert run.contacts is not None
     assert run.contacts.skin == 1.5e-3
     assert prepared.stand["creep"] == 0.0
@@ -129,5 +129,5 @@ def test_skin_and_friction_of_a_scene_are_the_runs(tmp_path: Path) -> None:
 def test_a_bed_of_grains_in_the_air_takes_nothing(tmp_path: Path) -> None:
     prepared = scene_in_the_air(tmp_path, str)
     bed = read_bed(prepared.bed_file, prepared.recipe)
-    stand = let_bed_stand(prepared.recipe, bed, contact_of(prepared), 1e-5)
+    stand = let_bed_stand(prepared.recipe, bed, choose_contact(prepared), 1e-5)
     assert (stand.pairs, stand.creep, stand.at_limit) == (0, 0.0, 0.0)

@@ -53,7 +53,7 @@ def explain_refusal(path: Path, error: OSError) -> DiskFull | UsageError:
 
 
 @contextmanager
-def whole_file(path: Path) -> Iterator[Path]:
+def replace_file(path: Path) -> Iterator[Path]:
     """A name to write to that becomes ``path`` when the block ends well, and else is removed.
 
     Whatever kills the writer leaves the old file or the new, never a part; a symbolic link at
@@ -73,8 +73,8 @@ def whole_file(path: Path) -> Iterator[Path]:
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
-    """Write a text or bytes as `whole_file` does."""
-    with whole_file(path) as temporary, open_unlinked(temporary, "wb") as stream:
+    """Write a text or bytes as `replace_file` does."""
+    with replace_file(path) as temporary, open_unlinked(temporary, "wb") as stream:
         stream.write(content.encode() if isinstance(content, str) else content)
 
 

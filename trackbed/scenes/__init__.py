@@ -1,4 +1,4 @@
-"""Scenes to copy and edit: ``scene_names`` lists them, ``scene_template`` is the text of one."""
+"""Scenes to copy and edit: ``list_scenes`` lists them, ``read_template`` is the text of one."""
 
 from __future__ import annotations
 
@@ -7,23 +7,26 @@ from importlib.resources import files
 from pathlib import Path
 
 __all__ = [
-    "scene_names", "scene_path", "scene_template", "scene_verb",
+    "find_scene_verb",
+    "list_scenes",
+    "read_template",
+    "scene_path",
 ]  # fmt: skip
 
 VERB_OF_TABLE = {"sample": "run", "simulation": "qdem", "run": "rigid"}
 """A table of a scene file, and the verb that reads it."""
 
 
-def scene_names() -> tuple[str, ...]:
+def list_scenes() -> tuple[str, ...]:
     """Names of the scenes that ship with the package, sorted."""
     names = sorted(entry.name for entry in files(__name__).iterdir())
     return tuple(name.removesuffix(".toml") for name in names if name.endswith(".toml"))
 
 
-def scene_template(name: str) -> str:
+def read_template(name: str) -> str:
     """Text of the scene file ``name``; raises KeyError, which lists the names, for another."""
-    if name not in scene_names():
-        raise KeyError(f"no scene {name!r}; there are {', '.join(scene_names())}")
+    if name not in list_scenes():
+        raise KeyError(f"no scene {name!r}; there are {', '.join(list_scenes())}")
     return (files(__name__) / f"{name}.toml").read_text(encoding="utf-8")
 
 
@@ -32,7 +35,7 @@ def scene_path(name: str) -> Path:
     return Path(str(files(__name__) / f"{name}.toml"))
 
 
-def scene_verb(name: str) -> str:
+def find_scene_verb(name: str) -> str:
     """The verb of ``trackbed`` that runs the scene ``name``, known by a table only it has."""
-    tables = tomllib.loads(scene_template(name))
+    tables = tomllib.loads(read_template(name))
     return next((verb for table, verb in VERB_OF_TABLE.items() if table in tables), "run")

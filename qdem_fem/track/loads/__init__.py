@@ -1,6 +1,6 @@
 """Loads of a passing train: rail, wheels, records."""
 
-from qdem_fem.track.loads.rail import Track, seat_share
+from qdem_fem.track.loads.rail import Track, find_seat_share
 from qdem_fem.track.loads.train import (
     MOST_SAMPLES,
     RATE,
@@ -12,6 +12,13 @@ from qdem_fem.track.loads.train import (
 )
 
 __all__ = [
-    "MOST_SAMPLES", "RATE", "Track", "Train", "WheelFlat", "find_flat_forces", "make_train_record",
-    "seat_share", "write_load_record",
+    "MOST_SAMPLES",
+    "RATE",
+    "Track",
+    "Train",
+    "WheelFlat",
+    "find_flat_forces",
+    "find_seat_share",
+    "make_train_record",
+    "write_load_record",
 ]  # fmt: skip

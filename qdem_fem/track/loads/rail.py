@@ -45,7 +45,7 @@ def refuse_unless_positive(thing: Any, where: str) -> None:
             )
 
 
-def seat_share(distance: FloatArray, track: Track) -> FloatArray:
+def find_seat_share(distance: FloatArray, track: Track) -> FloatArray:
     """Share of a wheel load that a rail seat takes from a wheel at ``distance`` x from it [m].
 
     The foundation carries p = P/(2 L) e^-s (cos s + sin s) a metre, s = |x|/L; over the spacing a

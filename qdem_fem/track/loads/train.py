@@ -21,7 +21,7 @@ import numpy as np
 
 from qdem_fem.files import ConditionError
 from qdem_fem.mesh import FloatArray
-from qdem_fem.track.loads.rail import QUIET, Track, refuse_unless_positive, seat_share
+from qdem_fem.track.loads.rail import QUIET, Track, find_seat_share, refuse_unless_positive
 from trackbed.run_files import write_whole
 
 RATE = 10_000.0
@@ -119,7 +119,7 @@ def find_seat_forces(
     front = train.speed * time
     total = np.zeros((len(time), 2))
     for axle in train.axles:
-        total += np.outer(seat_share(front - axle, track), train.wheel_loads)
+        total += np.outer(find_seat_share(front - axle, track), train.wheel_loads)
     if flats:
         total += find_flat_forces(front, train.axles, train.speed, track, flats)[:, None]
     return total
@@ -149,7 +149,7 @@ def find_flat_forces(
         place = front - axles[int(flat.axle)]
         since = np.mod(place - flat.place, turn) / speed
         force = np.where(since < flat.duration, flat.peak * np.sin(pi * since / flat.duration), 0.0)
-        total += force * seat_share(place, track)
+        total += force * find_seat_share(place, track)
     return total
 
 

@@ -29,7 +29,9 @@ def contact_made(model: str, detail: float, friction: float) -> q.SphereContact 
     return q.SurfaceContact(MODULUS, friction, points=int(detail))
 
 
-def faces_stress(model: str, below: int, above: int, detail: float) -> tuple[Floats, float, float]:
+def average_stress(
+    model: str, below: int, above: int, detail: float
+) -> tuple[Floats, float, float]:
     """Stress of all elements over the pressure, (m,), force carried over the load, and [s] a step.
 
     The upper cube lies on the lower one and is pressed at 1 MPa until both rest; the exact answer
@@ -67,7 +69,7 @@ def faces_checks() -> list[Check]:
     """Vertices on vertices, and between them, on two sizes of mesh, by both models."""
     checks = []
     for model, below, above, detail in FACES:
-        stress, carried, seconds = faces_stress(model, below, above, detail)
+        stress, carried, seconds = average_stress(model, below, above, detail)
         name, worst = faces_name(model, below, above, detail), float(np.abs(stress - 1).max())
         same = model == "surface" and below == above
         checks += [

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from qdem_fem.mesh.generation import make_box_mesh
-from qdem_fem.mesh.surface import find_faces_within, find_surface_faces, pressure_forces
+from qdem_fem.mesh.surface import find_faces_within, find_pressure_forces, find_surface_faces
 from qdem_fem.mesh.tetrahedra import TetMesh
 from validation.bench.qdem.closed_forms import CONCRETE_BEAM
 
@@ -80,7 +80,7 @@ class Question:
             force[loaded, 2] = LOAD / loaded.sum()
             return force
         faces = find_faces_within(find_surface_faces(mesh.elements), loaded)
-        return self.amplitude * pressure_forces(mesh.nodes, faces, len(mesh.nodes))
+        return self.amplitude * find_pressure_forces(mesh.nodes, faces, len(mesh.nodes))
 
     def error(self, times: FloatArray, displacement: FloatArray, wanted: FloatArray) -> float:
         """Relative L2 error of a history ``displacement`` [m] at ``times`` [s]."""

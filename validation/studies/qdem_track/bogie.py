@@ -10,8 +10,14 @@ import numpy as np
 from qdem_fem.files.errors import UsageError
 from qdem_fem.files.output import read_table
 from qdem_fem.mesh.checks import FloatArray
-from qdem_fem.report.spectra import fourier_spectrum, parzen_smoothed
-from qdem_fem.report.track import BANDWIDTH, GRAINS, HIGHEST, acceleration_spectrum, mobility
+from qdem_fem.report.spectra import smooth_spectrum, transform_record
+from qdem_fem.report.track import (
+    BANDWIDTH,
+    GRAINS,
+    HIGHEST,
+    find_acceleration_spectrum,
+    find_grain_mobility,
+)
 from qdem_fem.scene.checks import load_scene
 from qdem_fem.track.enter import TrackPrepared, TrackScene
 from qdem_fem.track.loads.train import Train
@@ -84,13 +90,13 @@ def measure_packing(folder: Path, seed: int, friction: float) -> dict[str, Any]:
 def spectra_of(prepared: TrackPrepared, rows: dict[str, FloatArray]) -> dict[str, list[float]]:
     """Every `APART` Hz: the load [N s], acceleration of S2 [m/s], mobility of B2 [m/(s N)]."""
     time, load = rows["time"], prepared.load
-    frequency, spectrum = fourier_spectrum(time, np.interp(time, load.times, load.values[:, 2]))
-    smooth = parzen_smoothed(frequency, np.abs(spectrum), BANDWIDTH)
+    frequency, spectrum = transform_record(time, np.interp(time, load.times, load.values[:, 2]))
+    smooth = smooth_spectrum(frequency, np.abs(spectrum), BANDWIDTH)
     up = {name: rows[f"{name}_z"] - rows[f"{name}_z"][0] for name in ("S2", "B2")}
     curves = {
         "load": (frequency, smooth),
-        "S2": acceleration_spectrum(time, up["S2"]),
-        "B2": mobility(time, up["B2"], load),
+        "S2": find_acceleration_spectrum(time, up["S2"]),
+        "B2": find_grain_mobility(time, up["B2"], load),
     }
     grid = np.arange(0.0, HIGHEST, APART)
     return {

@@ -11,7 +11,7 @@ from pathlib import Path
 from qdem_fem.files.errors import StepWarning
 from qdem_fem.scene.checks import load_scene
 from qdem_fem.track.bed import STAGES, read_bed
-from qdem_fem.track.enter import TrackPrepared, contact_of
+from qdem_fem.track.enter import TrackPrepared, choose_contact
 from qdem_fem.track.stand import begin_bed
 from validation.bench.qdem.checks import figures_row, reported
 from validation.studies.qdem_track.bogie import FRICTIONS, SCENE, SEEDS, measure_packing
@@ -50,7 +50,7 @@ def paper_scale() -> Row:
         )
     table = prepared.scene.simulation
     run = begin_bed(
-        recipe, bed, contact_of(prepared), strain=table.strain, step=table.step,
+        recipe, bed, choose_contact(prepared), strain=table.strain, step=table.step,
         safety=table.safety, threads=1, mass_scaling=table.mass_scaling,
     )[0]  # fmt: skip
     run.advance(20 * run.step)

@@ -10,7 +10,7 @@ import numpy as np
 
 from qdem_fem.files.output import read_table
 from qdem_fem.report.track import list_track_facts
-from qdem_fem.scene.build import simulation_of
+from qdem_fem.scene.build import make_simulation
 from qdem_fem.scene.energy_account import list_energy_facts
 from qdem_fem.scene.run import RunFolder, run_dynamic
 from qdem_fem.track.bed import prepare_bed
@@ -53,7 +53,7 @@ class Trial:
 
 def run_scene(prepared: TrackPrepared, folder: Path) -> Trial:
     """Prepare, where that is not done yet, and run."""
-    run, bodies = simulation_of(prepared)
+    run, bodies = make_simulation(prepared)
     place = RunFolder(folder)
     with place.locked():
         done = run_dynamic(prepared, run, bodies, place, resume=False, progress=Quiet())
@@ -101,7 +101,7 @@ def at_most(name: str, value: float, bar: float, unit: str = "") -> Check:
 
 def resume_check(folder: Path) -> Check:
     """A run that is saved and taken up again beside one that is not: the same to the bit."""
-    runs = [simulation_of(scene_at(folder))[0] for _ in range(2)]
+    runs = [make_simulation(scene_at(folder))[0] for _ in range(2)]
     half = 1000 * runs[0].step
     runs[0].advance(half)
     runs[0].save(folder / "half.npz")
