@@ -22,7 +22,6 @@ FLAT = 1e-12
 regular tetrahedron has 0.118.  Round-off of the volume itself is about 1e-16."""
 EXTENT_MOST = 1e100
 """Largest extent of a mesh [m], and one over the smallest: volumes stay within float64."""
-_ELEMENTS_AT_ONCE = 1 << 16
 _SHOWN = 5
 
 
@@ -189,7 +188,16 @@ def find_flat_elements(
     Flat is a volume at or below `FLAT` of the cube of the longest edge, or below what the
     rounding of the coordinates leaves open, four units in their last place.
     """
-    volume, shape, noise = _volumes(nodes, elements, usable)
+    volume, shape, noise = np.full((3, len(elements)), np.nan)
+    x = np.ascontiguousarray(nodes[elements[usable]].transpose(1, 2, 0))
+    with np.errstate(all="ignore"):  # beyond the range of a float: the caller finds it
+        e = x[1:] - x[0]
+        others = (e[1] - e[0], e[2] - e[0], e[2] - e[1])
+        longest = np.sqrt(np.max([(v * v).sum(axis=0) for v in (*e, *others)], axis=0))
+        volume[usable] = (e[0] * np.cross(e[1], e[2], axis=0)).sum(axis=0) / 6
+        shape[usable] = volume[usable] / longest**3
+        farthest = np.abs(x).max(axis=(0, 1), initial=0.0)
+        noise[usable] = 4 * np.finfo(np.float64).eps * farthest / longest
     tiny = np.finfo(np.float64).tiny
     sound = np.isfinite(volume) & (np.abs(volume) >= tiny)
     sound &= np.abs(shape) > np.maximum(FLAT, noise)
@@ -203,26 +211,6 @@ def find_flat_elements(
         f"(at least {np.fmax(FLAT, noise[at]):.0e} is needed)"
     )
     return volume, [Problem(text, "remove the flat elements or mesh again there")]
-
-
-def _volumes(
-    nodes: FloatArray, elements: IntArray, usable: BoolArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Signed volume [m^3], the same over longest edge cubed, and that ratio's rounding, (m,)."""
-    volume, shape, noise = np.full((3, len(elements)), np.nan)
-    for start in range(0, len(elements), _ELEMENTS_AT_ONCE):
-        part = start + np.flatnonzero(usable[start : start + _ELEMENTS_AT_ONCE])
-        x = np.ascontiguousarray(nodes[elements[part]].transpose(1, 2, 0))
-        with np.errstate(all="ignore"):  # beyond the range of a float: the caller finds it
-            e = x[1:] - x[0]
-            others = (e[1] - e[0], e[2] - e[0], e[2] - e[1])
-            longest = np.sqrt(np.max([(v * v).sum(axis=0) for v in (*e, *others)], axis=0))
-            sixfold = (e[0] * np.cross(e[1], e[2], axis=0)).sum(axis=0)
-            volume[part] = sixfold / 6
-            shape[part] = sixfold / 6 / longest**3
-            farthest = np.abs(x).max(axis=(0, 1), initial=0.0)
-            noise[part] = 4 * np.finfo(np.float64).eps * farthest / longest
-    return volume, shape, noise
 
 
 def name_some(kind: str, indices: IntArray) -> str:

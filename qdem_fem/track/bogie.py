@@ -8,7 +8,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from qdem_fem.files import ConditionError, Series
-from qdem_fem.mesh import FloatArray
 from qdem_fem.track.loads import (
     MOST_SAMPLES,
     RATE,
@@ -19,6 +18,7 @@ from qdem_fem.track.loads import (
     find_seat_share,
 )
 
+DOWN = np.array([0.0, 0.0, -1.0])
 RISE = 0.01
 """Time over which the load of a bogie that is still far begins and ends [s]."""
 
@@ -57,14 +57,9 @@ def make_bogie_series(
     force = train.first_share * train.axle_load * of_wheels
     if flats:
         force += find_flat_forces(front, axles, train.speed, track, flats)
-    return Series(time, point_down(share * force * (1 - np.cos(np.pi * ramp)) / 2))
+    return Series(time, np.outer(share * force * (1 - np.cos(np.pi * ramp)) / 2, DOWN))
 
 
 def find_passing_time(train: Train, lead: float) -> float:
     """From the front axle ``lead`` [m] before the sleeper to the rear one as far behind it [s]."""
     return float(2 * lead + train.axles[1]) / train.speed
-
-
-def point_down(size: FloatArray) -> FloatArray:
-    """Forces of these sizes (k,) [N] along -z, (k, 3)."""
-    return np.outer(size, [0.0, 0.0, -1.0])

@@ -9,12 +9,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 from pydantic import Field
 
 from qdem_fem.bodies import Rigid
 from qdem_fem.files import Series
 from qdem_fem.tables import Cells, MaterialTable, SeriesTable, Share, make_series
-from qdem_fem.track.bogie import find_passing_time, make_bogie_series, point_down
+from qdem_fem.track.bogie import DOWN, find_passing_time, make_bogie_series
 from qdem_fem.track.layout import Part
 from qdem_fem.track.loads import Track, Train, WheelFlat
 from qdem_fem.track.sleeper_mesh import SleeperShape
@@ -159,5 +160,5 @@ def make_seat_loads(track: TrackTable, folder: Path) -> tuple[Series, ...]:
             found += found
             continue
         given = make_series(table, f"track.{name}", folder, vector=False)
-        found.append(Series(given.times, point_down(share * track.seat_area * given.values)))
+        found.append(Series(given.times, np.outer(share * track.seat_area * given.values, DOWN)))
     return tuple(found)
