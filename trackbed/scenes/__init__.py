@@ -19,8 +19,8 @@ VERB_OF_TABLE = {"sample": "run", "simulation": "qdem", "run": "rigid"}
 
 def list_scenes() -> tuple[str, ...]:
     """Names of the scenes that ship with the package, sorted."""
-    names = sorted(entry.name for entry in files(__name__).iterdir())
-    return tuple(name.removesuffix(".toml") for name in names if name.endswith(".toml"))
+    names = [entry.name for entry in files(__name__).iterdir()]
+    return tuple(sorted(n.removesuffix(".toml") for n in names if n.endswith(".toml")))
 
 
 def read_template(name: str) -> str:
