@@ -137,9 +137,9 @@ def find_node_areas(nodes: FloatArray, faces: IntArray) -> FloatArray:
 def find_greatest_curvatures(nodes: FloatArray, faces: IntArray, edges: Edges) -> FloatArray:
     """Larger principal curvature at each node [1/m], (n,): H + sqrt(H^2 - K).
 
-    With the area A of `find_node_areas`: H = sum(L theta)/(4 A) over its edges, K = (2 pi - sum of
-    the angles around it)/A, with no root where H^2 < K (Meyer et al. 2003).  Curvature is smeared over
-    that area: no edge is sharper than the mesh shows.
+    With the area A of `find_node_areas`: H = sum(L theta)/(4 A) over its edges, K = (2 pi - sum
+    of the angles around it)/A, with no root where H^2 < K (Meyer et al. 2003). Curvature is
+    smeared over that area: no edge is sharper than the mesh shows.
     """
     count = len(nodes)
     own = find_node_areas(nodes, faces)
