@@ -197,6 +197,8 @@ def _opened(content: bytes, where: str) -> tuple[dict[str, Any], Arrays]:
         raise CheckpointError(
             f"it is of format {known}, this version reads {CHECKPOINT_FORMAT}",
             where=where,
-            remedy="go on with the version that wrote it",
+            remedy="go on with trackbed 0.1.0"
+            if known == 3
+            else "go on with the version that wrote it",
         )
     return head, arrays

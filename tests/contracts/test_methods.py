@@ -22,6 +22,8 @@ from rigid_lcp.friction.problem.definition import (
 )
 from tests.rigid_static_problems import beam, pyramid, table, tower
 
+pytestmark = pytest.mark.lowest
+
 TOLERANCE = 1e-10
 SMALL = {
     "beam": beam(), "rough beam": beam(0.1, 0.5), "tower": tower(3), "pyramid": pyramid(3, 0.6),
