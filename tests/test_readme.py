@@ -20,13 +20,13 @@ SHORTER = {"k_i": (20, 5), "k": (20, 5), "h": (35, 8), "total_cycles": (100, 20)
 
 
 def blocks() -> list[object]:
-    """Code blocks in the order of the text; those that start an engine are marked so."""
+    """Code blocks in the order of the text; those that start an engine are marked so, and long."""
     return [
         pytest.param(
             block["language"],
             block["code"],
             id=f"line-{README.count(chr(10), 0, block.start()) + 1}",
-            marks=[pytest.mark.engine] if block["engine"] else [],
+            marks=[pytest.mark.engine, pytest.mark.long] if block["engine"] else [],
         )
         for block in BLOCK.finditer(README)
     ]

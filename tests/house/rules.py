@@ -126,10 +126,15 @@ def read_imports(tree: ast.Module, modules: Mapping[str, Any]) -> Iterator[Impor
             names = tuple(name for name in inside if f"{node.module}.{name}" not in modules)
             if names:
                 yield Import(node.lineno, node.module, names)
-        elif isinstance(node, ast.Call) and "import_module" in ast.unparse(node.func):
+        elif isinstance(node, ast.Call) and is_named(node.func, "import_module"):
             for word in node.args:
                 if isinstance(word, ast.Constant) and isinstance(word.value, str):
                     yield Import(node.lineno, word.value)
+
+
+def is_named(node: ast.expr, name: str) -> bool:
+    """Whether an expression is a name, or ends with it after a dot."""
+    return name in (getattr(node, "id", ""), getattr(node, "attr", ""))
 
 
 def find_circles(graph: Mapping[str, set[str]]) -> list[list[str]]:

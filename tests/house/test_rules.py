@@ -26,10 +26,10 @@ ROOT = Path(__file__).parents[2]
 Check = Callable[[House], Iterator[Breach]]
 
 
-@pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.__name__)
-def test_house_keeps_its_rules(rule: Check) -> None:
+def test_house_keeps_its_rules() -> None:
     """No rule is broken; where one is, each place is named with file, line and rule."""
-    breaches = [str(one) for one in rule(House(ROOT))]
+    house = House(ROOT)
+    breaches = [str(one) for rule in RULES for one in rule(house)]
     assert not breaches, "\n".join(["", *breaches])
 
 

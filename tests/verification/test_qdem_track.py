@@ -73,7 +73,7 @@ def test_cubes_come_to_rest_on_springs_that_bear_their_weight(rigid: bool, each:
     # What is unbalanced, 1 % of the force on a vertex, leaves at most some per cent of a body's.
     run = stacked(rigid)
     rest = kinetic_damping.find_rest(run, 1e-2, 1e-3, 0.0, 2.0, look=10 if rigid else 40, each=each)
-    weight = 9.81 * kinetic_damping.masses(run)
+    weight = 9.81 * kinetic_damping.compute_masses(run)
     assert run.contacts is not None
     assert rest.unbalanced <= 1e-2
     assert -run.contacts.plane_force(0)[2] == pytest.approx(weight.sum(), rel=2e-2)
