@@ -27,6 +27,7 @@ VERBS = {
         "adapters.cli.fit",
         "fit a residual law to a run, dumps or a CSV series and extrapolate it",
     ),
+    "relax": ("adapters.cli.relax", "bring the overlaps of a state back to equilibrium"),
     "qdem": ("qdem_fem.cli.run", "vibration and statics of deformable bodies, from a scene file"),
     "advise": ("qdem_fem.cli.advise", "which bodies of a QDEM scene may be rigid, at what error"),
     "grains": ("qdem_fem.cli.track", "random ballast grains of a standard grading, as a file"),

@@ -21,13 +21,17 @@ import time
 import numpy as np
 
 from adapters.bed import (
+    CHAIN_FACTOR,
+    GRAVITY,
     BoolArray,
     FloatArray,
     HertzStiffness,
     IntArray,
     State,
     Walls,
+    check_bed,
     list_wall_rows,
+    overlap_under_force,
     wall_names,
 )
 from adapters.errors import UsageError
@@ -62,6 +66,7 @@ def relax(
     method: str = "smallest-move",
     frontier: BoolArray | None = None,
     keep_height: bool = True,
+    overlap_cap: float = np.inf,
     tolerance: float = 0.01,
     evaluations_max: int = 40_000,
 ) -> Relaxation:
@@ -71,7 +76,8 @@ def relax(
     is now.
 
     ``smallest-move``: every pair in contact before the jump gets back its overlap, as far as the
-    network does not turn over; ``keep_height`` keeps the mean height of ``position``.
+    network does not turn over; ``keep_height`` keeps the mean height of ``position``;
+    ``overlap_cap`` [m] bounds what counts as carried (``before`` was not in equilibrium itself).
     ``karrech2007`` holds the grains of ``frontier`` (n,) where they are estimated: those that touch
     a wall before the jump where it is not given.
 
@@ -91,7 +97,7 @@ def relax(
         raise UsageError("a relaxation wants a tolerance above 0")
     if method == "smallest-move":
         relaxed, converged, evaluations = relax_by_move(
-            bed, keep_height, tolerance, evaluations_max
+            bed, overlap_cap, keep_height, tolerance, evaluations_max
         )
     else:
         if frontier is None:
@@ -112,12 +118,46 @@ def relax(
     return result
 
 
+def relax_bare(
+    state: State,
+    walls: Walls,
+    stiffness: HertzStiffness,
+    *,
+    method: str = "smallest-move",
+    load: float = 0.0,
+) -> Relaxation:
+    """Relax a state of which no earlier one is known; arguments and errors as `relax`.
+
+    Overlaps up to what a bed in equilibrium under its weight and ``load`` [N] can show are taken
+    as carried, so that such a bed stays as it is; larger ones are brought down.
+    """
+    check_bed(state.position, state.radius)
+    cap = bound_equilibrium_overlap(state, stiffness, load)
+    return relax(
+        state.position, state, walls, stiffness, method=method, keep_height=False, overlap_cap=cap
+    )
+
+
+def bound_equilibrium_overlap(state: State, stiffness: HertzStiffness, load: float = 0.0) -> float:
+    """Greatest Hertz overlap [m] that weight and ``load`` [N] cause in a bed at rest.
+
+    The whole vertical force goes through each layer; a contact carries at most `CHAIN_FACTOR`
+    times its share among the grains of a layer, and never more than all of it.
+    """
+    if len(state.radius) == 0:
+        return 0.0
+    top, bottom = state.position[:, 2] + state.radius, state.position[:, 2] - state.radius
+    layer = len(state.radius) * 2 * state.radius.mean() / float(top.max() - bottom.min())
+    force = (GRAVITY * state.mass.sum() + load) * min(1.0, CHAIN_FACTOR / layer)
+    return float(overlap_under_force(force, stiffness.grain, state.radius.min() / 2))
+
+
 def relax_by_move(
-    bed: Estimated, keep_height: bool, tolerance: float, evaluations_max: int
+    bed: Estimated, overlap_cap: float, keep_height: bool, tolerance: float, evaluations_max: int
 ) -> tuple[FloatArray, bool, int]:
     """`find_smallest_move` of grains sorted in space; centres [m], whether converged,
     evaluations."""
-    carried = bed.carried.overlap
+    carried = bed.carried.overlap[bed.carried.overlap <= overlap_cap]
     scale = float(carried.mean()) if len(carried) else bed.length
     position_before = bed.before.position
     order = sort_in_space(position_before, bed.scene.radius)
@@ -129,10 +169,12 @@ def relax_by_move(
         _inside(after, estimate),
         after,
         network,
+        overlap_cap,
+        scale,
         GAP_FACTOR * scale,
         keep_height=keep_height,
         tolerance=tolerance * scale,
-        accepted=max(scale, network.overlap.max(initial=0.0)),
+        accepted=min(overlap_cap, max(scale, network.overlap.max(initial=0.0))),
         evaluations_max=evaluations_max,
     )
     position = np.empty_like(estimate)

@@ -67,6 +67,8 @@ def find_smallest_move(
     start: FloatArray,
     scene: Surroundings,
     network: Neighbours,
+    overlap_cap: float,
+    bound: float,
     gap: float,
     *,
     keep_height: bool,
@@ -80,7 +82,8 @@ def find_smallest_move(
     overlaps, the products with J J^T counted in.
 
     ``start`` (n, 3) is where the iteration begins.  The overlaps of ``network`` are those to get
-    back; all other pairs stay ``gap`` [m] apart.  ``tolerance`` [m] is the greatest error of an
+    back; above ``overlap_cap`` [m] a pair only stays below ``bound`` [m]; all others stay ``gap`` [m]
+    apart.  ``tolerance`` [m] is the greatest error of an
     overlap.  Where the demands contradict each other, late iterations end as soon as no overlap is
     above ``accepted`` [m].  Gives up after about ``evaluations_max`` evaluations.
     """
@@ -88,7 +91,7 @@ def find_smallest_move(
     height_share = 1 / np.sqrt(n) if keep_height else 0.0
     skin = SKIN * float(np.median(radius))
     x, anchor = start.copy(), estimate
-    rows = start_rows(network, n)
+    rows = start_rows(network, overlap_cap, bound, n)
     listed_at = None
     norm, evaluations = 1.0, 0
     for iteration in range(ITERATIONS_MAX):
@@ -152,16 +155,17 @@ def _key(first: IntArray, second: IntArray, n: int) -> IntArray:
     return (first << 32) + np.where(second >= 0, second, n - 1 - second)
 
 
-def start_rows(network: Neighbours, n: int) -> _Rows:
-    """Members of the network."""
+def start_rows(network: Neighbours, overlap_cap: float, bound: float, n: int) -> _Rows:
+    """Members of the network, and its pairs above the cap with a bound instead."""
+    member = network.overlap <= overlap_cap
     key = _key(network.first, network.second, n)
     order = np.argsort(key)
     return _Rows(
         key[order],
         network.first[order],
         network.second[order],
-        np.ones(len(key), bool),
-        network.overlap[order],
+        member[order],
+        np.where(member, network.overlap, bound)[order],
         np.zeros(len(key) + 1),
     )
 

@@ -22,7 +22,7 @@ from adapters.relaxation.kernel import (
     solve_multipliers,
 )
 from adapters.relaxation.measured import Relaxation, RelaxationNotConverged
-from adapters.relaxation.methods import relax
+from adapters.relaxation.methods import bound_equilibrium_overlap, relax, relax_bare
 from tests.deepest_overlap import deepest
 from tests.made_beds import STIFFNESS, bed_made, jump, parted, state_at_rest
 
@@ -442,3 +442,13 @@ def test_arguments_that_do_not_fit(bed: Bed) -> None:
     empty = state_at_rest(np.empty((0, 3)), np.empty(0))
     with pytest.raises(UsageError, match="wants grains"):
         relax(np.empty((0, 3)), empty, walls, STIFFNESS)
+
+
+def test_pressed_bed_without_a_past(bed: Bed) -> None:
+    """Overlaps of a bed pressed by 2 % come down to what a bed at rest can carry."""
+    state, walls = bed
+    pressed = state.moved(state.position * [1, 1, 0.98])
+    found = relax_bare(pressed, walls, STIFFNESS)
+    limit = 1.01 * bound_equilibrium_overlap(pressed, STIFFNESS)
+    assert found.estimated.max_penetration > 5e-5
+    assert deepest(found.position, state.radius, walls) <= limit

@@ -1,0 +1,102 @@
+"""The verb ``relax``: a state at rest."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from adapters.cli.arguments import add_json_flag, print_json
+from adapters.errors import UsageError
+
+
+def register(verb: str, parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``relax``."""
+    parser.add_argument("state", metavar="STATE", type=Path, help="a .npz of trackbed or a dump")
+    parser.add_argument(
+        "--out",
+        metavar="STATE",
+        type=Path,
+        required=True,
+        help=".npz, or any other name for a dump",
+    )
+    parser.add_argument(
+        "--scene", type=Path, help="for walls and stiffness; default: that of the run STATE is in"
+    )
+    parser.add_argument(
+        "--before", type=Path, metavar="STATE", help="the state before the jump that made STATE"
+    )
+    parser.add_argument(
+        "--method", default="smallest-move", metavar="NAME",
+        help="smallest-move (default) or karrech2007",
+    )  # fmt: skip
+    add_json_flag(parser)
+    parser.set_defaults(command=run_relax)
+
+
+def find_scene_of_state(state: Path) -> tuple[Path, list[str]]:
+    """Scene file and overrides of the run folder that a state lies in."""
+    from adapters.files import RunFolder
+
+    for folder in state.resolve().parents:
+        if (folder / "manifest.json").exists():
+            return folder / "scene.toml", RunFolder(folder).manifest()["overrides"]
+    raise UsageError(
+        "the walls and the stiffness of the grains are not known",
+        where=str(state),
+        remedy="name the scene: --scene scene.toml",
+    )
+
+
+def run_relax(arguments: argparse.Namespace) -> int:
+    """Relax a state, write it at rest, print what changed."""
+    import numpy as np
+
+    from adapters.bed import make_no_contacts
+    from adapters.files import read_state_file, write_state_file
+    from adapters.relaxation import relax, relax_bare
+    from adapters.scene import load_scene
+
+    if not arguments.out.parent.is_dir():
+        raise UsageError("the folder of --out does not exist", where=str(arguments.out))
+    if arguments.scene is None:
+        scene = load_scene(*find_scene_of_state(arguments.state))
+    else:
+        scene = load_scene(arguments.scene)
+    density = scene.material.grain.density
+    state = read_state_file(arguments.state, density)
+    walls = scene.container.walls(state.piston_height, scene.piston_reach)
+    if arguments.before is None:
+        load = float(scene.stress_at(0.0)) * scene.loaded_area
+        relaxation = relax_bare(state, walls, scene.stiffness, method=arguments.method, load=load)
+    else:
+        before = read_state_file(arguments.before, density)
+        if not np.array_equal(before.identifier, state.identifier):
+            raise UsageError("the grains are not those of STATE", where=str(arguments.before))
+        relaxation = relax(
+            state.position,
+            before,
+            scene.container.walls(before.piston_height, scene.piston_reach),
+            scene.stiffness,
+            walls_after=walls,
+            method=arguments.method,
+        )
+    still = np.zeros_like(state.position)
+    # Contacts and wall forces belong to the positions before and are left out.
+    relaxed = state.moved(
+        relaxation.position, velocity=still, spin=still, contacts=make_no_contacts(), wall_force={}
+    )
+    write_state_file(relaxed, arguments.out)
+    record = relaxation.record()
+    if arguments.json:
+        print_json(record)
+        return 0
+    print(f"{arguments.out}, at rest; all figures in SI units")
+    for key, value in record.items():
+        if isinstance(value, dict):
+            print(f"{key}:")
+            for name, figure in value.items():
+                print(f"  {name.replace('_', ' '):26}{figure:.6g}")
+        else:
+            shown = f"{value:.6g}" if isinstance(value, float) else value
+            print(f"{key.replace('_', ' '):28}{shown}")
+    return 0

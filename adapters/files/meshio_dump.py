@@ -1,0 +1,144 @@
+"""Text dumps of LIGGGHTS and LAMMPS as a format of meshio: importing this module registers it.
+
+>>> import adapters.files.meshio_dump, meshio  # doctest: +SKIP
+>>> bed = meshio.read("states.dump")     # doctest: +SKIP
+
+Names that end in one of `EXTENSIONS` are known by it; for others, such as ``dump.10000``, say so:
+``meshio.read(path, file_format="lammps-dump")``.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import deque
+from collections.abc import Iterator
+from itertools import groupby
+from os import PathLike
+
+import meshio
+import numpy as np
+from numpy.typing import NDArray
+
+from adapters.errors import DumpError, UsageError
+from adapters.files.dump import Frame, write_dump
+from adapters.files.dump_reader import read_frames
+
+FORMAT = "lammps-dump"
+"""Name of the format in meshio."""
+
+EXTENSIONS = (".dump", ".lammpstrj", ".liggghts")
+"""Endings of file names that are taken for text dumps; with ``.gz`` behind them, too."""
+
+STEP, BOX = "time_step", "box"
+"""Keys of ``Mesh.field_data``: the step count, (1,), and the box, low and high [m], (3, 2)."""
+
+WHOLE = ("id", "type", "mol")
+"""Columns of whole numbers."""
+
+_COMPONENT = re.compile(r"(?P<name>.+)(?:\[(?P<index>\d+)\]|(?P<axis>[xyz]))")
+_REFERENCE = re.compile(r"[cfdi]2?_")
+"""How an engine's name of a compute, a fix or a property begins: its components are name[1], ..."""
+
+
+def read_dump_meshes(path: str | PathLike[str]) -> Iterator[meshio.Mesh]:
+    """Every frame of a text dump (``.gz`` too) as a mesh, in order.
+
+    ``points`` are the columns x, y, z [m], ``cells`` one vertex a grain, in ascending ``id``.
+    ``point_data`` holds the other columns by name: vx, vy, vz as ``v``, shape (n, 3), and
+    f_force[1], f_force[2], f_force[3] as ``f_force``; ``field_data`` the `STEP` and the `BOX`.
+    Raises `DumpError` and `UsageError` as `adapters.files.read_frames`, and for a dump without
+    places (a "dump local" of contacts).
+    """
+    for frame in read_frames(str(path)):
+        yield _mesh(frame, str(path))
+
+
+def read_dump_mesh(path: str | PathLike[str]) -> meshio.Mesh:
+    """The last frame of a text dump, as `read_dump_meshes`: a mesh is one instant."""
+    return _mesh(deque(read_frames(str(path)), maxlen=1).pop(), str(path))
+
+
+def write_dump_mesh(path: str | PathLike[str], mesh: meshio.Mesh) -> None:
+    """Write a mesh's points and their data as a dump of one frame; `read_dump_mesh` gives them
+    back.
+
+    Vectors become columns as they were read; ``id`` counts from 1 where the mesh has none.
+    Cells, and data of cells, are left out.  Raises `UsageError` for points that are not (n, 3).
+    """
+    points = np.asarray(mesh.points, float)
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise UsageError(f"points of shape {points.shape}, not (n, 3)", where=str(path))
+    columns: dict[str, NDArray[np.generic]] = {"id": np.arange(1, len(points) + 1)} | dict(
+        zip("xyz", points.T, strict=True)
+    )
+    for name, values in mesh.point_data.items():
+        columns |= _columns("_".join(name.split()), np.asarray(values))
+    step = int(np.ravel(mesh.field_data.get(STEP, 0))[0])
+    bounds = np.asarray(mesh.field_data.get(BOX, np.empty((0, 2))), float)
+    frame = Frame(step, tuple(columns), np.column_stack([*columns.values()]), bounds)
+    write_dump(str(path), [frame])
+
+
+def _mesh(frame: Frame, path: str) -> meshio.Mesh:
+    if frame.kind != "atoms" or not {"x", "y", "z"} <= set(frame.columns):
+        raise DumpError(
+            f"there are no places x y z, only {' '.join(frame.columns)}",
+            where=f"{path}, time step {frame.time_step}",
+            remedy="give a dump of grains with x y z; contacts are not a mesh by themselves",
+        )
+    points = frame.block("x", "y", "z")
+    data = dict(gather_point_data(frame))
+    cells = [("vertex", np.arange(len(points))[:, None])]
+    field: dict[str, NDArray[np.generic]] = {STEP: np.array([frame.time_step])}
+    if frame.bounds.shape == (3, 2):
+        field[BOX] = frame.bounds
+    return meshio.Mesh(points, cells, point_data=data, field_data=field)
+
+
+def gather_point_data(frame: Frame) -> Iterator[tuple[str, NDArray[np.generic]]]:
+    """Columns by name, neighbours that are components of one vector as (n, k)."""
+    others = [column for column in frame.columns if column not in ("x", "y", "z")]
+    for (name, _), family in ((key, list(group)) for key, group in groupby(others, _vector)):
+        if name not in others and _is_vector(family):
+            yield name, frame.block(*family)
+        else:
+            for column in family:
+                values = frame.column(column)
+                yield column, values.astype(np.int64) if column in WHOLE else values
+
+
+def _vector(column: str) -> tuple[str, str]:
+    """Name of the vector that a column may be a component of, and how it is written."""
+    match = _COMPONENT.fullmatch(column)
+    if match is None:
+        return column, ""
+    return match["name"], "axis" if match["axis"] else "index"
+
+
+def _is_vector(family: list[str]) -> bool:
+    """Whether columns of one name are all its components in order: x, y, z or [1], ..., [k]."""
+    matches = [_COMPONENT.fullmatch(column) for column in family]
+    if not all(matches):
+        return False
+    axes = [match["axis"] or match["index"] for match in matches if match]
+    return axes == list("xyz") or (
+        len(axes) > 1 and axes == [str(i) for i in range(1, len(axes) + 1)]
+    )
+
+
+def _columns(name: str, values: NDArray[np.generic]) -> dict[str, NDArray[np.generic]]:
+    """Columns of a scalar, or of a vector, under the names `gather_point_data` joins again."""
+    if values.ndim == 1:
+        return {name: values}
+    rows = values.reshape(len(values), -1).T
+    if len(rows) == 3 and not _REFERENCE.match(name):
+        return {name + axis: row for axis, row in zip("xyz", rows, strict=True)}
+    return {f"{name}[{i}]": row for i, row in enumerate(rows, 1)}
+
+
+meshio.register_format(
+    FORMAT,
+    [ending + packed for ending in EXTENSIONS for packed in ("", ".gz")],
+    read_dump_mesh,
+    {FORMAT: write_dump_mesh},
+)

@@ -1,0 +1,57 @@
+"""States as users have them in files: ``.npz`` of trackbed, or a text dump of an engine."""
+
+from __future__ import annotations
+
+from collections import deque
+from pathlib import Path
+
+import numpy as np
+
+from adapters.bed import FloatArray, State, load_state, save_state
+from adapters.files.dump import Frame, write_dump
+from adapters.files.dump_reader import read_frames
+
+
+def read_state_file(path: Path, density: float) -> State:
+    """A state from ``path``: ``.npz`` as `adapters.bed.load_state`, else a dump's last frame.
+
+    A dump needs the columns id, x, y, z and radius.  Without its own columns, a mass is that of a
+    sphere of ``density`` [kg/m^3] and a velocity is zero; contacts and piston it has none.
+    Raises `UsageError` and `DumpError`.
+    """
+    if path.suffix == ".npz":
+        return load_state(path)
+    frame = deque(read_frames(path), maxlen=1).pop()
+    radius = frame.column("radius")
+
+    def vectors(*columns: str) -> FloatArray:
+        there = set(columns) <= set(frame.columns)
+        return frame.block(*columns) if there else np.zeros((len(radius), 3))
+
+    return State(
+        frame.column("id").astype(np.int64),
+        frame.block("x", "y", "z"),
+        radius,
+        frame.column("mass") if "mass" in frame.columns else density * 4 / 3 * np.pi * radius**3,
+        vectors("vx", "vy", "vz"),
+        vectors("omegax", "omegay", "omegaz"),
+        time_step=frame.time_step,
+    )
+
+
+def write_state_file(state: State, path: Path) -> None:
+    """Write a state to ``path``: ``.npz`` whole and without loss, else its grains as a dump."""
+    if path.suffix == ".npz":
+        save_state(state, path)
+        return
+    columns = tuple(
+        ["id", "x", "y", "z", "vx", "vy", "vz", "omegax", "omegay", "omegaz", "radius", "mass"]
+    )
+    values = np.column_stack(
+        [state.identifier, state.position, state.velocity, state.spin, state.radius, state.mass]
+    )
+    reach = state.radius[:, None]
+    bounds = np.column_stack(
+        [(state.position - reach).min(axis=0), (state.position + reach).max(axis=0)]
+    )
+    write_dump(path, [Frame(state.time_step, columns, values, bounds)])

@@ -1,0 +1,104 @@
+"""States in files: npz without loss, dumps of any engine with the columns that are needed."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from adapters.bed.state import State
+from adapters.errors import DumpError, UsageError
+from adapters.files import Frame, read_frames, write_dump
+from adapters.files.states import read_state_file, write_state_file
+from trackbed.command import main
+
+
+@pytest.fixture
+def state() -> State:
+    """Seven grains with awkward numbers."""
+    random = np.random.default_rng(3)
+    return State(
+        np.array([2, 3, 5, 7, 11, 13, 17]),
+        random.normal(size=(7, 3)) / 3,
+        random.uniform(1e-3, 4e-3, 7),
+        random.uniform(1e-4, 1e-3, 7),
+        random.normal(size=(7, 3)) * 1e-9,
+        random.normal(size=(7, 3)),
+        piston_height=0.1,
+        cycle=4,
+        time_step=123456,
+    )
+
+
+@pytest.mark.parametrize("name", ["state.npz", "state.dump", "state.dump.gz"])
+def test_round_trip(state: State, name: str, tmp_path: Path) -> None:
+    """Every number of a grain comes back bit for bit."""
+    path = tmp_path / name
+    write_state_file(state, path)
+    again = read_state_file(path, density=1.0)
+    for field in ("identifier", "position", "radius", "mass", "velocity", "spin", "time_step"):
+        np.testing.assert_array_equal(getattr(again, field), getattr(state, field))
+    assert np.isnan(again.piston_height) == (path.suffix != ".npz")
+
+
+def test_last_frame_and_masses_of_spheres(tmp_path: Path) -> None:
+    """Of a dump the last frame counts; a mass it does not name is that of a sphere, at rest."""
+    path = tmp_path / "two.dump"
+    values = np.array([[1.0, 0, 0, 0.5, 0.01], [2.0, 0, 0, 0.9, 0.02]])
+    columns = ("id", "x", "y", "z", "radius")
+    later = values + np.array([0, 0, 0, 1, 0])
+    write_dump(path, [Frame(0, columns, values), Frame(10, columns, later)])
+    state = read_state_file(path, density=2710.0)
+    assert state.time_step == 10
+    np.testing.assert_array_equal(state.position[:, 2], [1.5, 1.9])
+    volume = 4 / 3 * np.pi * np.array([0.01, 0.02]) ** 3
+    np.testing.assert_allclose(state.mass, 2710.0 * volume, rtol=1e-14)
+    assert not state.velocity.any()
+    assert not state.spin.any()
+
+
+def test_dump_without_radius(tmp_path: Path) -> None:
+    """A dump of points is refused with the name of the column it lacks."""
+    path = tmp_path / "points.dump"
+    write_dump(path, [Frame(0, ("id", "x", "y", "z"), np.array([[1.0, 0, 0, 0]]))])
+    with pytest.raises(DumpError, match="radius"):
+        read_state_file(path, density=1.0)
+
+
+@pytest.mark.parametrize("name", ["no.npz", "no.dump"])
+def test_missing_file(name: str, tmp_path: Path) -> None:
+    """A file that is not there is wrong use, and the text names it."""
+    with pytest.raises(UsageError, match=name):
+        read_state_file(tmp_path / name, density=1.0)
+
+
+@pytest.mark.parametrize("name", ["garbage.npz", "garbage.dump"])
+def test_garbage(name: str, tmp_path: Path) -> None:
+    """Binary garbage under either name is named, not read."""
+    path = tmp_path / name
+    path.write_bytes(bytes(range(256)) * 40)
+    with pytest.raises((UsageError, DumpError), match=name):
+        read_state_file(path, density=1.0)
+
+
+def test_relax_writes_a_state(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """``relax`` takes 50 % of overlap out of two grains and states what the bed was and is."""
+
+    assert main(["new", "karrech-coarse", str(tmp_path)]) == 0
+    radius = 3.2e-3
+    columns = ("id", "x", "y", "z", "radius")
+    deep, there = tmp_path / "deep.dump", tmp_path / "relaxed.dump"
+    values = np.array([[1, 0.01, 0.01, radius, radius], [2, 0.013, 0.01, radius, radius]])
+    write_dump(deep, [Frame(0, columns, values)])
+    words = ["relax", str(deep), "--out", str(there), "--json"]
+    assert main(words) == 2
+    assert "--scene" in capsys.readouterr().err
+    assert main([*words, "--scene", str(tmp_path / "scene.toml")]) == 0
+    record = json.loads(capsys.readouterr().out)
+    assert record["estimated"]["max_penetration"] == pytest.approx(2 * radius - 0.003)
+    assert record["relaxed"]["max_penetration"] < 1e-6
+    (frame,) = read_frames(there)
+    apart = np.linalg.norm(np.diff(frame.block("x", "y", "z"), axis=0))
+    assert apart == pytest.approx(2 * radius, abs=1e-6)
