@@ -3,7 +3,7 @@
 Cells are separated by commas, semicolons, tabs or blanks; where not by commas, a comma may be the
 decimal sign.  What stands above the line that names the columns is skipped.  A unit stands behind
 a column's name or in a row below it.  Text is UTF-8, UTF-16 with its mark, or Windows-1252;
-lines that begin with # are comments.
+lines that begin with # are comments.  Of an .xlsx file the first sheet is read.
 """
 
 from __future__ import annotations
@@ -15,16 +15,19 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from errno import EINVAL
+from importlib import import_module
 from math import isfinite
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trackbed.errors import UsageError
+from trackbed.errors import LibraryMissing, UsageError
 
 Floats = NDArray[np.float64]
 
+SPREADSHEET = ".xlsx"
 PREAMBLE_MOST = 200
 """Lines that are looked through for the one that names the columns."""
 
@@ -147,10 +150,8 @@ def read_table(path: Path, wanted: Sequence[Collection[str]] = ()) -> Table:
     try:
         if path.is_char_device():
             raise OSError(EINVAL, "it is a device without an end")
-        if path.suffix.lower() == ".xlsx":
-            raise UsageError(
-                "a spreadsheet is not read", where=str(path), remedy="save the sheet as CSV"
-            )
+        if path.suffix.lower() == SPREADSHEET:
+            return _shape_table(path, *_read_spreadsheet(path), wanted, comma=True)
         text = _decode_text(path.read_bytes())
         skipped, separator = _find_header(text, wanted)
         lines, rows = _split_rows(text, separator, skipped)
@@ -162,7 +163,7 @@ def read_table(path: Path, wanted: Sequence[Collection[str]] = ()) -> Table:
             where=str(path),
             remedy="write text in UTF-8, one row a line; a dump must not be named .csv",
         ) from error
-    return _shape_table(path, lines, rows, comma=separator != ",")
+    return _shape_table(path, lines, rows, wanted, comma=separator != ",")
 
 
 def read_columns(
@@ -304,9 +305,35 @@ def _split_rows(text: str, separator: str, skipped: int) -> tuple[list[int], lis
     return lines, rows
 
 
-def _shape_table(path: Path, lines: list[int], rows: list[list[str]], *, comma: bool) -> Table:
+def _read_spreadsheet(path: Path) -> tuple[list[int], list[list[str]]]:
+    """Rows of the first sheet, by number, as texts."""
+    try:
+        openpyxl: Any = import_module("openpyxl")
+    except ImportError as error:
+        raise LibraryMissing(
+            "reading a spreadsheet needs openpyxl", where=str(path),
+            remedy="pip install openpyxl, or save the sheet as CSV",
+        ) from error  # fmt: skip
+    try:
+        sheet = openpyxl.load_workbook(path, read_only=True, data_only=True).worksheets[0]
+        rows = [["" if v is None else str(v) for v in row] for row in sheet.values]
+    except OSError:
+        raise
+    except Exception as error:  # whatever a damaged archive makes of it
+        raise ValueError(error) from error
+    kept = [(number, row) for number, row in enumerate(rows, 1) if any(row)]
+    return [number for number, _ in kept], [row for _, row in kept]
+
+
+def _shape_table(
+    path: Path, lines: list[int], rows: list[list[str]], wanted: Sequence[Collection[str]],
+    *, comma: bool,
+) -> Table:  # fmt: skip
     """Rows as a table: header, units, and rows that are all as long."""
     remedy = "the first line names the columns, and every row below it has a cell for each"
+    if path.suffix.lower() == SPREADSHEET and wanted:
+        first = next((i for i, row in enumerate(rows) if _names_all(row, wanted)), 0)
+        lines, rows = lines[first:], rows[first:]
     if not rows:
         raise UsageError("the file is empty", where=str(path), remedy=remedy)
     header = [cell.strip() for cell in rows[0]]

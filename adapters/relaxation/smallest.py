@@ -82,10 +82,10 @@ def find_smallest_move(
     overlaps, the products with J J^T counted in.
 
     ``start`` (n, 3) is where the iteration begins.  The overlaps of ``network`` are those to get
-    back; above ``overlap_cap`` [m] a pair only stays below ``bound`` [m]; all others stay ``gap`` [m]
-    apart.  ``tolerance`` [m] is the greatest error of an
-    overlap.  Where the demands contradict each other, late iterations end as soon as no overlap is
-    above ``accepted`` [m].  Gives up after about ``evaluations_max`` evaluations.
+    back; above ``overlap_cap`` [m] a pair only stays below ``bound`` [m]; all others stay ``gap``
+    [m] apart. ``tolerance`` [m] is the greatest error of an overlap. Where the demands contradict
+    each other, late iterations end as soon as no overlap is above ``accepted`` [m]. Gives up
+    after about ``evaluations_max`` evaluations.
     """
     radius, n = scene.radius, len(scene.radius)
     height_share = 1 / np.sqrt(n) if keep_height else 0.0

@@ -49,6 +49,10 @@ def _register_train(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument("--modulus", type=float, help="of the track's foundation, N/m^2")
     parser.add_argument(
+        "--roughness", choices=["smooth", "average"], help="of a rail that is not even"
+    )
+    parser.add_argument("--seed", type=int, help="of the roughness (default: 1)")
+    parser.add_argument(
         "--area", type=float, default=SEAT_AREA, help="of a rail seat, m^2 (default: %(default)g)"
     )
     parser.set_defaults(command=make_train_file)
@@ -75,13 +79,25 @@ def make_grain_file(arguments: argparse.Namespace) -> int:
 
 def make_train_file(arguments: argparse.Namespace) -> int:
     """Write the made-up record of a passing train."""
-    from qdem_fem.track.loads import Track, Train, WheelFlat, make_train_record, write_load_record
+    from qdem_fem.files import UsageError
+    from qdem_fem.track.loads import (
+        Roughness,
+        Track,
+        Train,
+        WheelFlat,
+        make_train_record,
+        write_load_record,
+    )
 
     _refuse_no_folder(arguments.out)
     train = Train(**_given(arguments, "cars", "speed", "axle_load", "first_share"))
-    track = Track(**_given(arguments, "modulus"))
+    track, rough = Track(**_given(arguments, "modulus")), None
+    if arguments.roughness is not None:
+        rough = Roughness(arguments.roughness, **_given(arguments, "seed"))
+    elif arguments.seed is not None:
+        raise UsageError("--seed is that of a roughness", remedy="give --roughness, too")
     flats = [WheelFlat(axle, peak, duration) for axle, peak, duration in arguments.flat]
-    record = make_train_record(train, track, arguments.area, flats)
+    record = make_train_record(train, track, arguments.area, flats, roughness=rough)
     write_load_record(arguments.out, record)
     print(f"{arguments.out}: {record.time[-1]:.3f} s at {record.rate:g} Hz")
     return 0

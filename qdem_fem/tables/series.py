@@ -9,7 +9,7 @@ import numpy as np
 from qdem_fem.files import Series, ramp
 from qdem_fem.tables.keys import SeriesTable
 from qdem_fem.tables.types import WrongKey
-from trackbed.errors import UsageError
+from trackbed.errors import LibraryMissing, UsageError
 from trackbed.series_file import SI, TIMES, read_columns
 
 WAYS = {"ramp": ("ramp", "value"), "times": ("times", "values"), "csv": ("csv", "value")}
@@ -78,7 +78,7 @@ def _from_csv(table: SeriesTable, key: str, folder: Path) -> Series:
 
     try:
         (times, values), lines = read_columns(path, (table.time, table.value), (TIMES, tuple(SI)))
-    except UsageError as error:
+    except (UsageError, LibraryMissing) as error:
         raise refuse(error.what, error.where) from error
     back = np.flatnonzero(np.diff(times) <= 0)
     if len(back):

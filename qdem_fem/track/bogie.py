@@ -11,10 +11,12 @@ from qdem_fem.files import ConditionError, Series
 from qdem_fem.track.loads import (
     MOST_SAMPLES,
     RATE,
+    Roughness,
     Track,
     Train,
     WheelFlat,
     find_flat_forces,
+    find_rolling_forces,
     find_seat_share,
 )
 
@@ -25,16 +27,16 @@ RISE = 0.01
 
 def make_bogie_series(
     train: Train, track: Track, share: float, lead: float, rest: float, rate: float = RATE,
-    flats: Sequence[WheelFlat] = (),
+    roughness: Roughness | None = None, flats: Sequence[WheelFlat] = (),
 ) -> Series:  # fmt: skip
     """Force on the seat of a slice while the first bogie of a train passes [N], (k, 3), down.
 
     The front axle begins ``lead`` [m] before the sleeper and the rear one ends as far behind it,
     then ``rest`` [s] of no load; at both ends the force grows and dies over `RISE` as half a
-    cosine.  ``share``: of a seat's force, what the slice takes of it; ``flats``: on both wheels of
-    one of these two axles.  Raises `ConditionError` as `find_flat_forces`, for a bogie so near and
-    fast that it is over the sleeper before its load has grown, and for one so slow or far that no
-    record would hold it.
+    cosine.  ``share``: of a seat's force, what the slice takes of it; ``roughness``: what rolling
+    adds to it, too; ``flats``: on both wheels of one of these two axles.  Raises `ConditionError`
+    as `find_flat_forces` and `find_rolling_forces`, for a bogie so near and fast that it is over
+    the sleeper before its load has grown, and for one so slow or far that no record would hold it.
     """
     axles = train.axles[:2]
     end = find_passing_time(train, lead)
@@ -55,6 +57,10 @@ def make_bogie_series(
     of_wheels = sum(find_seat_share(front - axle, track) for axle in axles)
     ramp = np.clip(np.minimum(time, end - time) / RISE, 0.0, 1.0)
     force = train.first_share * train.axle_load * of_wheels
+    if roughness is not None:
+        force += find_rolling_forces(
+            time - lead / train.speed, train.speed, axles, train.wheel_loads[:1], track, roughness
+        )[:, 0]
     if flats:
         force += find_flat_forces(front, axles, train.speed, track, flats)
     return Series(time, np.outer(share * force * (1 - np.cos(np.pi * ramp)) / 2, DOWN))

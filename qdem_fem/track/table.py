@@ -17,12 +17,23 @@ from qdem_fem.files import Series
 from qdem_fem.tables import Cells, MaterialTable, SeriesTable, Share, make_series
 from qdem_fem.track.bogie import DOWN, find_passing_time, make_bogie_series
 from qdem_fem.track.layout import Part
-from qdem_fem.track.loads import Track, Train, WheelFlat
+from qdem_fem.track.loads import RailKind, Roughness, Track, Train, WheelFlat, WheelKind
 from qdem_fem.track.sleeper_mesh import SleeperShape
 from trackbed.scene_files import NonNegative, Positive, Problem, Real, Table, Text
 
 LEAST_SHOULDER = 0.1
 """Ballast beyond a free end, at least [m]: room for a grain and what is between."""
+
+
+class RoughnessTable(Table):
+    """Of wheels and rail (`qdem_fem.track.loads.roughness.Roughness`)."""
+
+    rail: RailKind = "smooth"
+    wheel: WheelKind = "disc"
+    seed: Annotated[int, Field(ge=0)] = 1
+    amplitude: NonNegative = 1.0
+    highest: Positive = 2000.0
+    """Frequency up to which there is any [Hz]."""
 
 
 class FlatTable(Table):
@@ -48,6 +59,8 @@ class BogieTable(Table):
     """From the front axle to the sleeper at first, from it to the rear axle at last [m]."""
     rest: NonNegative = 0.05
     """Time without load at the end [s]."""
+    roughness: RoughnessTable | None = None
+    """What rolling adds; without it the load has next to nothing above 100 Hz."""
     flat: Annotated[tuple[FlatTable, ...], Field(strict=False)] = ()
     """Of wheels that are not round."""
 
@@ -150,8 +163,11 @@ def make_seat_loads(track: TrackTable, folder: Path) -> tuple[Series, ...]:
     share, seats = track.share or 1.0, 2 if track.part == "whole" else 1
     if track.bogie is not None:
         one = track.bogie
+        rough = None if one.roughness is None else Roughness(**one.roughness.model_dump())
         flats = [WheelFlat(**flat.model_dump()) for flat in one.flat]
-        series = make_bogie_series(one.train, Track(), share, one.lead, one.rest, flats=flats)
+        series = make_bogie_series(
+            one.train, Track(), share, one.lead, one.rest, roughness=rough, flats=flats
+        )
         return seats * (series,)
     found: list[Series] = []
     for name in ("pressure", "pressure_other")[:seats]:

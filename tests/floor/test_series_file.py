@@ -1,12 +1,14 @@
-"""Tables of numbers: units, preambles, decimal commas, thousands."""
+"""Tables of numbers: units, preambles, decimal commas, thousands, spreadsheets."""
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
-from trackbed.errors import UsageError
+from trackbed.errors import LibraryMissing, UsageError
 from trackbed.series_file import SI, TIMES, read_columns, read_table
 
 
@@ -97,8 +99,21 @@ def test_faults_are_named_with_their_line(tmp_path: Path, text: str, said: str) 
 
 
 def test_devices_without_an_end_are_refused() -> None:
-    """They filled the memory; so is a spreadsheet, which is to be saved as a table."""
+    """They filled the memory."""
     with pytest.raises(UsageError, match="can not read the series"):
         read_table(Path("/dev/zero"))
-    with pytest.raises(UsageError, match="save the sheet as CSV"):
-        read_table(Path("a.xlsx"))
+
+
+def test_spreadsheets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first sheet, by a library that only this needs."""
+    path = tmp_path / "a.xlsx"
+    path.touch()
+    monkeypatch.setitem(sys.modules, "openpyxl", None)
+    with pytest.raises(LibraryMissing, match="needs openpyxl"):
+        read_table(path)
+    values = [("Logger", None), (None, None), ("time [ms]", "p [kPa]"), (0, 1), (500, 2.5)]
+    book = SimpleNamespace(worksheets=[SimpleNamespace(values=values)])
+    library = SimpleNamespace(load_workbook=lambda *_, **__: book)
+    monkeypatch.setitem(sys.modules, "openpyxl", library)
+    numbers, lines = read_columns(path, ("time", "p"), (TIMES, ("kPa",)))
+    assert (numbers.tolist(), lines) == ([[0.0, 0.5], [1000.0, 2500.0]], [4, 5])

@@ -77,11 +77,13 @@ def test_a_flat_strikes_the_seat_at_every_turn_of_its_wheel(tmp_path: Path) -> N
 
 
 def test_wheels_are_round_by_default(tmp_path: Path) -> None:
-    """The same bits as without the key."""
+    """The same bits as without the key, with roughness, too."""
+    for rough in ("", ", roughness = { highest = 300 }"):
+        _, default = load_of(tmp_path, "lead = 2.0" + rough)
+        _, none = load_of(tmp_path, "lead = 2.0, flat = []" + rough)
+        assert (default == none).all()
     train = Train(cars=1)
     _, default = load_of(tmp_path, "lead = 2.0")
-    _, none = load_of(tmp_path, "lead = 2.0, flat = []")
-    assert (default == none).all()
     assert (-make_bogie_series(train, Track(), SHARE, 2.0, 0.05).values[:, 2] == default).all()
 
 
@@ -113,6 +115,10 @@ def test_a_flat_that_can_not_be_is_refused_by_its_key(tmp_path: Path, flat: str,
         ("speed = 1e-9", "give more speed, less lead or less rest"),
         ("lead = 1e12", "give more speed, less lead or less rest"),
         ("rest = 1e15", "give more speed, less lead or less rest"),
+        ("roughness = { highest = 5001 }", "at most 5000 Hz"),
+        ("roughness = { highest = 1e15 }", "at most 5000 Hz"),
+        ("speed = 0.1, roughness = { highest = 5000 }", "or a lower highest frequency"),
+        ("roughness = { amplitude = 1e6 }", "leaves the rail"),
     ],
 )
 def test_a_bogie_that_no_record_holds_is_refused_by_its_key(

@@ -3,8 +3,8 @@
 The record of the paper's Fig. 5 is not published.  Axles move at constant speed over a rail that is
 an infinite beam on a Winkler foundation (Zimmermann 1888; Hetenyi, Beams on Elastic Foundation,
 1946, ch. 2), and a sleeper takes what the foundation carries over its share of the track.  That
-holds the quasi-static load, to some tens of Hz; of wheel-rail dynamics only what a `WheelFlat`
-names.
+holds the quasi-static load, to some tens of Hz; of wheel-rail dynamics only what a `WheelFlat` or
+a `qdem_fem.track.loads.roughness.Roughness` names.
 
     trackbed train --flat 0 60e3 2e-3 --out train.csv
 """
@@ -22,6 +22,8 @@ import numpy as np
 from qdem_fem.files import ConditionError
 from qdem_fem.mesh import FloatArray
 from qdem_fem.track.loads.rail import QUIET, Track, find_seat_share, refuse_unless_positive
+from qdem_fem.track.loads.rolling import find_rolling_forces
+from qdem_fem.track.loads.roughness import Roughness
 from trackbed.run_files import write_whole
 
 RATE = 10_000.0
@@ -169,12 +171,13 @@ class LoadRecord:
 
 
 def make_train_record(
-    train: Train, track: Track, area: float, flats: Sequence[WheelFlat] = (), rate: float = RATE
-) -> LoadRecord:
+    train: Train, track: Track, area: float, flats: Sequence[WheelFlat] = (), rate: float = RATE,
+    roughness: Roughness | None = None,
+) -> LoadRecord:  # fmt: skip
     """The pressure on both seats of ``area`` [m^2] while the train passes, sampled at ``rate``.
 
     It begins and ends with the nearest axle `QUIET` elastic lengths and half a spacing away; time
-    0 is the first sample.
+    0 is the first sample.  ``roughness``: what rolling adds, too.
     """
     if not (0 < area < inf and 0 < rate < inf):
         raise ConditionError(f"area {area} m^2, rate {rate} Hz", where="train",
@@ -187,7 +190,12 @@ def make_train_record(
             remedy=f"give more speed or fewer cars: at most {MOST_SAMPLES} samples",
         )  # fmt: skip
     time = np.arange(int(np.ceil(last * rate)) + 1) / rate
-    return LoadRecord(time, find_seat_forces(time - lead, train, track, flats) / area)
+    force = find_seat_forces(time - lead, train, track, flats)
+    if roughness is not None:
+        force += find_rolling_forces(
+            time - lead, train.speed, train.axles, train.wheel_loads, track, roughness
+        )
+    return LoadRecord(time, force / area)
 
 
 def write_load_record(path: str | os.PathLike[str], record: LoadRecord) -> None:
