@@ -71,6 +71,8 @@ def bed_made(count: int, seed: int = 0) -> tuple[State, Walls]:
         position,
         scene,
         network,
+        np.inf,
+        5 * OVERLAP,
         5 * OVERLAP,
         keep_height=False,
         tolerance=0.01 * OVERLAP,
