@@ -8,8 +8,7 @@ apart by the roughness r between them; a Hertz spring, made linear at the wheel 
 with receptances alpha [m/N] (Remington, J. Sound Vib. 46, 1976, 359-379; Grassie, Gregory,
 Harrison, Johnson, J. Mech. Eng. Sci. 24, 1982, 77-90; Thompson, Railway Noise and Vibration, 2009,
 ch. 2, 3, 5).  F is positive where wheel and rail are pressed together, r where metal is added.
-What a rail seat takes of F is in closed form too, and at f = 0
-`qdem_fem.track.loads.find_seat_share`.
+What a rail seat takes of F is in closed form too; at f = 0 it is `find_seat_share`.
 
 A strip of roughness is pulled between a wheel and a rail that stand still; the wheel's place moves
 on slowly against the waves in the rail (32 m/s against some hundreds).  Not for frequencies above
@@ -33,8 +32,8 @@ from qdem_fem.track.loads.roughness import (
     WHEEL,
     ComplexArray,
     Roughness,
-    contact_filter,
     draw_roughness_lines,
+    find_contact_filter,
 )
 
 Response = Callable[[FloatArray], ComplexArray]
@@ -71,7 +70,7 @@ class Rolling:
         refuse_unless_positive(self, "rolling")
 
 
-def hertz_contact(load: float, rolling: Rolling) -> tuple[float, float]:
+def find_hertz_contact(load: float, rolling: Rolling) -> tuple[float, float]:
     """Radius a of the contact [m] and its stiffness dP/d delta = 2 E* a [N/m] at a wheel load [N].
 
     Hertz for a sphere of the geometric mean R of both radii: a^3 = 3 P R/(4 E*).
@@ -81,7 +80,9 @@ def hertz_contact(load: float, rolling: Rolling) -> tuple[float, float]:
     return size, 2 * STEEL_MODULUS * size
 
 
-def foundation_stiffness(frequency: FloatArray, track: Track, rolling: Rolling) -> ComplexArray:
+def find_foundation_stiffness(
+    frequency: FloatArray, track: Track, rolling: Rolling
+) -> ComplexArray:
     """s(f) [N/m^2], (m,): force a metre over deflection of the rail, s = s_p (s_b - w^2 m)/(s_p +
     s_b - w^2 m) of pads, and ballast under sleepers spread along the rail (Thompson, sec. 3.3).
 
@@ -99,24 +100,24 @@ def foundation_stiffness(frequency: FloatArray, track: Track, rolling: Rolling) 
     return np.asarray(above * below / (above + below))
 
 
-def _beam(
+def _find_beam(
     frequency: FloatArray, track: Track, rolling: Rolling
 ) -> tuple[ComplexArray, ComplexArray]:
     """s/(s - w^2 m_r) [-] and the wavenumber k [1/m] of waves exp(i w t - i k |x|) that die out,
     E I k^4 = w^2 m_r - s."""
-    support = foundation_stiffness(frequency, track, rolling)
+    support = find_foundation_stiffness(frequency, track, rolling)
     stiff = support - (2 * pi * frequency) ** 2 * rolling.rail_mass
     number = np.exp(-0.25j * pi) * (stiff / track.rail_stiffness) ** 0.25
     return support / stiff, number
 
 
-def rail_receptance(frequency: FloatArray, track: Track, rolling: Rolling) -> ComplexArray:
+def find_rail_receptance(frequency: FloatArray, track: Track, rolling: Rolling) -> ComplexArray:
     """Deflection under a unit force, -(1 + i)/(4 E I k^3) [m/N], (m,); L^3/(8 E I) at f = 0."""
-    _, number = _beam(frequency, track, rolling)
+    _, number = _find_beam(frequency, track, rolling)
     return np.asarray(-(1 + 1j) / (4 * track.rail_stiffness * number**3))
 
 
-def seat_response(
+def find_seat_response(
     distance: FloatArray, frequency: FloatArray, track: Track, rolling: Rolling
 ) -> ComplexArray:
     """What a seat takes of a unit force on the rail at ``distance`` x (n,) from it [m], (n, m).
@@ -126,24 +127,24 @@ def seat_response(
         s/(s - w^2 m_r) (Q(x + a/2) - Q(x - a/2))/4,
         Q(y) = sign(y) (2 - e^(-i k |y|) - e^(-k |y|)).
     """
-    carried, number = _beam(frequency, track, rolling)
+    carried, number = _find_beam(frequency, track, rolling)
 
-    def one_side(place: FloatArray) -> ComplexArray:
+    def sum_side(place: FloatArray) -> ComplexArray:
         size = np.abs(place)[:, None] * number
         return np.asarray(np.sign(place)[:, None] * (2 - np.exp(-1j * size) - np.exp(-size)))
 
     half = track.spacing / 2
-    return carried * (one_side(distance + half) - one_side(distance - half)) / 4
+    return carried * (sum_side(distance + half) - sum_side(distance - half)) / 4
 
 
-def force_response(
+def find_force_response(
     frequency: FloatArray, speed: float, load: float, track: Track, rolling: Rolling
 ) -> ComplexArray:
     """Dynamic contact force over roughness [N/m], (m,), at a wheel load [N]."""
-    size, stiffness = hertz_contact(load, rolling)
+    size, stiffness = find_hertz_contact(load, rolling)
     wheel = -1 / (rolling.unsprung * (2 * pi * frequency) ** 2)
-    through = wheel + 1 / stiffness + rail_receptance(frequency, track, rolling)
-    return np.asarray(contact_filter(frequency, speed, size) / through)
+    through = wheel + 1 / stiffness + find_rail_receptance(frequency, track, rolling)
+    return np.asarray(find_contact_filter(frequency, speed, size) / through)
 
 
 def sum_lines(
@@ -153,13 +154,10 @@ def sum_lines(
     and with each term times its ``response`` (n, m), a function of frequencies."""
     total = np.zeros((2, len(time), lines.shape[1]))
     for first in range(0, len(frequency), FREQUENCIES_AT_ONCE):
-        some, sizes = (
-            frequency[first : first + FREQUENCIES_AT_ONCE],
-            lines[first : first + FREQUENCIES_AT_ONCE],
-        )
-        wave = np.exp(2j * pi * np.outer(time, some))
-        total[0] += (wave @ sizes).real
-        total[1] += ((wave * response(some)) @ sizes).real
+        part = slice(first, first + FREQUENCIES_AT_ONCE)
+        wave = np.exp(2j * pi * np.outer(time, frequency[part]))
+        total[0] += (wave @ lines[part]).real
+        total[1] += ((wave * response(frequency[part])) @ lines[part]).real
     return total
 
 
@@ -182,13 +180,13 @@ def roll_on_rail(
     ]
     wheel, on_wheel = drawn[0][0], np.stack([lines for _, lines in drawn], axis=1)
 
-    def taken(some: FloatArray) -> ComplexArray:
-        return seat_response(speed * time, some, track, rolling)
+    def take_force(some: FloatArray) -> ComplexArray:
+        return find_seat_response(speed * time, some, track, rolling)
 
     forces = np.zeros((2, len(time), axles))
     for frequency, heights in ((rail, on_rail[:, None]), (wheel, on_wheel)):
-        of_heights = force_response(frequency, speed, load, track, rolling)[:, None]
-        forces += sum_lines(time, frequency, of_heights * heights, taken)
+        of_heights = find_force_response(frequency, speed, load, track, rolling)[:, None]
+        forces += sum_lines(time, frequency, of_heights * heights, take_force)
     contact, on_seat = forces
     if contact.min() <= -load:
         raise ConditionError(

@@ -80,7 +80,9 @@ class Roughness:
             )  # fmt: skip
 
 
-def roughness_power(levels: Sequence[float], frequency: FloatArray, speed: float) -> FloatArray:
+def find_roughness_power(
+    levels: Sequence[float], frequency: FloatArray, speed: float
+) -> FloatArray:
     """Power of a roughness over frequency S(f) [m^2/Hz], (m,), one-sided, at a ``speed`` [m/s].
 
     A third octave of level L about a wavelength v/f holds (1 um)^2 10^(L/10) of mean square; the
@@ -94,7 +96,7 @@ def roughness_power(levels: Sequence[float], frequency: FloatArray, speed: float
     )
 
 
-def contact_filter(frequency: FloatArray, speed: float, size: float) -> FloatArray:
+def find_contact_filter(frequency: FloatArray, speed: float, size: float) -> FloatArray:
     """H_c [-], (m,): what a contact of radius a averages out, (1 + pi/4 (k a)^3)^(-1/2) with
     k = 2 pi f/v (Remington, J. Acoust. Soc. Am. 81, 1987, 1805-1823)."""
     return np.asarray((1 + pi / 4 * (2 * pi * frequency / speed * size) ** 3) ** -0.5)
@@ -110,6 +112,6 @@ def draw_roughness_lines(
     """
     apart = speed / length
     frequency = apart * np.arange(1.0, int(roughness.highest / apart) + 1)
-    size = roughness.amplitude * np.sqrt(2 * apart * roughness_power(levels, frequency, speed))
+    size = roughness.amplitude * np.sqrt(2 * apart * find_roughness_power(levels, frequency, speed))
     phase = np.random.default_rng([roughness.seed, *seed]).uniform(0, 2 * pi, len(frequency))
     return frequency, size * np.exp(1j * phase)
