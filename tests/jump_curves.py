@@ -163,7 +163,7 @@ def play(curve: Curve, k_i: int, settings: Settings) -> Play:
         out.computed += settings.healing + decision.window
         settlement = control.settlement + decision.moved + float(window.gain.sum())
         check = judge(control, decision, settings, window, settlement)
-        told = asdict(check) | {
+        said = asdict(check) | {
             "jump": decision.jump,
             "window": settings.healing + decision.window,
             "cycle": control.cycle,
@@ -172,10 +172,10 @@ def play(curve: Curve, k_i: int, settings: Settings) -> Play:
             error = decision.gain - curve.mean(control.cycle, landed)
             total = abs(control.settlement + decision.gain)
             out.true_errors.append(error / total if total else 0.0)
-            out.checks.append(told)
+            out.checks.append(said)
             control = accept(control, decision, check, settings, window, settlement)
         else:
-            out.taken_back.append(told)
+            out.taken_back.append(said)
             control = reject(control, decision, check.error, settings)
     out.settlement = control.settlement
     out.truth = start + curve.mean(k_i, control.cycle)

@@ -116,14 +116,14 @@ def test_members_run_in_jobs(tmp_path: Path) -> None:
     printed, said = child.communicate(timeout=PATIENCE_S)
     assert child.returncode == 8, said
     assert sweep.jobs_seen() & running  # engines ran in jobs that SLURM knew
-    told = json.loads(printed)
-    assert told["counts"] == {"failed": 4, "finished": 4}
-    for one in told["members"]:
+    shown = json.loads(printed)
+    assert shown["counts"] == {"failed": 4, "finished": 4}
+    for one in shown["members"]:
         bad = one["settings"]["engine.launcher"].endswith('/bad"]')
         assert one["exit_code"] == (5 if bad else 0)
         assert ("no licence" in one["sentence"]) == bad
         assert (f"{one['member']}, exit code 5: " in said) == bad
-    assert sorted(one["seeds"] for one in told["settlements"]) == [2, 2]
+    assert sorted(one["seeds"] for one in shown["settlements"]) == [2, 2]
     for name, rows in (("members", 8), ("settlement", 4 * 4), ("band", 2 * 4)):
         with (sweep.into / f"{name}.csv").open() as stream:
             assert len(list(csv.DictReader(stream))) == rows

@@ -55,9 +55,9 @@ def test_a_missing_scene_reads_alike_at_every_door(
     """No file: exit code 2 and the file's name first, at all three doors."""
     path = tmp_path / "none.toml"
     assert main([verb, str(path)]) == 2
-    told = capsys.readouterr().err
-    assert told.startswith(f"trackbed: {path}: can not read the scene (No such file or directory)")
-    assert "\n  -> " in told
+    said = capsys.readouterr().err
+    assert said.startswith(f"trackbed: {path}: can not read the scene (No such file or directory)")
+    assert "\n  -> " in said
 
 
 @pytest.mark.parametrize("verb", DOORS)
@@ -77,10 +77,10 @@ def test_a_wrong_scene_reads_alike_at_every_door(
     path = tmp_path / "scene.toml"
     path.write_text(text.replace("TABLE", DOORS[verb]))
     assert main([verb, str(path)]) == 3
-    told = capsys.readouterr().err
-    assert f"{path}{where}".replace("TABLE", DOORS[verb]) in told
-    assert what in told
-    assert "\n  -> " in told
+    said = capsys.readouterr().err
+    assert f"{path}{where}".replace("TABLE", DOORS[verb]) in said
+    assert what in said
+    assert "\n  -> " in said
 
 
 @pytest.mark.parametrize("verb", DOORS)
@@ -91,5 +91,5 @@ def test_an_override_that_is_none_reads_alike_at_every_door(
     path = tmp_path / "scene.toml"
     path.write_text('title = "one"\n')
     assert main([verb, str(path), "--set", "nothing"]) == 2
-    told = capsys.readouterr().err
-    assert told.startswith("trackbed: --set: can not read the override 'nothing'\n  -> write ")
+    said = capsys.readouterr().err
+    assert said.startswith("trackbed: --set: can not read the override 'nothing'\n  -> write ")

@@ -36,9 +36,9 @@ def test_status_tells_how_far_a_run_is(
     """Stopped, running, finished, and what to do next, in the words of the command."""
     folder = folder_of(kind, tmp_path / "run")
     assert main(["status", str(folder), "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert (told["kind"], told["state"], told["saved_states"]) == (kind, "stopped", 1)
-    assert told["next"] == f"trackbed {kind} a.toml --set 'x=[1, 2]' --resume"
+    shown = json.loads(capsys.readouterr().out)
+    assert (shown["kind"], shown["state"], shown["saved_states"]) == (kind, "stopped", 1)
+    assert shown["next"] == f"trackbed {kind} a.toml --set 'x=[1, 2]' --resume"
     with lock_folder(folder):
         assert main(["status", str(folder), "--json"]) == 0
         assert json.loads(capsys.readouterr().out)["state"] == "running"
@@ -64,10 +64,10 @@ def test_what_a_story_has_no_verb_for_is_a_sentence(
     """Exit code 2, and what to do instead."""
     folder = folder_of(kind, tmp_path / "run")
     assert main([words[0], str(folder), *words[1:]]) == 2
-    told = capsys.readouterr().err
-    assert told.startswith(f"trackbed: {folder}: ")
-    assert said.replace("VERB", kind) in told
-    assert "\n  -> " in told
+    shown = capsys.readouterr().err
+    assert shown.startswith(f"trackbed: {folder}: ")
+    assert said.replace("VERB", kind) in shown
+    assert "\n  -> " in shown
 
 
 @pytest.mark.parametrize("kind", SCENES)

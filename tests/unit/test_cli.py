@@ -391,8 +391,8 @@ def test_a_full_disk_has_one_exit_code(tmp_path: Path) -> None:
     from adapters.files.run_folder import name_full_disk
     from trackbed.run_files.whole import refuse_writing
 
-    def code(number: int, told: Callable[[Path], AbstractContextManager[None]]) -> int:
-        with pytest.raises(Exception, match=os.strerror(number)) as caught, told(tmp_path):
+    def code(number: int, shown: Callable[[Path], AbstractContextManager[None]]) -> int:
+        with pytest.raises(Exception, match=os.strerror(number)) as caught, shown(tmp_path):
             raise OSError(number, os.strerror(number))
         return explain_error(caught.value)[1]
 

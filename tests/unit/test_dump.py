@@ -470,7 +470,7 @@ def test_other_files_are_refused(tmp_path: Path, content: bytes, says: str) -> N
 
 
 def test_missing_file_is_a_usage_error(tmp_path: Path) -> None:
-    """A file that is not there, or a folder, is the user's mistake, told with its name."""
+    """A file that is not there, or a folder, is the user's mistake, and named."""
     for path in (tmp_path / "none.dump", tmp_path):
         with pytest.raises(UsageError, match=re.escape(str(path))):
             list(read_frames(path))

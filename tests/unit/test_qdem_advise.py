@@ -109,9 +109,9 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     """A line a body, and the same in JSON; a tolerance that is none is refused."""
     file = tmp_path / "advice.json"
     assert command.main(["advise", str(STONES), "--tolerance", "0.05", "--json", str(file)]) == 0
-    told = capsys.readouterr().out
-    assert "pad: deformable: it makes 0.9" in told
-    assert "rigid: 2 of 3 bodies" in told
+    shown = capsys.readouterr().out
+    assert "pad: deformable: it makes 0.9" in shown
+    assert "rigid: 2 of 3 bodies" in shown
     written = json.loads(file.read_text())
     assert [body["rigid"] for body in written["bodies"]] == [False, True, True]
     assert command.main(["advise", str(STONES), "--tolerance", "2"]) == 2

@@ -132,7 +132,7 @@ def test_state_of_periodic_bodies_in_the_middle(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "said"),
     [
         ({"cells": (6, 2, 2)}, "mesh of body 0"),
         ({"material": {"poisson": 0.29}}, "material of body 0"),
@@ -155,14 +155,14 @@ def test_state_of_periodic_bodies_in_the_middle(tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 def test_state_of_another_simulation_is_refused(
-    change: dict[str, Any], told: str, tmp_path: Path
+    change: dict[str, Any], said: str, tmp_path: Path
 ) -> None:
     """The error names what differs, and the simulation stays as it was."""
     made().save(tmp_path / "state.npz")
     other = made(**change)
     other.advance(1e-5)
     before = state_of(other)
-    with pytest.raises(CheckpointError, match=told):
+    with pytest.raises(CheckpointError, match=said):
         other.restore(tmp_path / "state.npz")
     assert state_of(other) == before
 
@@ -236,8 +236,8 @@ def test_failed_write_keeps_the_old_file(saved: Path, monkeypatch: pytest.Monkey
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("os.fsync", full)
-    with pytest.raises(DiskFull, match="No space") as told:
+    with pytest.raises(DiskFull, match="No space") as said:
         made().save(saved)
-    assert told.value.exit_code == 5
+    assert said.value.exit_code == 5
     assert saved.read_bytes() == before
     assert [path.name for path in saved.parent.iterdir()] == [saved.name]

@@ -107,8 +107,8 @@ def test_page_shows_the_numbers_of_the_json(finished: Path) -> None:
     numbers, page = report_of(finished)
     for row in numbers["error_rows"][1:]:
         del row["speed_up_with_preparation"]  # the claim has this run's
-    told = ("error_rows", "jumps", "costs", "preparation", "settlement")
-    wanted = {value for name in told for value in numbers_in(numbers[name])}
+    printed = ("error_rows", "jumps", "costs", "preparation", "settlement")
+    wanted = {value for name in printed for value in numbers_in(numbers[name])}
     assert not wanted - shown(page)
     assert len(wanted) > 30
 
@@ -417,7 +417,7 @@ def test_numbers_are_typeset() -> None:
 
 
 def test_what_is_left_out_follows_from_the_scene() -> None:
-    """Friction, mirrors, damping and jumps are told of exactly where the scene has them."""
+    """Friction, mirrors, damping and jumps are named exactly where the scene has them."""
 
     def said(*overrides: str) -> str:
         return " ".join(left_out(load_scene(scene_path("karrech-coarse"), overrides)))

@@ -31,7 +31,7 @@ def test_only_what_is_left_at_the_end_is_told() -> None:
 
 
 @pytest.mark.parametrize(
-    ("cycles", "jumps", "told"),
+    ("cycles", "jumps", "said"),
     [
         ([], [15], ""),
         ([1, 2, 9], [15, 40], "cycles 1 to 2, 9 to 9:</strong>.* 1 of the 2 jumps were made then"),
@@ -40,7 +40,7 @@ def test_only_what_is_left_at_the_end_is_told() -> None:
     ],
 )
 def test_a_piston_that_hung_is_told(
-    monkeypatch: pytest.MonkeyPatch, cycles: list[int], jumps: list[int], told: str
+    monkeypatch: pytest.MonkeyPatch, cycles: list[int], jumps: list[int], said: str
 ) -> None:
     """In which cycles, and how many jumps were made then or in the k_i = 10 cycles behind; nothing
     where it did not hang, or there is no load."""
@@ -49,7 +49,7 @@ def test_a_piston_that_hung_is_told(
     run = SimpleNamespace(outcomes=[], jumps=made)
     monkeypatch.setattr(report_jumps, "find_hung_cycles", lambda *_: np.array(cycles, int))
     found = hung(cast(Record, SimpleNamespace(scene=scene, run=run)))
-    assert re.search(told, found, re.DOTALL)
+    assert re.search(said, found, re.DOTALL)
     assert bool(found) == bool(cycles)
     bare = SimpleNamespace(procedure=scene.procedure, loading=None)
     assert hung(cast(Record, SimpleNamespace(scene=bare, run=run))) == ""

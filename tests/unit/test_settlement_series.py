@@ -133,10 +133,10 @@ def test_long_tables_are_read_fast(tmp_path: Path) -> None:
         series = read_series([path])
         read = time.process_time()
         with path.open() as file:
-            told = {float(n): float(value) for n, value in list(csv.reader(file))[1:]}
+            said = {float(n): float(value) for n, value in list(csv.reader(file))[1:]}
         least.append(time.process_time() - read)
         seconds.append(read - start)
-    assert len(told) == len(series.settlement)
+    assert len(said) == len(series.settlement)
     assert min(seconds) < 4.0 * min(least)
     np.testing.assert_allclose(series.settlement, cycle / 7, rtol=1e-8)
 
@@ -270,12 +270,12 @@ def test_a_unit_that_the_data_has_is_not_given_another(tmp_path: Path) -> None:
         read_series([table], columns=("cycle", "Settlement [inch]"), unit="mm")
 
 
-@pytest.mark.parametrize(("told", "unit"), [("µm", "um"), (" MM ", "mm"), ("-", "1"), ("1", "1")])
-def test_units_are_told_as_headers_give_them(tmp_path: Path, told: str, unit: str) -> None:
+@pytest.mark.parametrize(("said", "unit"), [("µm", "um"), (" MM ", "mm"), ("-", "1"), ("1", "1")])
+def test_units_are_given_as_headers_give_them(tmp_path: Path, said: str, unit: str) -> None:
     """Case, blanks and the other letter mu do not count."""
     table = tmp_path / "bare.csv"
     table.write_text("1,0.001\n2,0.002\n")
-    assert read_series([table], unit=told).unit == unit
+    assert read_series([table], unit=said).unit == unit
 
 
 def test_settlement_before_the_count_began_is_known() -> None:

@@ -77,7 +77,7 @@ def test_to_the_end_with_its_control(tmp_path: Path) -> None:
     written = json.loads((tmp_path / "run" / "report.json").read_text())
     assert written["band"]["low"] == pytest.approx(low)
     events = len(RunFolder(tmp_path / "run").events())
-    procedure.resume(tmp_path / "run", progress=QUIET)  # finished: the same decisions, none told
+    procedure.resume(tmp_path / "run", progress=QUIET)  # finished: the same decisions, none printed
     assert list_decisions(RunFolder(tmp_path / "run").events()) == decisions
     assert len(RunFolder(tmp_path / "run").events()) == events + 3  # resumed, two engines
     newer = {"moved", "correction", "kappa", "reseated"}
@@ -265,10 +265,10 @@ def test_killed_at_file_operations(commands: Commands, tmp_path: Path) -> None:
     names = [RunFolder(path).stage_names() for path in (whole, run_folder)]
     assert names[0] == names[1]
 
-    def told(path: Path) -> list[dict[str, object]]:
+    def said(path: Path) -> list[dict[str, object]]:
         return [{**e, "time": ""} for e in list_decisions(RunFolder(path).events())]
 
-    assert told(run_folder) == told(whole)
+    assert said(run_folder) == said(whole)
 
 
 def test_jump_that_fails_is_halved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -232,6 +232,6 @@ def test_a_scene_names_the_width(tmp_path: Path) -> None:
         ("contact.plane.0.normal=[0, 1, 1]", "contact.plane.0.normal: its normal has a part"),
         ('contact.model="surface"', "contact.periodic: a width is for spheres"),
     ):
-        with pytest.raises(SceneError) as told:
+        with pytest.raises(SceneError) as said:
             make_simulation(load_scene(path, [change]))
-        assert words in str(told.value), change
+        assert words in str(said.value), change

@@ -398,10 +398,10 @@ def test_more_contacts_than_the_step_allows_for_are_warned_of() -> None:
         "contacts": 1, "planes": [q.ContactPlane((0, 0, -0.00599), (0, 0, 1))]
     })  # fmt: skip
     assert run.critical_step.value < 0.1 * run.elements_critical_step.value
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as shown:
         warnings.simplefilter("always")
         run.advance(2 * run.step)
-    assert any("contacts of a vertex make" in str(w.message) for w in told)
+    assert any("contacts of a vertex make" in str(w.message) for w in shown)
     run = two(gap=-1e-7, stiffness=1e12, step=run.step * 3, contact={"contacts": 1})
     with pytest.warns(StepWarning, match="governs"):
         run.advance(run.step)

@@ -39,10 +39,10 @@ def test_newton() -> None:
     """A body whose nodes all follow ``z = a t^2/2``: m a, gravity apart."""
     body = block()
     run = q.Simulation([body], threads=1, step=1e-4, gravity=[0, 0, -9.81])
-    told = run.prescribe(body, np.arange(len(X)), "z", lambda t: 0.5 * 3.0 * t**2)
+    said = run.prescribe(body, np.arange(len(X)), "z", lambda t: 0.5 * 3.0 * t**2)
     run.advance(5e-3)
     expected = MASS * (3.0 + 9.81)
-    np.testing.assert_allclose(run.reaction(told), [0, 0, expected], rtol=1e-9, atol=1e-6)
+    np.testing.assert_allclose(run.reaction(said), [0, 0, expected], rtol=1e-9, atol=1e-6)
 
 
 def test_momentum_of_a_march() -> None:

@@ -31,11 +31,11 @@ def test_a_sliver_that_governs_the_step_is_named_once() -> None:
     body = q.Body(flattened(0.01), MATERIAL, name="stone")
     run = q.Simulation([body], threads=1)
     thin = [int(k) for k in np.flatnonzero(body.gradients[1] < 0.02 * np.median(body.gradients[1]))]
-    with pytest.warns(StepWarning, match="of stone makes the critical step") as told:
+    with pytest.warns(StepWarning, match="of stone makes the critical step") as said:
         run.advance(run.step)
-    assert len(told) == 1
+    assert len(said) == 1
     assert run.critical_step.element in thin
-    assert f"element {run.critical_step.element} " in str(told[0].message)
+    assert f"element {run.critical_step.element} " in str(said[0].message)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         run.advance(run.step)

@@ -422,9 +422,9 @@ def test_a_dry_run_prepares_no_bed(tmp_path: Path, capsys: pytest.CaptureFixture
     assert isinstance(prepared, TrackPrepared)
     count = prepared.recipe.below + prepared.recipe.beside
     assert main(["qdem", str(path), "--dry-run"]) == 0
-    told = capsys.readouterr().out
-    assert "to be prepared first (stages bed to rest)" in told
-    assert f"the bed: {count} grains" in told
+    shown = capsys.readouterr().out
+    assert "to be prepared first (stages bed to rest)" in shown
+    assert f"the bed: {count} grains" in shown
     assert main(["qdem", str(path), "--dry-run", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["bed"]["grains"] == count
     assert [file.name for file in tmp_path.iterdir()] == ["scene.toml"]

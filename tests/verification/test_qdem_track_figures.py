@@ -157,7 +157,7 @@ def test_a_run_too_short_for_spectra_ends_with_the_rest(tmp_path: Path, count: i
     assert (
         ("peaks" in facts["S1"]) == ("mobility_peaks" in facts["B1"]) == (count >= FEWEST_SAMPLES)
     )
-    told = dict(draw_track_pictures(tmp_path, load))
-    assert len(told) == (6 if count >= FEWEST_SAMPLES else 2)
-    assert any("not smoothed" in caption for caption in told.values()) == (count >= FEWEST_SAMPLES)
+    said = dict(draw_track_pictures(tmp_path, load))
+    assert len(said) == (6 if count >= FEWEST_SAMPLES else 2)
+    assert any("not smoothed" in caption for caption in said.values()) == (count >= FEWEST_SAMPLES)
     assert describe_smoothing(np.linspace(0.0, 0.05, 9)) == "Parzen window of 20 Hz"

@@ -72,8 +72,8 @@ def test_a_run_of_rigid_grains_says_what_it_leaves_out_and_stands_for_itself(fol
     kinds = {"false": "", "true": ", grains rigid", '"lumped"': ", grains rigid (lumped)"}
     for kind in kinds:
         prepared = prepared_in(folder, f"track.rigid={kind}", "track.stand=1e-5")
-        told = " ".join(prepared.scene.list_left_out())
-        assert ("deformation of grains" in told) == (kind != "false")
+        said = " ".join(prepared.scene.list_left_out())
+        assert ("deformation of grains" in said) == (kind != "false")
         make_simulation(prepared)
     stands = read_bed(prepared.bed_file, prepared.recipe).stands
     keys = {f"friction 0.577, 1e-05 s{kind}" for kind in kinds.values()}

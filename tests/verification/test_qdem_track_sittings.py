@@ -54,7 +54,7 @@ def fallen(recipe: BedRecipe, part: Path | None, killed_after: int | None = None
     return run_stage(recipe, make_bed_grains(recipe), "bed", None, 1, progress, part)
 
 
-def told(bed: Bed) -> tuple[bytes, dict[str, Any]]:
+def said(bed: Bed) -> tuple[bytes, dict[str, Any]]:
     """Where all nodes lie, to the bit, and how the stage went."""
     rest = {key: value for key, value in bed.rests["bed"].items() if key != "cpu_s"}
     return np.concatenate(bed.positions).tobytes(), rest
@@ -76,7 +76,7 @@ def test_a_killed_stage_goes_on_to_the_same_bits(
             fallen(recipe, part, JUDGEMENTS)
     bed = fallen(recipe, part)
     assert whole.rests["bed"]["steps"] > 3 * JUDGEMENTS * 1000
-    assert told(bed) == told(whole)
+    assert said(bed) == said(whole)
     assert bed.rests["bed"]["cpu_s"] > 0
 
 
@@ -89,7 +89,7 @@ def test_more_patience_goes_on_where_less_gave_up(whole: Bed, tmp_path: Path) ->
     ):
         fallen(short, part)
     seen = part.stat().st_mtime_ns
-    assert told(fallen(recipe, part)) == told(whole)
+    assert said(fallen(recipe, part)) == said(whole)
     assert part.stat().st_mtime_ns == seen
 
 

@@ -85,7 +85,7 @@ def test_a_bed_with_too_little_is_refused_and_remembered(
     with pytest.raises(NotConverged, match=r"sliders take .* at Coulomb's limit .0\.01 asked"):
         judge_bed(SLOPING, bed, path, contact(0.15), TIME, 0.01)
     kept = read_bed(path, SLOPING)
-    monkeypatch.setattr(track_stand, "let_bed_stand", None)  # told from the file
+    monkeypatch.setattr(track_stand, "let_bed_stand", None)  # read from the file
     stand = judge_bed(SLOPING, kept, path, contact(0.15), TIME, 1.0)
     assert asdict(stand) in list(kept.stands.values())
     assert stand.at_limit == 0.5  # the upper ones, which bear less

@@ -84,10 +84,10 @@ def test_tables_and_picture(
 ) -> None:
     """Every member's cycles and their mean are in CSV and Parquet alike; the rest is not run."""
     into = tmp_path / "sweep"
-    code, told, _ = sweep(capsys, scene, *FREQUENCIES, "--seeds", 2, "--into", into)
+    code, shown, _ = sweep(capsys, scene, *FREQUENCIES, "--seeds", 2, "--into", into)
     assert code == 0
-    assert told is not None
-    assert told["counts"] == {"finished": 4}
+    assert shown is not None
+    assert shown["counts"] == {"finished": 4}
     assert len(in_process) == 4
     assert (into / "settlement.png").read_bytes().startswith(b"\x89PNG")
     for name, rows in (("members", 4), ("settlement", 4 * 9), ("band", 2 * 9)):
@@ -110,12 +110,12 @@ def test_tables_and_picture(
             ) if (f, c) == (frequency, cycle)
         ]  # fmt: skip
         assert mean == pytest.approx(np.mean(own), rel=1e-12)
-    first = into / told["members"][0]["run_folder"]
+    first = into / shown["members"][0]["run_folder"]
     assert curves["settlement"][:9] == [
         row["settlement"] for outcome in RunFolder(first).outcomes() for row in outcome.rows
     ]
 
-    code, told, said = sweep(capsys, scene, *FREQUENCIES, "--seeds", 3, "--into", into)
+    code, shown, said = sweep(capsys, scene, *FREQUENCIES, "--seeds", 3, "--into", into)
     assert code == 0
     assert "6 members, 4 finished" in said
     assert [words[-1] for words in in_process[4:]] == ["sample.seed=3", "sample.seed=3"]
@@ -131,16 +131,16 @@ def test_failed_members_are_named_and_the_others_finish(
     words = (scene, "--set", "engine.name=liggghts,fake", "--seeds", 2, "--into", into)
     with monkeypatch.context() as context:
         context.setenv("PATH", "/nonexistent")
-        code, told, said = sweep(capsys, *words)
+        code, shown, said = sweep(capsys, *words)
     assert code == 8
-    assert told is not None
-    assert told["counts"] == {"failed": 2, "finished": 2}
-    assert [one["exit_code"] for one in told["members"]] == [4, 4, 0, 0]
+    assert shown is not None
+    assert shown["counts"] == {"failed": 2, "finished": 2}
+    assert [one["exit_code"] for one in shown["members"]] == [4, 4, 0, 0]
     assert said.count("engine.name=liggghts,sample.seed=1, exit code 4: ") == 1
-    assert "apt-get install" in told["members"][0]["sentence"]
+    assert "apt-get install" in shown["members"][0]["sentence"]
     members = table_read(into / "members.parquet").to_pydict()
     assert members["state"] == ["failed", "failed", "finished", "finished"]
-    assert [one["seeds"] for one in told["settlements"]] == [2]
+    assert [one["seeds"] for one in shown["settlements"]] == [2]
 
     scene.write_text(scene.read_text() + "# another comment changes nothing\n")
     in_process.clear()
@@ -201,13 +201,13 @@ def test_any_dask_cluster_by_its_address(
         address = cluster.scheduler_address
         assert address.startswith("tcp://")
         words = (scene, "--seeds", 2, "--into", tmp_path / "sweep", "--scheduler", address)
-        code, told, _ = sweep(capsys, *words)
+        code, shown, _ = sweep(capsys, *words)
         with Client(cluster) as client:
             assert client.scheduler_info()["workers"]
     assert code == 0
-    assert told is not None
-    assert told["scheduler"] == address
-    assert told["counts"] == {"finished": 2}
+    assert shown is not None
+    assert shown["scheduler"] == address
+    assert shown["counts"] == {"finished": 2}
     assert len(in_process) == 2
 
 
@@ -273,13 +273,13 @@ def test_stopped_it_goes_on(
     words = (scene, "--seeds", 3, "--into", into)
     with monkeypatch.context() as context:
         context.setattr(sweep_member, "run_process", stopped_in_the_second)
-        code, told, said = sweep(capsys, *words)
+        code, shown, said = sweep(capsys, *words)
     assert code == 130
-    assert told is None
+    assert shown is None
     assert "the same command goes on with the sweep" in said
     members = json.loads((into / "sweep.json").read_text())["members"]
     assert [one["state"] for one in members] == ["finished", "stopped", "stopped"]
-    code, told, said = sweep(capsys, *words)
+    code, shown, said = sweep(capsys, *words)
     assert code == 0
     assert "3 members, 1 finished" in said
     assert len(in_process) == 3
