@@ -20,6 +20,7 @@ import pytest
 from adapters.files.run_folder import RunFolder
 from adapters.procedure.sweep import member as sweep_member
 from adapters.procedure.sweep import run as run_sweep
+from adapters.procedure.sweep.cluster import ANY_PORT
 from adapters.procedure.sweep.member import Ended
 from adapters.procedure.sweep.plan import Member, Sweep
 from tests.forked_commands import comes_true, gone
@@ -196,7 +197,7 @@ def test_any_dask_cluster_by_its_address(
 
     with LocalCluster(
         n_workers=1, threads_per_worker=1, processes=False, protocol="tcp://",
-        host="127.0.0.1", dashboard_address=None,
+        host="127.0.0.1", dashboard_address=None, scheduler_kwargs={"dashboard_address": ANY_PORT},
     ) as cluster:  # fmt: skip
         address = cluster.scheduler_address
         assert address.startswith("tcp://")

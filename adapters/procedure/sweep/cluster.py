@@ -14,6 +14,8 @@ from adapters.errors import EngineMissing, UsageError
 LOCAL, SLURM = "local", "slurm"
 """Names for ``--scheduler``; anything else is the address of a scheduler."""
 
+ANY_PORT = "127.0.0.1:0"
+"""Of a scheduler's pages: Dask's own port is taken where two sweeps run at once."""
 CONNECT_S = 30
 """How long a scheduler may take to answer [s]."""
 
@@ -50,6 +52,7 @@ def open_client(
                 threads_per_worker=min(workers or cores, members),
                 processes=False,
                 dashboard_address=None,
+                scheduler_kwargs={"dashboard_address": ANY_PORT},
                 memory_limit=None,
             )
             stack.enter_context(place)
