@@ -29,7 +29,6 @@ VERBS = {
     ),
     "relax": ("adapters.cli.relax", "bring the overlaps of a state back to equilibrium"),
     "qdem": ("qdem_fem.cli.run", "vibration and statics of deformable bodies, from a scene file"),
-    "advise": ("qdem_fem.cli.advise", "which bodies of a QDEM scene may be rigid, at what error"),
     "grains": ("qdem_fem.cli.track", "random ballast grains of a standard grading, as a file"),
     "train": ("qdem_fem.cli.track", "load of a passing train on a sleeper's rail seats, as CSV"),
     "rigid": ("rigid_lcp.cli", "rigid, sharp-edged grains with friction, from a scene file"),

@@ -8,7 +8,7 @@ from qdem_fem.mesh.surface import (
     find_pressure_forces,
     find_surface_faces,
 )
-from qdem_fem.mesh.tetrahedra import TetMesh, find_altitudes, find_gradients, lump_mass, read_mesh
+from qdem_fem.mesh.tetrahedra import TetMesh, find_altitudes, find_gradients, read_mesh
 
 __all__ = [
     "BoolArray",
@@ -21,7 +21,6 @@ __all__ = [
     "find_gradients",
     "find_pressure_forces",
     "find_surface_faces",
-    "lump_mass",
     "make_box_mesh",
     "name_some",
     "read_mesh",

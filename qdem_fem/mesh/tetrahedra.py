@@ -1,4 +1,4 @@
-"""Tetrahedral meshes: read and checked once, then gradients, volumes and lumped masses."""
+"""Tetrahedral meshes: read and checked once, then gradients and volumes."""
 
 from __future__ import annotations
 
@@ -180,18 +180,3 @@ def find_altitudes(gradients: FloatArray) -> FloatArray:
     g = np.ascontiguousarray(gradients.transpose(1, 2, 0))
     squares = [(row * row).sum(axis=0) for row in (*g, g.sum(axis=0))]
     return np.asarray(1 / np.sqrt(np.max(squares, axis=0)))
-
-
-def lump_mass(
-    elements: IntArray, volumes: FloatArray, density: float | FloatArray, n_nodes: int
-) -> FloatArray:
-    """Mass of each node [kg], (n,): a quarter of rho V_0 of each of its elements (paper, 2.4).
-
-    ``volumes`` (m,) [m^3] of the reference configuration, ``density`` [kg/m^3] one or (m,).
-    Nodes of no element get zero.
-    """
-    quarter = np.broadcast_to(np.asarray(density) * volumes / 4, volumes.shape)
-    mass = np.zeros(n_nodes)
-    for corner in elements.T:
-        mass += np.bincount(corner, weights=quarter, minlength=n_nodes)
-    return mass

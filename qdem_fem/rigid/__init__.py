@@ -2,7 +2,6 @@
 
 from qdem_fem.rigid import step
 from qdem_fem.rigid.bodies import Acting, RigidBodies
-from qdem_fem.rigid.holds import find_hold
 from qdem_fem.rigid.step import Rigid, advance_rigid
 
-__all__ = ["Acting", "Rigid", "RigidBodies", "advance_rigid", "find_hold", "step"]
+__all__ = ["Acting", "Rigid", "RigidBodies", "advance_rigid", "step"]

@@ -1,6 +1,5 @@
-"""A scene run from its file: build, march, report, advice."""
+"""A scene run from its file: build, march, report."""
 
-from qdem_fem.scene.advise import Advice, advise, predict_error
 from qdem_fem.scene.build import make_simulation
 from qdem_fem.scene.checks import load_scene
 from qdem_fem.scene.page import write_report
@@ -13,16 +12,13 @@ from qdem_fem.scene.summary import (
 )
 
 __all__ = [
-    "Advice",
     "RunFolder",
-    "advise",
     "describe_critical_step",
     "list_body_facts",
     "list_mass_scaling_facts",
     "load_scene",
     "make_plan",
     "make_simulation",
-    "predict_error",
     "run_dynamic",
     "run_static",
     "summarise_run",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import warnings
 from pathlib import Path
 
@@ -15,7 +14,6 @@ from qdem_fem.scene.checks import load_scene
 from qdem_fem.track.bed import prepare_bed, read_bed
 from qdem_fem.track.enter import TrackPrepared, choose_contact
 from qdem_fem.track.stand import begin_bed
-from trackbed import command
 from validation.bench.track_trials import SCENE, scene_at
 
 FEW = ("track.below=8", "track.beside=3", "track.unbalanced=0.5")
@@ -54,16 +52,6 @@ def test_rigid_grains_begin_with_the_forces_of_deformable_ones(folder: Path) -> 
     assert hard.energy().contact == soft.energy().contact
     assert 0 < hard.energy().elastic < soft.energy().elastic
     assert hard.step > soft.step
-
-
-def test_of_a_hard_track_no_grain_may_be_rigid(folder: Path) -> None:
-    """By the advice: its contacts are as stiff as its grains."""
-    scene, file = folder / "scene.toml", folder / "advice.json"
-    marks = [f"--set={one}" for one in FEW]
-    assert command.main(["advise", str(scene), "--json", str(file), *marks]) == 0
-    found = json.loads(file.read_text(encoding="utf-8"))["bodies"]
-    assert len(found) == 12
-    assert not any(one["rigid"] for one in found)
 
 
 @pytest.mark.filterwarnings("ignore::qdem_fem.files.errors.StepWarning")
