@@ -15,10 +15,9 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 import numpy.typing as npt
 
+from qdem_fem.files.arrays import Floats
 from qdem_fem.files.errors import UsageError
 from trackbed.run_files import open_unlinked, refuse_writing, replace_file, write_whole
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def write_bodies_vtu(path: Path, bodies: Sequence[Any]) -> None:
@@ -122,7 +121,7 @@ class Table:
             ) from error  # fmt: skip
 
 
-def read_table(path: Path) -> dict[str, FloatArray]:
+def read_table(path: Path) -> dict[str, Floats]:
     """Columns of a CSV table of numbers by name; empty arrays when it has no rows.
 
     Raises `UsageError` when it is not such a table.

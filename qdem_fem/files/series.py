@@ -8,11 +8,10 @@ from numbers import Real
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from qdem_fem.files.arrays import Floats
 from qdem_fem.files.errors import ConditionError
-
-Floats = NDArray[np.float64]
 
 
 class Series:

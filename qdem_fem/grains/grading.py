@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from qdem_fem.files import MeshError
-from qdem_fem.mesh import FloatArray
+from qdem_fem.files import Floats, MeshError
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,9 +16,9 @@ class Grading:
     Raises `MeshError` for sieves that do not grow, or shares that do not grow from 0 to 1.
     """
 
-    sieves: FloatArray
+    sieves: Floats
     """Sides of the square holes [m], (k,), growing."""
-    passing: FloatArray
+    passing: Floats
     """Share of the mass that passes [-], (k,), from 0 to 1."""
 
     def __post_init__(self) -> None:
@@ -43,7 +42,7 @@ BALLAST = Grading(
 nothing below 22.4 mm: 71.5 % from 31.5 to 50.  Not compared with a printed copy of the standard."""
 
 
-def draw_sizes(grading: Grading, count: int, generator: np.random.Generator) -> FloatArray:
+def draw_sizes(grading: Grading, count: int, generator: np.random.Generator) -> Floats:
     """Sieve sizes [m], (count,), of grains of like shape whose masses follow the curve.
 
     Even in ln D by mass is D^-4 dD by number, as the mass of a grain goes with D^3.  One size is

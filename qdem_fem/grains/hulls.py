@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.spatial import ConvexHull
 
-from qdem_fem.files import MeshError
+from qdem_fem.files import Floats, Integers, MeshError
 from qdem_fem.grains.measures import (
     find_edge_angles,
     find_roundness,
@@ -26,7 +26,6 @@ from qdem_fem.grains.measures import (
     quarter_faces,
 )
 from qdem_fem.grains.meshing import find_radius_ratios, make_grain_elements, place_apex_and_spokes
-from qdem_fem.mesh import FloatArray, IntArray
 
 CANDIDATES = 10
 """Random points of which the one farthest from the corners so far becomes a corner."""
@@ -90,16 +89,16 @@ class GrainRecipe:
 class GrainForm:
     """A grain of no particular size."""
 
-    corner_faces: IntArray
+    corner_faces: Integers
     """Triangles of the hull of the M corners, (2 M - 4, 3), outward."""
-    nodes: FloatArray
+    nodes: Floats
     """M corners, the middle of every edge of `find_surface_edges` of ``corner_faces``, and the
     inner nodes of `qdem_fem.grains.place_apex_and_spokes`; centroid at zero, (5 M - 5, 3)."""
     sphericity: float
     roundness: float
 
 
-def place_corners_apart(generator: np.random.Generator, count: int) -> FloatArray:
+def place_corners_apart(generator: np.random.Generator, count: int) -> Floats:
     """Points on the unit sphere (count, 3), each the best of some random ones (Mitchell 1991)."""
     chosen = np.empty((0, 3))
     while len(chosen) < count:
@@ -110,7 +109,7 @@ def place_corners_apart(generator: np.random.Generator, count: int) -> FloatArra
     return chosen
 
 
-def find_hull_faces(points: FloatArray) -> IntArray:
+def find_hull_faces(points: Floats) -> Integers:
     """Outward triangles (2 n - 4, 3) of the convex hull of points (n, 3) on a sphere about 0."""
     faces = ConvexHull(points).simplices.astype(np.int64)
     a, b, c = points[faces].transpose(1, 0, 2)
@@ -144,7 +143,7 @@ def draw_grain(generator: np.random.Generator, recipe: GrainRecipe) -> GrainForm
     )
 
 
-def make_flat_form(points: FloatArray) -> GrainForm:
+def make_flat_form(points: Floats) -> GrainForm:
     """The grain of flat faces that is the hull of ``points`` (M, 3), the origin inside it.
 
     Raises `MeshError` where a point is no corner of the hull, or the mesh would have a sliver.
@@ -192,7 +191,7 @@ class _Drawn:
         self.turn = np.linalg.qr(generator.standard_normal((3, 3)))[0]
         self.turn *= np.sign(np.linalg.det(self.turn))
 
-    def lifted(self, lift: float) -> FloatArray:
+    def lifted(self, lift: float) -> Floats:
         """Nodes within the unit sphere (n, 3); lifts are lowered until the grain is convex."""
         lifts = np.full(len(self.outward), lift)
         for _ in range(1000):
@@ -206,7 +205,7 @@ class _Drawn:
             lifts[inward] *= LOWERED
         return nodes
 
-    def stretched(self, nodes: FloatArray, psi: float) -> FloatArray | None:
+    def stretched(self, nodes: Floats, psi: float) -> Floats | None:
         """Nodes of sphericity ``psi``, or None where they have less without any stretch.
 
         Stretches keep the volume.
@@ -228,7 +227,7 @@ class _Drawn:
         What roundness was had on the way is noted in ``reached``.
         """
 
-        def tried(lift: float) -> tuple[float, FloatArray] | None:
+        def tried(lift: float) -> tuple[float, Floats] | None:
             nodes = self.stretched(self.lifted(lift), psi)
             if nodes is None:
                 return None
@@ -262,7 +261,7 @@ class _Drawn:
             below, above = (middle, above) if found[0] < 0 else (below, middle)
         return None
 
-    def _form(self, surface: FloatArray, psi: float, roundness: float) -> GrainForm | None:
+    def _form(self, surface: Floats, psi: float, roundness: float) -> GrainForm | None:
         """The grain of a solved surface, None where its mesh has a sliver."""
         turned = surface @ self.turn.T
         inner = place_apex_and_spokes(turned, self.faces, self.count)

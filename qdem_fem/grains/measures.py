@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from qdem_fem.mesh import FloatArray, IntArray, find_area_vectors
+from qdem_fem.files import Floats, Integers
+from qdem_fem.mesh import find_area_vectors
 
 FIRST_PLANES = 1e3
 """Distance of the planes that the search for an inscribed sphere starts from, over the extent."""
@@ -25,11 +26,11 @@ class Solid:
 
     volume: float
     """V = integral dV [m^3]; negative where the faces are seen clockwise from outside."""
-    centroid: FloatArray
+    centroid: Floats
     """integral x dV / V [m], (3,)."""
 
 
-def integrate_polyhedron(nodes: FloatArray, faces: IntArray) -> Solid:
+def integrate_polyhedron(nodes: Floats, faces: Integers) -> Solid:
     """Integrals over the cones from one node to every face, which is exact.
 
     With D = det(a, b, c) of a cone's face: volume D/6, first moment D (a + b + c)/24.
@@ -42,7 +43,7 @@ def integrate_polyhedron(nodes: FloatArray, faces: IntArray) -> Solid:
     return Solid(float(volume), origin + first / volume)
 
 
-def find_surface_area(nodes: FloatArray, faces: IntArray) -> float:
+def find_surface_area(nodes: Floats, faces: Integers) -> float:
     """Area of the surface [m^2]."""
     return float(np.linalg.norm(find_area_vectors(nodes, faces), axis=1).sum())
 
@@ -61,15 +62,15 @@ def find_sphericity(volume: float, area: float) -> float:
 class Edges:
     """Edges of a closed surface; of its connectivity only."""
 
-    nodes: IntArray
+    nodes: Integers
     """The two nodes of each edge, (e, 2), as the first of its faces runs through them."""
-    faces: IntArray
+    faces: Integers
     """The two faces of each edge, (e, 2)."""
-    opposite: IntArray
+    opposite: Integers
     """The third node of each of these faces, (e, 2)."""
 
 
-def find_surface_edges(faces: IntArray) -> Edges:
+def find_surface_edges(faces: Integers) -> Edges:
     """Edges of a closed surface whose faces all run the same way round."""
     start, end = faces.reshape(-1), np.roll(faces, -1, axis=1).reshape(-1)
     third, owner = np.roll(faces, -2, axis=1).reshape(-1), np.repeat(np.arange(len(faces)), 3)
@@ -82,7 +83,7 @@ def find_surface_edges(faces: IntArray) -> Edges:
     return Edges(np.stack([start[one], end[one]], axis=1), owner[pair], third[pair])
 
 
-def quarter_faces(faces: IntArray, edges: Edges) -> IntArray:
+def quarter_faces(faces: Integers, edges: Edges) -> Integers:
     """Each triangle (k, 3) cut into four at the middles of its edges, (4 k, 3).
 
     The middle of edge e is node n + e, behind the n nodes of ``faces``.
@@ -93,7 +94,7 @@ def quarter_faces(faces: IntArray, edges: Edges) -> IntArray:
     return np.concatenate([np.stack(one, axis=1) for one in four])
 
 
-def number_edges(faces: IntArray, edges: Edges) -> IntArray:
+def number_edges(faces: Integers, edges: Edges) -> Integers:
     """Numbers of the edges 0-1, 1-2, 2-0 of each triangle, (k, 3)."""
     size = int(faces.max()) + 1
     key = edges.nodes.min(axis=1) * size + edges.nodes.max(axis=1)
@@ -103,9 +104,7 @@ def number_edges(faces: IntArray, edges: Edges) -> IntArray:
     return np.asarray(order[np.searchsorted(key, wanted, sorter=order)])
 
 
-def find_edge_angles(
-    nodes: FloatArray, faces: IntArray, edges: Edges
-) -> tuple[FloatArray, FloatArray]:
+def find_edge_angles(nodes: Floats, faces: Integers, edges: Edges) -> tuple[Floats, Floats]:
     """Lengths [m] and angles between the outward normals [rad], (e,); negative where concave."""
     normal = find_area_vectors(nodes, faces)
     normal /= np.linalg.norm(normal, axis=1)[:, None]
@@ -116,7 +115,7 @@ def find_edge_angles(
     return length, np.arctan2(sine, (one * other).sum(axis=1))
 
 
-def find_node_areas(nodes: FloatArray, faces: IntArray) -> FloatArray:
+def find_node_areas(nodes: Floats, faces: Integers) -> Floats:
     """Area of the surface that is nearest to each node [m^2], (n,); they add up to the whole.
 
     Voronoi regions, of obtuse triangles half to the obtuse corner and a quarter to each other one
@@ -134,7 +133,7 @@ def find_node_areas(nodes: FloatArray, faces: IntArray) -> FloatArray:
     return np.asarray(np.bincount(faces.reshape(-1), share.reshape(-1), len(nodes)), float)
 
 
-def find_greatest_curvatures(nodes: FloatArray, faces: IntArray, edges: Edges) -> FloatArray:
+def find_greatest_curvatures(nodes: Floats, faces: Integers, edges: Edges) -> Floats:
     """Larger principal curvature at each node [1/m], (n,): H + sqrt(H^2 - K).
 
     With the area A of `find_node_areas`: H = sum(L theta)/(4 A) over its edges, K = (2 pi - sum
@@ -153,7 +152,7 @@ def find_greatest_curvatures(nodes: FloatArray, faces: IntArray, edges: Edges) -
     return np.asarray(mean + np.sqrt(np.maximum(mean**2 - gauss, 0.0)))
 
 
-def find_roundness(nodes: FloatArray, faces: IntArray, edges: Edges | None = None) -> float:
+def find_roundness(nodes: Floats, faces: Integers, edges: Edges | None = None) -> float:
     """Mean radius of curvature of corners and ridges over that of the inscribed sphere [-].
 
     Wadell's roundness (J. Geol. 40, 1932) taken to space as by Bullard and Garboczi (Powder
@@ -168,7 +167,7 @@ def find_roundness(nodes: FloatArray, faces: IntArray, edges: Edges | None = Non
     return float(np.mean(1 / relative[sharp])) if sharp.any() else 1.0
 
 
-def find_inscribed_sphere(nodes: FloatArray, faces: IntArray) -> tuple[FloatArray, float]:
+def find_inscribed_sphere(nodes: Floats, faces: Integers) -> tuple[Floats, float]:
     """Centre [m], (3,), and radius [m] of the largest sphere inside the planes of all faces.
 
     The largest inscribed sphere of a convex body; of one that is not convex a smaller one, and

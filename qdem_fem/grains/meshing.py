@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from qdem_fem.files import MeshError
+from qdem_fem.files import Floats, Integers, MeshError
 from qdem_fem.grains.measures import (
     find_surface_edges,
     integrate_polyhedron,
     number_edges,
 )
-from qdem_fem.mesh import FloatArray, IntArray, TetMesh, name_some
+from qdem_fem.mesh import TetMesh, name_some
 
 SPOKE = 0.5
 """Where on a spoke from the apex its node lies."""
@@ -31,7 +31,7 @@ DIAGONALS = np.array([
 """The other four, around one of the three diagonals of the octahedron that is left."""
 
 
-def find_radius_ratios(nodes: FloatArray, elements: IntArray) -> FloatArray:
+def find_radius_ratios(nodes: Floats, elements: Integers) -> Floats:
     """Three times the radius of the inscribed over that of the circumscribed sphere, (m,).
 
     1 for a regular tetrahedron, 0 for a flat one, negative where left-handed; ``nodes`` (n, 3) [m],
@@ -55,13 +55,13 @@ def find_radius_ratios(nodes: FloatArray, elements: IntArray) -> FloatArray:
     return np.asarray(size * np.sign(sixfold))
 
 
-def place_apex_and_spokes(nodes: FloatArray, faces: IntArray, corners: int) -> FloatArray:
+def place_apex_and_spokes(nodes: Floats, faces: Integers, corners: int) -> Floats:
     """The inner nodes (M + 1, 3) [m] of a surface: its centroid, and one on each spoke."""
     apex = integrate_polyhedron(nodes, faces).centroid
     return np.vstack([apex, apex + SPOKE * (nodes[:corners] - apex)])
 
 
-def make_grain_elements(nodes: FloatArray, corner_faces: IntArray) -> IntArray:
+def make_grain_elements(nodes: Floats, corner_faces: Integers) -> Integers:
     """Tetrahedra (8 (2 M - 4), 4) of a grain with ``nodes`` (5 M - 5, 3), right-handed.
 
     Of the three diagonals of each cone's octahedron the one that leaves the best worst
@@ -81,7 +81,7 @@ def make_grain_elements(nodes: FloatArray, corner_faces: IntArray) -> IntArray:
     return np.concatenate([local[:, CORNERS], best], axis=1).reshape(-1, 4)
 
 
-def make_grain_tetrahedra(nodes: FloatArray, corner_faces: IntArray) -> TetMesh:
+def make_grain_tetrahedra(nodes: Floats, corner_faces: Integers) -> TetMesh:
     """The mesh of a grain of all its ``nodes`` (5 M - 5, 3) [m]; node set ``surface``.
 
     Raises `MeshError` if the apex does not see the whole surface from inside.

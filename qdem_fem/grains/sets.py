@@ -16,12 +16,12 @@ from pathlib import Path
 
 import numpy as np
 
-from qdem_fem.files import MeshError
+from qdem_fem.files import Floats, Integers, MeshError
 from qdem_fem.grains.grading import BALLAST, Grading, draw_sizes
 from qdem_fem.grains.hulls import GrainForm, GrainRecipe
 from qdem_fem.grains.meshing import make_grain_tetrahedra
 from qdem_fem.grains.sieve import find_sieve_size
-from qdem_fem.mesh import FloatArray, IntArray, TetMesh
+from qdem_fem.mesh import TetMesh
 from trackbed.choices import find_choice
 
 GRAINS_FORMAT = 1
@@ -33,21 +33,21 @@ BATCH = 50
 class GrainSet:
     """Grains one behind another; grain i has ``corners[i]`` = M corners."""
 
-    corners: IntArray
+    corners: Integers
     """M of each grain, (g,)."""
-    nodes: FloatArray
+    nodes: Floats
     """Nodes of all grains [m], (sum of 5 M - 5, 3), the centroid of each at zero."""
-    corner_faces: IntArray
+    corner_faces: Integers
     """Triangles of their corners, (sum of 2 M - 4, 3), by the numbers within the grain."""
-    sizes: FloatArray
+    sizes: Floats
     """`qdem_fem.grains.find_sieve_size` [m], (g,)."""
-    sphericity: FloatArray
-    roundness: FloatArray
+    sphericity: Floats
+    roundness: Floats
 
     def __len__(self) -> int:
         return len(self.corners)
 
-    def parts(self, grain: int) -> tuple[FloatArray, IntArray]:
+    def parts(self, grain: int) -> tuple[Floats, Integers]:
         """Nodes (5 M - 5, 3) [m] and corner faces (2 M - 4, 3) of a grain."""
         before = self.corners[:grain]
         node, face, own = 5 * (before - 1), 2 * (before - 2), self.corners[grain]
@@ -62,7 +62,7 @@ class GrainSet:
         return make_grain_tetrahedra(*self.parts(grain))
 
     @property
-    def tetrahedra(self) -> IntArray:
+    def tetrahedra(self) -> Integers:
         """How many each grain has, (g,)."""
         return np.asarray(8 * (2 * self.corners - 4))
 

@@ -7,14 +7,14 @@ from functools import cache
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from qdem_fem.mesh import FloatArray
+from qdem_fem.files import Floats
 
 STARTS, KEPT, ROUNDS, TRIES = 3000, 16, 34, 12
 FIRST_TURN, SHRINK = 0.3, 0.75
 """Random turns of the first round [rad], and their factor from round to round: 0.3 to 2e-5."""
 
 
-def find_sieve_size(nodes: FloatArray) -> float:
+def find_sieve_size(nodes: Floats) -> float:
     """Side D [m] of the smallest square hole that a rigid body passes without turning.
 
     ``nodes`` (n, 3) [m]: all corners of its convex hull.  With w(a) = max a.x - min a.x, the width
@@ -44,7 +44,7 @@ def find_sieve_size(nodes: FloatArray) -> float:
 
 
 @cache
-def _rotations() -> tuple[FloatArray, FloatArray]:
+def _rotations() -> tuple[Floats, Floats]:
     """Frames to start from (s, 2, 3), and turns (rounds, tries, 3, 3) that get smaller."""
     generator = np.random.default_rng(0)
     starts = Rotation.from_quat(generator.standard_normal((STARTS, 4))).as_matrix()[:, :2]
@@ -54,7 +54,7 @@ def _rotations() -> tuple[FloatArray, FloatArray]:
     return starts, turns.reshape(ROUNDS, TRIES, 3, 3)
 
 
-def _hole(x: FloatArray, frames: FloatArray) -> FloatArray:
+def _hole(x: Floats, frames: Floats) -> Floats:
     """max(w(a), w(b)) [m] of frames (..., 2, 3)."""
     along = frames @ x.T
     return np.asarray((along.max(axis=-1) - along.min(axis=-1)).max(axis=-1))

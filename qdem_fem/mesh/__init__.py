@@ -1,6 +1,6 @@
 """Meshes of tetrahedra: sources, generation, checks, surface."""
 
-from qdem_fem.mesh.checks import BoolArray, FloatArray, IntArray, name_some
+from qdem_fem.mesh.checks import BoolArray, name_some
 from qdem_fem.mesh.generation import make_box_mesh
 from qdem_fem.mesh.surface import (
     find_area_vectors,
@@ -11,17 +11,7 @@ from qdem_fem.mesh.surface import (
 from qdem_fem.mesh.tetrahedra import TetMesh, find_altitudes, find_gradients, read_mesh
 
 __all__ = [
-    "BoolArray",
-    "FloatArray",
-    "IntArray",
-    "TetMesh",
-    "find_altitudes",
-    "find_area_vectors",
-    "find_faces_within",
-    "find_gradients",
-    "find_pressure_forces",
-    "find_surface_faces",
-    "make_box_mesh",
-    "name_some",
-    "read_mesh",
+    "BoolArray", "TetMesh", "find_altitudes", "find_area_vectors", "find_faces_within",
+    "find_gradients", "find_pressure_forces", "find_surface_faces", "make_box_mesh",
+    "name_some", "read_mesh",
 ]  # fmt: skip

@@ -11,10 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from qdem_fem.files import MeshError
+from qdem_fem.files import Floats, Integers, MeshError
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 
 FLAT = 1e-12
@@ -57,7 +55,7 @@ def take_array(raw: Any, what: str, kinds: str, of: str, remedy: str) -> Any:
     return array
 
 
-def take_nodes(raw: Any) -> tuple[FloatArray, list[Problem]]:
+def take_nodes(raw: Any) -> tuple[Floats, list[Problem]]:
     """Coordinates (n, 3) [m] as float64, a copy; every other shape or type is a problem."""
     remedy = "give nodes as an array (n, 3) of coordinates in metres"
     none = np.zeros((0, 3))
@@ -82,7 +80,7 @@ def take_nodes(raw: Any) -> tuple[FloatArray, list[Problem]]:
     return nodes, []
 
 
-def take_elements(raw: Any) -> tuple[IntArray, list[Problem]]:
+def take_elements(raw: Any) -> tuple[Integers, list[Problem]]:
     """Elements (m, 4) as int64, a copy; whole numbers held as float are accepted."""
     remedy = "give elements as an array (m, 4) of whole numbers, the nodes of each, counted from 0"
     none = np.zeros((0, 4), np.int64)
@@ -109,10 +107,10 @@ def take_elements(raw: Any) -> tuple[IntArray, list[Problem]]:
 
 def take_sets(
     sets: dict[str, Any], kind: str, count: int
-) -> tuple[dict[str, IntArray], list[Problem]]:
+) -> tuple[dict[str, Integers], list[Problem]]:
     """Sets of nodes or elements as sorted int64 without repeats; a bool mask is accepted."""
     remedy = f"name each {kind} of the set by its number, counted from 0"
-    taken: dict[str, IntArray] = {}
+    taken: dict[str, Integers] = {}
     problems: list[Problem] = []
     for name, raw in sets.items():
         array = take_array(raw, f"the {kind} set '{name}' is", "iub", "whole", remedy)
@@ -132,7 +130,7 @@ def take_sets(
     return taken, problems
 
 
-def find_index_problems(elements: IntArray, n_nodes: int) -> tuple[BoolArray, list[Problem]]:
+def find_index_problems(elements: Integers, n_nodes: int) -> tuple[BoolArray, list[Problem]]:
     """Which elements name four different nodes of the mesh (m,), and what is wrong with others."""
     problems = []
     # Seen as unsigned, a negative number is larger than any count.
@@ -160,7 +158,7 @@ def find_index_problems(elements: IntArray, n_nodes: int) -> tuple[BoolArray, li
     return ~(out | twice), problems
 
 
-def find_repeated_elements(elements: IntArray, usable: BoolArray) -> list[Problem]:
+def find_repeated_elements(elements: Integers, usable: BoolArray) -> list[Problem]:
     """Usable elements of the same four nodes, in whatever order they name them."""
     numbers = np.flatnonzero(usable)
     rows = np.sort(elements[numbers], axis=1)
@@ -181,8 +179,8 @@ def find_repeated_elements(elements: IntArray, usable: BoolArray) -> list[Proble
 
 
 def find_flat_elements(
-    nodes: FloatArray, elements: IntArray, usable: BoolArray
-) -> tuple[FloatArray, list[Problem]]:
+    nodes: Floats, elements: Integers, usable: BoolArray
+) -> tuple[Floats, list[Problem]]:
     """Signed volume (m,) [m^3] of the usable elements, and those with none worth the name.
 
     Flat is a volume at or below `FLAT` of the cube of the longest edge, or below what the
@@ -213,7 +211,7 @@ def find_flat_elements(
     return volume, [Problem(text, "remove the flat elements or mesh again there")]
 
 
-def name_some(kind: str, indices: IntArray) -> str:
+def name_some(kind: str, indices: Integers) -> str:
     """`elements 3, 8, 9, 12, 40 and 7 more`."""
     shown = ", ".join(str(index) for index in indices[:_SHOWN])
     more = f" and {len(indices) - _SHOWN} more" if len(indices) > _SHOWN else ""

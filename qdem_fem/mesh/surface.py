@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from qdem_fem.files import MeshError
-from qdem_fem.mesh.checks import BoolArray, FloatArray, IntArray
+from qdem_fem.files import Floats, Integers, MeshError
+from qdem_fem.mesh.checks import BoolArray
 
 _OWNERS_SHOWN = 4
 _PACKED = 1 << 20
@@ -14,7 +14,7 @@ _OUTWARD = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 """Faces of a right-handed element, seen from outside, by the nodes within it."""
 
 
-def find_surface_faces(elements: IntArray, where: str = "mesh") -> IntArray:
+def find_surface_faces(elements: Integers, where: str = "mesh") -> Integers:
     """Triangles of the boundary (k, 3): faces of one element only, seen from outside.
 
     ``elements`` (m, 4) are right-handed, as `read_mesh` leaves them; (X1 - X0) x (X2 - X0) of a
@@ -49,7 +49,7 @@ def find_surface_faces(elements: IntArray, where: str = "mesh") -> IntArray:
     return np.stack([first[at], second[at], third[at]], axis=1)
 
 
-def _raise_overlap(face: IntArray, elements: IntArray, where: str) -> None:
+def _raise_overlap(face: Integers, elements: Integers, where: str) -> None:
     owners = np.flatnonzero(np.isin(elements, face).sum(axis=1) == 3)
     shown = ", ".join(map(str, owners[:_OWNERS_SHOWN])) + (
         ", ..." if len(owners) > _OWNERS_SHOWN else ""
@@ -67,7 +67,7 @@ def _raise_overlap(face: IntArray, elements: IntArray, where: str) -> None:
     )
 
 
-def find_area_vectors(nodes: FloatArray, faces: IntArray) -> FloatArray:
+def find_area_vectors(nodes: Floats, faces: Integers) -> Floats:
     """Area times unit normal of each face [m^2], (k, 3): (X1 - X0) x (X2 - X0) / 2.
 
     ``nodes`` (n, 3) [m], ``faces`` (k, 3); outward where the faces are `find_surface_faces`.
@@ -76,12 +76,12 @@ def find_area_vectors(nodes: FloatArray, faces: IntArray) -> FloatArray:
     return np.cross(nodes[faces[:, 1]] - first, nodes[faces[:, 2]] - first) / 2
 
 
-def find_faces_within(faces: IntArray, node_mask: BoolArray) -> IntArray:
+def find_faces_within(faces: Integers, node_mask: BoolArray) -> Integers:
     """The faces (k, 3) whose three nodes are all named by ``node_mask`` (n,)."""
     return faces[node_mask[faces].all(axis=1)]
 
 
-def find_pressure_forces(nodes: FloatArray, faces: IntArray, n_nodes: int) -> FloatArray:
+def find_pressure_forces(nodes: Floats, faces: Integers, n_nodes: int) -> Floats:
     """Force on each node for a pressure of 1 Pa on outward ``faces`` (k, 3) [N/Pa = m^2], (n, 3).
 
     A uniform pressure acts along the inward normal, and the linear shape functions give a third

@@ -9,10 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from qdem_fem.files import MeshError
+from qdem_fem.files import Floats, Integers, MeshError
 from qdem_fem.mesh.checks import (
-    FloatArray,
-    IntArray,
     Problem,
     find_flat_elements,
     find_index_problems,
@@ -32,7 +30,7 @@ _SLIVER = 1e-2
 precision; few or no elements of a sound mesh are below it."""
 
 
-def _none() -> IntArray:
+def _none() -> Integers:
     return np.zeros(0, np.int64)
 
 
@@ -43,17 +41,17 @@ class TetMesh:
     Made by `read_mesh`, which checks it, or by `qdem_fem.mesh.generation`.
     """
 
-    nodes: FloatArray
+    nodes: Floats
     """Coordinates X [m], (n, 3)."""
-    elements: IntArray
+    elements: Integers
     """The nodes of each element, (m, 4), with (X1 - X0) x (X2 - X0) . (X3 - X0) > 0."""
-    flipped: IntArray = field(default_factory=_none)
+    flipped: Integers = field(default_factory=_none)
     """Elements that were left-handed as given, and whose last two nodes were swapped, (k,)."""
-    unused: IntArray = field(default_factory=_none)
+    unused: Integers = field(default_factory=_none)
     """Nodes of no element, (j,); they have no mass and do not move."""
-    node_sets: dict[str, IntArray] = field(default_factory=dict)
+    node_sets: dict[str, Integers] = field(default_factory=dict)
     """Named nodes, each sorted."""
-    element_sets: dict[str, IntArray] = field(default_factory=dict)
+    element_sets: dict[str, Integers] = field(default_factory=dict)
     """Named elements, each sorted."""
 
 
@@ -118,7 +116,7 @@ def read_mesh(source: Any, *, where: str = "") -> TetMesh:
     return TetMesh(nodes, elements, flipped, np.flatnonzero(~used), node_sets, element_sets)
 
 
-def find_gradients(nodes: FloatArray, elements: IntArray) -> tuple[FloatArray, FloatArray]:
+def find_gradients(nodes: Floats, elements: Integers) -> tuple[Floats, Floats]:
     """Gradients of the linear shape functions, and volumes: rows of dX^-1 (paper, eq. 1).
 
     ``nodes`` (n, 3) [m], right-handed ``elements`` (m, 4).  Returns ``gradients`` (m, 3, 3)
@@ -172,7 +170,7 @@ def _cofactors(x: npt.NDArray[Any]) -> tuple[npt.NDArray[Any], ...]:
     return gradient, sixfold, np.sqrt(squares[0]) * np.sqrt(squares[1]) * np.sqrt(squares[2])
 
 
-def find_altitudes(gradients: FloatArray) -> FloatArray:
+def find_altitudes(gradients: Floats) -> Floats:
     """Smallest of the four altitudes of each element [m], (m,), of ``gradients`` (m, 3, 3) [1/m].
 
     The altitude over the face opposite node a is 1 / |grad N_a|.

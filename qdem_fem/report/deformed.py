@@ -7,16 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from qdem_fem.files import Floats, Integers
 from qdem_fem.report.figures import choose_unit, round_below, write_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 SHOWN = 0.06
 """Greatest displacement in a picture, over the size of the bodies."""
@@ -65,7 +62,7 @@ def draw_deformed(path: Path, bodies: Sequence[Any], magnification: float | None
     return magnification
 
 
-def find_view(azimuth: float, elevation: float) -> FloatArray:
+def find_view(azimuth: float, elevation: float) -> Floats:
     """Rows: right, away from the viewer, up; orthonormal (3, 3)."""
     a, e = np.radians([azimuth, elevation])
     right = np.array([-np.sin(a), np.cos(a), 0.0])
@@ -83,7 +80,7 @@ def round_magnification(bodies: Sequence[Any]) -> float:
     return max(1.0, round_below(SHOWN * size / moved))
 
 
-def average_stress(bodies: Sequence[Any]) -> FloatArray:
+def average_stress(bodies: Sequence[Any]) -> Floats:
     """Von Mises stress of the surface faces of all bodies as it is drawn [Pa], (k,): the mean of
     their nodes', and of each node that of its elements."""
     stress = []
@@ -95,7 +92,7 @@ def average_stress(bodies: Sequence[Any]) -> FloatArray:
     return np.concatenate(stress)
 
 
-def _paint(panel: Axes, corners: FloatArray, values: FloatArray, label: str) -> None:
+def _paint(panel: Axes, corners: Floats, values: Floats, label: str) -> None:
     """Faces towards the viewer, shaded, from back to front; ``corners`` (k, 3, 3) in the frame,
     colours of ``values`` (k,) from zero to the greatest."""
     from matplotlib import colormaps
@@ -121,7 +118,7 @@ def _paint(panel: Axes, corners: FloatArray, values: FloatArray, label: str) -> 
     )
 
 
-def _outline(panel: Axes, bodies: Sequence[Any], frame: FloatArray) -> None:
+def _outline(panel: Axes, bodies: Sequence[Any], frame: Floats) -> None:
     """Sharp edges of the undeformed bodies."""
     from matplotlib.collections import LineCollection
 
@@ -132,7 +129,7 @@ def _outline(panel: Axes, bodies: Sequence[Any], frame: FloatArray) -> None:
     panel.add_collection(LineCollection(list(places), colors="#555555", linewidths=0.5))
 
 
-def find_feature_edges(nodes: FloatArray, faces: IntArray) -> IntArray:
+def find_feature_edges(nodes: Floats, faces: Integers) -> Integers:
     """Edges (e, 2) whose two faces meet at a sharp angle, or that have not two faces."""
     normal = np.cross(
         nodes[faces[:, 1]] - nodes[faces[:, 0]], nodes[faces[:, 2]] - nodes[faces[:, 0]]
@@ -148,7 +145,7 @@ def find_feature_edges(nodes: FloatArray, faces: IntArray) -> IntArray:
     return np.asarray(unique[(count != 2) | (cosine < FEATURE)])
 
 
-def _draw_frame(panel: Axes, frame: FloatArray) -> None:
+def _draw_frame(panel: Axes, frame: Floats) -> None:
     """The three axes in the lower left corner, away from the bodies."""
     inset = panel.inset_axes((0.0, 0.0, 0.12, 0.2))
     for axis, letter in enumerate("xyz"):

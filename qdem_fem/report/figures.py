@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from qdem_fem.files import Floats
 from qdem_fem.report.spectra import Mode, find_amplitudes
 from trackbed.report import STYLE, encode_figure
 from trackbed.run_files import write_whole
@@ -23,8 +23,7 @@ from trackbed.run_files import write_whole
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FloatArray = npt.NDArray[np.float64]
-Curve = tuple[FloatArray, FloatArray]
+Curve = tuple[Floats, Floats]
 """Times [s] and values."""
 
 COLOURS = ("#0b5fa5", "#2a9d6f", "#7a4fa3", "#b02020", "#6b6b6b", "#00838f")
@@ -81,7 +80,7 @@ def draw_spectrum(path: Path, curves: Mapping[str, Curve], modes: Sequence[Mode]
         panel.legend(loc="upper right")
 
 
-def draw_energy(path: Path, energy: Mapping[str, FloatArray]) -> None:
+def draw_energy(path: Path, energy: Mapping[str, Floats]) -> None:
     """Draw the energies [J] of a run against ``energy["time"]``."""
     time = energy["time"]
     names = [name for name in energy if name != "time"]

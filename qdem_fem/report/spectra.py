@@ -15,9 +15,8 @@ from math import pi
 import numpy as np
 import numpy.typing as npt
 
-from qdem_fem.files import UsageError
+from qdem_fem.files import Floats, UsageError
 
-FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
 
 UNEVEN_INTERVAL = 1e-6
@@ -42,7 +41,7 @@ class Mode:
     """[rad]"""
 
 
-def find_amplitudes(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+def find_amplitudes(time: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Frequencies [Hz] and amplitudes [unit of values], (k // 2 + 1,) each, of a record (k,).
 
     The mean is taken off; the window is Hann's.  A cosine of amplitude A peaks at A when its
@@ -57,16 +56,14 @@ def find_amplitudes(time: FloatArray, values: FloatArray) -> tuple[FloatArray, F
     return np.asarray(np.fft.rfftfreq(len(values), step), float), amplitude
 
 
-def transform_record(time: FloatArray, values: FloatArray) -> tuple[FloatArray, ComplexArray]:
+def transform_record(time: Floats, values: Floats) -> tuple[Floats, ComplexArray]:
     """Frequencies [Hz] and the Fourier spectrum X(f) [unit s] of a record, mean left in."""
     step, values = _record(time, values)
     frequency = np.asarray(np.fft.rfftfreq(len(values), step), float)
     return frequency, step * np.fft.rfft(values) * np.exp(-2j * pi * frequency * time[0])
 
 
-def smooth_spectrum(
-    frequency: FloatArray, amplitude: FloatArray, bandwidth: float = 20.0
-) -> FloatArray:
+def smooth_spectrum(frequency: Floats, amplitude: Floats, bandwidth: float = 20.0) -> Floats:
     """An amplitude spectrum smoothed by a Parzen window, as in Figs. 9-12 of the paper.
 
     The power |X|^2 is averaged by W(f) = 3/4 u (sin(pi u f/2) / (pi u f/2))^4, u = 280/(151 b)
@@ -86,8 +83,8 @@ def smooth_spectrum(
 
 
 def find_mobility(
-    time: FloatArray, force: FloatArray, velocity: FloatArray, bandwidth: float = 20.0
-) -> tuple[FloatArray, FloatArray]:
+    time: Floats, force: Floats, velocity: Floats, bandwidth: float = 20.0
+) -> tuple[Floats, Floats]:
     """Frequencies [Hz] and mobility |H| = |V| / |F| [m/(s N)] (Fig. 12 of the paper).
 
     Linear spectra of ``velocity`` [m/s] and ``force`` [N] over the same ``time`` [s], each
@@ -105,7 +102,7 @@ def find_mobility(
 
 
 def find_peak_frequencies(
-    time: FloatArray, values: FloatArray, count: int = 1, floor: float = 1e-3
+    time: Floats, values: Floats, count: int = 1, floor: float = 1e-3
 ) -> list[Mode]:
     """The ``count`` strongest damped cosines of a record of free motion, strongest first.
 
@@ -120,7 +117,7 @@ def find_peak_frequencies(
     from scipy.optimize import least_squares
 
     step, values = _record(time, values)
-    elapsed: FloatArray = step * np.arange(len(values), dtype=float)
+    elapsed: Floats = step * np.arange(len(values), dtype=float)
     duration = float(elapsed[-1])
     scale = float(np.abs(values - values.mean()).max())
     if scale == 0 or len(values) < 8:
@@ -153,7 +150,7 @@ def find_peak_frequencies(
     return sorted(modes, key=lambda mode: -mode.amplitude)
 
 
-def _highest_peak(values: FloatArray, step: float, windowed: bool) -> float:
+def _highest_peak(values: Floats, step: float, windowed: bool) -> float:
     """Frequency [Hz] of the highest peak of the padded spectrum, refined by a parabola.
 
     A Hann window finds modes that last, and would hide one that dies out at once.
@@ -169,7 +166,7 @@ def _highest_peak(values: FloatArray, step: float, windowed: bool) -> float:
     return float((top + np.clip(shift, -1, 1)) / (length * step))
 
 
-def _columns(unknowns: FloatArray, t: FloatArray) -> FloatArray:
+def _columns(unknowns: Floats, t: Floats) -> Floats:
     """Cosine and sine of each damped oscillation, and the constant: (k, 2 modes + 1)."""
     cycles, decay = np.reshape(unknowns, (-1, 2)).T
     damped = np.exp(-np.clip(decay, -50, 500) * t[:, None])
@@ -177,19 +174,19 @@ def _columns(unknowns: FloatArray, t: FloatArray) -> FloatArray:
     return np.hstack([damped * np.cos(angle), damped * np.sin(angle), np.ones((len(t), 1))])
 
 
-def _misfit(unknowns: FloatArray, t: FloatArray, target: FloatArray) -> FloatArray:
+def _misfit(unknowns: Floats, t: Floats, target: Floats) -> Floats:
     columns = _columns(unknowns, t)
     weight = np.linalg.lstsq(columns, target, rcond=None)[0]
     return np.asarray(target - columns @ weight)
 
 
-def _misfit_square(unknowns: list[float], t: FloatArray, target: FloatArray) -> float:
+def _misfit_square(unknowns: list[float], t: Floats, target: Floats) -> float:
     left = _misfit(np.array(unknowns), t, target)
     return float(left @ left)
 
 
 def _modes(
-    unknowns: FloatArray, t: FloatArray, target: FloatArray, duration: float, scale: float
+    unknowns: Floats, t: Floats, target: Floats, duration: float, scale: float
 ) -> list[Mode]:
     weight = np.linalg.lstsq(_columns(unknowns, t), target, rcond=None)[0]
     pairs = np.reshape(unknowns, (-1, 2))
@@ -205,12 +202,12 @@ def _modes(
     ]
 
 
-def _hann(length: int) -> FloatArray:
+def _hann(length: int) -> Floats:
     """The periodic Hann window."""
     return np.asarray(0.5 - 0.5 * np.cos(2 * pi * np.arange(length) / length))
 
 
-def _record(time: FloatArray, values: FloatArray) -> tuple[float, FloatArray]:
+def _record(time: Floats, values: Floats) -> tuple[float, Floats]:
     """Interval [s] and values of an even, finite series."""
     time, values = np.asarray(time, float), np.asarray(values, float)
     if time.ndim != 1 or time.shape != values.shape or len(time) < 4:

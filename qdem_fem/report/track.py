@@ -16,8 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from qdem_fem.files import Series, read_table
-from qdem_fem.mesh import FloatArray
+from qdem_fem.files import Floats, Series, read_table
 from qdem_fem.report import figures as pictures
 from qdem_fem.report.spectra import find_mobility, smooth_spectrum, transform_record
 
@@ -31,20 +30,18 @@ FEWEST_SAMPLES = 5
 """Samples of a record that has spectra: with rest before them, second differences leave four."""
 
 
-def find_velocities(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+def find_velocities(time: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Times half-way between samples and velocity [m/s] there, (k - 1,) each, of an even series of
     displacements (k,) [m]."""
     return (time[1:] + time[:-1]) / 2, np.diff(values) / _interval(time)
 
 
-def find_accelerations(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+def find_accelerations(time: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Times and acceleration [m/s2], (k - 2,) each, of an even series of displacements (k,) [m]."""
     return time[1:-1], np.diff(values, 2) / _interval(time) ** 2
 
 
-def find_acceleration_spectrum(
-    time: FloatArray, values: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def find_acceleration_spectrum(time: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Frequencies [Hz] and smoothed linear spectrum [m/s] of the acceleration of a point that is
     displaced by ``values`` [m] from rest; up to `HIGHEST`.
 
@@ -60,9 +57,7 @@ def find_acceleration_spectrum(
     return frequency[seen], smooth_spectrum(frequency, size, BANDWIDTH)[seen]
 
 
-def find_grain_mobility(
-    time: FloatArray, values: FloatArray, load: Series
-) -> tuple[FloatArray, FloatArray]:
+def find_grain_mobility(time: Floats, values: Floats, load: Series) -> tuple[Floats, Floats]:
     """Frequencies [Hz] and |V|/|F| [m/(s N)] of a grain displaced by ``values`` [m] under a load
     (k, 3) [N] (Fig. 12), smoothed as spectra are; nan where the load is silent."""
     when, velocity = find_velocities(time, values)
@@ -72,7 +67,7 @@ def find_grain_mobility(
     return frequency[seen], ratio[seen]
 
 
-def average_between(time: FloatArray, times: FloatArray, values: FloatArray) -> FloatArray:
+def average_between(time: Floats, times: Floats, values: Floats) -> Floats:
     """Means (k - 1,) between instants (k,) [s] of a series that is linear between its ``times``
     (n,) [s], and constant before and behind them."""
     knots = np.union1d(time, times)
@@ -81,12 +76,12 @@ def average_between(time: FloatArray, times: FloatArray, values: FloatArray) -> 
     return np.diff(area[np.searchsorted(knots, time)]) / np.diff(time)
 
 
-def _interval(time: FloatArray) -> float:
+def _interval(time: Floats) -> float:
     """Between two samples of an even series [s]."""
     return float(time[-1] - time[0]) / (len(time) - 1)
 
 
-def find_peaks(frequency: FloatArray, size: FloatArray, count: int = 5) -> list[float]:
+def find_peaks(frequency: Floats, size: Floats, count: int = 5) -> list[float]:
     """Frequencies of the greatest local peaks of a smooth spectrum [Hz], by height."""
     inner = size[1:-1]
     at = 1 + np.flatnonzero((inner > size[:-2]) & (inner >= size[2:]))
@@ -163,7 +158,7 @@ def draw_track_pictures(path: Path, load: Series) -> Iterator[tuple[Path, str]]:
         yield target, caption
 
 
-def describe_smoothing(time: FloatArray) -> str:
+def describe_smoothing(time: Floats) -> str:
     """How spectra of a record at these times [s] are smoothed, in words."""
     apart = 1 / (time[-1] - time[0])
     if apart > BANDWIDTH:

@@ -12,15 +12,7 @@ from qdem_fem.scene.summary import (
 )
 
 __all__ = [
-    "RunFolder",
-    "describe_critical_step",
-    "list_body_facts",
-    "list_mass_scaling_facts",
-    "load_scene",
-    "make_plan",
-    "make_simulation",
-    "run_dynamic",
-    "run_static",
-    "summarise_run",
+    "RunFolder", "describe_critical_step", "list_body_facts", "list_mass_scaling_facts",
+    "load_scene", "make_plan", "make_simulation", "run_dynamic", "run_static", "summarise_run",
     "write_report",
 ]  # fmt: skip

@@ -7,12 +7,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-import numpy.typing as npt
 from pydantic import ValidationError
 
 from qdem_fem.element import MEASURES
-from qdem_fem.files import MeshError
+from qdem_fem.files import Integers, MeshError
 from qdem_fem.tables import (
     BodyTable,
     Condition,
@@ -40,8 +38,6 @@ from trackbed.scene_files import Problem, SceneText, describe_error, suggest_wor
 
 if TYPE_CHECKING:
     from qdem_fem.mesh import TetMesh
-
-IntArray = npt.NDArray[np.int64]
 
 
 def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Prepared:
@@ -71,7 +67,7 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Prepared:
                 problems.append(step)
             else:
                 conditions.append(step)
-    probes: dict[str, tuple[str, IntArray]] = {}
+    probes: dict[str, tuple[str, Integers]] = {}
     for _, output in list_tables(text, Output):
         found = list(_probes(output, names, meshes, probes))
         problems += found
@@ -175,7 +171,7 @@ def _probes(
     output: Output,
     names: Sequence[str],
     meshes: dict[str, TetMesh],
-    probes: dict[str, tuple[str, IntArray]],
+    probes: dict[str, tuple[str, Integers]],
 ) -> Iterator[Problem]:
     """Fill ``probes`` with name -> body and nodes."""
     for name, probe in output.probes.items():

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from qdem_fem.files import Floats
 
 STORED = ("kinetic", "elastic", "contact", "friction", "viscous")
 """Stored in the bodies or taken from them, where a run has it."""
@@ -31,7 +30,7 @@ class EnergyAccount:
         self.greatest = 0.0
         """The greatest energy so far [J]."""
 
-    def take(self, energy: Mapping[str, FloatArray]) -> None:
+    def take(self, energy: Mapping[str, Floats]) -> None:
         """Take rows more: columns (k,) [J] by name; others than energies are passed by."""
         names = [name for name in STORED if name in energy]
         if not self.first:
@@ -49,7 +48,7 @@ class EnergyAccount:
         return self.missing / self.greatest if self.greatest > 0 else 0.0
 
 
-def list_energy_facts(energy: Mapping[str, FloatArray]) -> dict[str, float]:
+def list_energy_facts(energy: Mapping[str, Floats]) -> dict[str, float]:
     """Energies at the end [J], and what `EnergyAccount` says of all rows."""
     account = EnergyAccount()
     account.take(energy)

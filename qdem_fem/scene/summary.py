@@ -6,15 +6,12 @@ from math import isfinite
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from qdem_fem.files import Series, read_table
+from qdem_fem.files import Floats, Series, read_table
 from qdem_fem.report import Mode, find_peak_frequencies
 from qdem_fem.scene.energy_account import list_energy_facts
 from qdem_fem.scene.run import Done, RunFolder
 from qdem_fem.tables import Prepared
-
-FloatArray = npt.NDArray[np.float64]
 
 MOVING = 1e-3
 """Share of the greatest displacement below which a component does not count as moving."""
@@ -124,7 +121,7 @@ def describe_body(body: Any) -> dict[str, Any]:
     }
 
 
-def find_moving_components(rows: dict[str, FloatArray]) -> list[str]:
+def find_moving_components(rows: dict[str, Floats]) -> list[str]:
     """Columns of probes.csv whose range is not negligible, in the order of the file."""
     ranges = {name: float(np.ptp(column)) for name, column in rows.items() if name != "time"}
     least = MOVING * max(ranges.values(), default=0.0)
@@ -142,7 +139,7 @@ def find_free_start(prepared: Prepared) -> float:
     return max((float(one.times[-1]) for one in series), default=0.0)
 
 
-def find_modes(prepared: Prepared, rows: dict[str, FloatArray]) -> dict[str, list[Mode]]:
+def find_modes(prepared: Prepared, rows: dict[str, Floats]) -> dict[str, list[Mode]]:
     """Modes in the free motion of each probe's strongest component, by column name."""
     count = prepared.scene.output.modes
     free = rows["time"] >= find_free_start(prepared)

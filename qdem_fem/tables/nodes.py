@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from qdem_fem.files import Floats, Integers
 from qdem_fem.tables.keys import Mesh, Nodes
 from qdem_fem.tables.types import WrongKey
 from trackbed.scene_files import suggest_word
@@ -15,8 +16,6 @@ from trackbed.scene_files import suggest_word
 if TYPE_CHECKING:
     from qdem_fem.mesh import TetMesh
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 SIDE = 1e-6
 """Distance to a side, over the size of the mesh, within which a node lies on it; mesh files keep
@@ -43,7 +42,7 @@ def make_body_mesh(table: Mesh, folder: Path, key: str) -> TetMesh:
     return read_mesh(make_box_mesh(*dict(table.box).values()))
 
 
-def list_node_sets(mesh: TetMesh) -> dict[str, IntArray]:
+def list_node_sets(mesh: TetMesh) -> dict[str, Integers]:
     """The mesh's own node sets, and x-min ... z-max where it has none of these names."""
     used = np.ones(len(mesh.nodes), bool)
     used[mesh.unused] = False
@@ -57,7 +56,7 @@ def list_node_sets(mesh: TetMesh) -> dict[str, IntArray]:
     return sets | mesh.node_sets
 
 
-def find_named_nodes(nodes: Nodes, mesh: TetMesh, key: str) -> IntArray:
+def find_named_nodes(nodes: Nodes, mesh: TetMesh, key: str) -> Integers:
     """Numbers of the nodes that a scene names at ``key``, sorted, without nodes of no element.
 
     Raises `WrongKey` for an unknown set and for a selection that names no node.
@@ -103,7 +102,7 @@ def find_named_nodes(nodes: Nodes, mesh: TetMesh, key: str) -> IntArray:
     return found
 
 
-def make_unit_vector(vector: tuple[float, float, float], key: str) -> FloatArray:
+def make_unit_vector(vector: tuple[float, float, float], key: str) -> Floats:
     """The vector over its length; raises `WrongKey` for zero."""
     length = float(np.linalg.norm(vector))
     if length == 0:

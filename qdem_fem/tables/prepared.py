@@ -7,9 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-import numpy.typing as npt
-
+from qdem_fem.files import Integers
 from qdem_fem.tables.keys import BodyTable, Output, Scene, SeriesTable, SimulationTable
 from trackbed.run_files import digest_file
 from trackbed.scene_files import Guide, Problem, SceneText, Table, read_scene
@@ -17,7 +15,6 @@ from trackbed.scene_files import Guide, Problem, SceneText, Table, read_scene
 if TYPE_CHECKING:
     from qdem_fem.mesh import TetMesh
 
-IntArray = npt.NDArray[np.int64]
 
 GUIDE = Guide("cantilever", "simulation.duration=0.1")
 TRACK_GUIDE = Guide("track-small", "simulation.duration=0.1")
@@ -46,7 +43,7 @@ class Prepared:
     text: SceneText
     meshes: dict[str, TetMesh]
     conditions: list[Step]
-    probes: dict[str, tuple[str, IntArray]]
+    probes: dict[str, tuple[str, Integers]]
     """Name -> body and nodes."""
     files: dict[str, str]
     """Each file that the scene names, as it is written there, and its SHA-256."""

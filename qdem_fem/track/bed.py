@@ -39,7 +39,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qdem_fem.bodies import Body
-from qdem_fem.files import CheckpointError, NotConverged
+from qdem_fem.files import CheckpointError, Floats, NotConverged
 from qdem_fem.grains import GrainSet
 from qdem_fem.march import Damping, Rest, find_rest, read_checkpoint, write_checkpoint
 from qdem_fem.track.bodies import GAP, place_grain_nodes
@@ -49,7 +49,6 @@ from trackbed.run_files import write_whole
 if TYPE_CHECKING:
     from qdem_fem.march import Simulation
 
-Floats = NDArray[np.float64]
 
 FIRM = {f"firm {k}/8": k / 8 for k in range(7, 0, -1)}
 """Powers of ``softness`` by which the springs of these stages are softer."""

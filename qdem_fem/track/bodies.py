@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from qdem_fem.files import MeshError
+from qdem_fem.files import Floats, MeshError
 from qdem_fem.grains import GrainSet
-from qdem_fem.mesh import FloatArray, TetMesh, make_box_mesh
+from qdem_fem.mesh import TetMesh, make_box_mesh
 from qdem_fem.track.sleeper_mesh import SleeperShape
 
 GAP = 1e-6
@@ -37,9 +37,9 @@ class TrackBox:
 
 
 def make_loose_lattice(
-    grains: Sequence[FloatArray], rooms: Sequence[Room], bottom: float, radius: float, seed: int,
-    share: Callable[[FloatArray], FloatArray] = np.ones_like, where: str = "track, box",
-) -> list[FloatArray]:  # fmt: skip
+    grains: Sequence[Floats], rooms: Sequence[Room], bottom: float, radius: float, seed: int,
+    share: Callable[[Floats], Floats] = np.ones_like, where: str = "track, box",
+) -> list[Floats]:  # fmt: skip
     """Nodes of grains turned at random, in columns on a lattice; none touches another or a wall.
 
     ``grains``: nodes (n, 3) [m] of each about its centroid, ``radius`` [m] of their spheres, which
@@ -75,13 +75,13 @@ def make_loose_lattice(
     return placed
 
 
-def _centres(start: float, end: float, cell: float) -> FloatArray:
+def _centres(start: float, end: float, cell: float) -> Floats:
     """Centres of as many cells as fit, evenly shared out [m]."""
     count = int((end - start) / cell)
     return start + (np.arange(count) + 0.5) * (end - start) / max(count, 1)
 
 
-def place_grain_nodes(grains: GrainSet) -> list[FloatArray]:
+def place_grain_nodes(grains: GrainSet) -> list[Floats]:
     """Nodes of each grain [m], (n, 3), its centroid at zero."""
     return [grains.parts(number)[0] for number in range(len(grains))]
 

@@ -18,9 +18,8 @@ from pydantic import Field
 
 from qdem_fem.contact.spheres import SphereContact
 from qdem_fem.element import Material
-from qdem_fem.files import ConditionError, Series
+from qdem_fem.files import ConditionError, Floats, Integers, Series
 from qdem_fem.march import Rest
-from qdem_fem.mesh import FloatArray, IntArray
 from qdem_fem.tables import (
     BodyTable,
     ContactTable,
@@ -238,7 +237,7 @@ def enter_track(prepared: TrackPrepared) -> tuple[Any, dict[str, Any]]:
 
 def find_watched_points(
     recipe: BedRecipe, bed: Bed, bodies: dict[str, Any]
-) -> dict[str, tuple[str, IntArray]]:
+) -> dict[str, tuple[str, Integers]]:
     """Bodies and nodes that are watched: grains at B1 to B3, S1 to S3 on the sleeper, all of it.
 
     A grain is the one whose centre is nearest to `BELOW` the sleeper's bottom, in the plane of its
@@ -248,9 +247,9 @@ def find_watched_points(
     centres = np.array([x.mean(axis=0) for x in positions[: recipe.below]])
     centres[:, 1] = recipe.layout.across(centres)
     bottom = float(positions[-1][:, 2].min())
-    found: dict[str, tuple[str, IntArray]] = {}
+    found: dict[str, tuple[str, Integers]] = {}
 
-    def watch(name: str, place: FloatArray, but: str = "") -> None:
+    def watch(name: str, place: Floats, but: str = "") -> None:
         order = np.argsort(np.linalg.norm(centres - place, axis=1))
         body = next(f"grain-{i}" for i in order if f"grain-{i}" != but)
         found[name] = (body, np.arange(len(bodies[body].nodes)))

@@ -15,7 +15,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from qdem_fem.mesh import FloatArray, TetMesh
+from qdem_fem.files import Floats
+from qdem_fem.mesh import TetMesh
 from qdem_fem.track.bodies import GAP, Room, TrackBox, make_loose_lattice, make_sleeper_slice
 from qdem_fem.track.sleeper_mesh import SleeperShape, make_half_sleeper, make_sleeper_mesh
 
@@ -64,37 +65,37 @@ class TrackLayout:
             mesh, nodes=mesh.nodes + np.array([self.span[0], self.box.width / 2, bottom])
         )
 
-    def beyond(self, x: FloatArray) -> FloatArray:
+    def beyond(self, x: Floats) -> Floats:
         """How far x (k,) [m] lies beyond the free end of the sleeper, zero along it [m]."""
         start, end = self.span
         return np.maximum(np.maximum(start - x, x - end), 0.0)
 
-    def under(self, places: FloatArray) -> NDArray[np.bool_]:
+    def under(self, places: Floats) -> NDArray[np.bool_]:
         """Whether spheres at (k, 3) [m] are where the sleeper goes down, (k,)."""
         aside = np.abs(self.across(places)) <= self._reach
         return np.asarray(aside & (self.beyond(places[:, 0]) <= 2 * self.radius))
 
-    def across(self, places: FloatArray) -> FloatArray:
+    def across(self, places: Floats) -> Floats:
         """How far places (k, 3) [m] lie from the plane of the sleeper's middle, along y; where the
         track repeats a grain may have left the box, and counts where its image is, (k,) [m]."""
         away = places[:, 1] - self.box.width / 2
         return np.asarray(away - self.box.width * np.round(away / self.box.width))
 
-    def place_grains_below(self, grains: Sequence[FloatArray], seed: int) -> list[FloatArray]:
+    def place_grains_below(self, grains: Sequence[Floats], seed: int) -> list[Floats]:
         """Loose grains on the ground, nodes of each [m]: as high as the flat top reaches, and from
         there lower by degrees to the foot."""
         if self.shoulder is None:
             return make_loose_lattice(grains, [self._room(inf)], 0.0, self.radius, seed)
         flat, foot = self.shoulder
 
-        def share(x: FloatArray) -> FloatArray:
+        def share(x: Floats) -> Floats:
             return np.minimum(1.0, (foot - self.beyond(x)) / (foot - flat))
 
         return make_loose_lattice(grains, [self._room(foot)], 0.0, self.radius, seed, share)
 
     def place_grains_beside(
-        self, grains: Sequence[FloatArray], bottom: float, seed: int
-    ) -> list[FloatArray]:
+        self, grains: Sequence[Floats], bottom: float, seed: int
+    ) -> list[Floats]:
         """Loose grains from a height [m] on, beside the sleeper and beyond its ends; nodes.
 
         Raises `MeshError` where there is no room."""

@@ -11,18 +11,16 @@ from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from qdem_fem.bodies import Body, Rigid
 from qdem_fem.contact.search import PeriodicWidth
 from qdem_fem.contact.spheres import ContactPlane, SphereContact
 from qdem_fem.element import Material
+from qdem_fem.files import Floats
 from qdem_fem.grains import Grading, GrainSet, make_grains
 from qdem_fem.track.bodies import TrackBox
 from qdem_fem.track.layout import Part, TrackLayout
 from qdem_fem.track.sleeper_mesh import SleeperShape
-
-Floats = NDArray[np.float64]
 
 SLEEPER = "sleeper"
 """Name of the body."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from qdem_fem.files import MeshError
-from qdem_fem.mesh import FloatArray, IntArray, TetMesh, make_box_mesh
+from qdem_fem.files import Floats, Integers, MeshError
+from qdem_fem.mesh import TetMesh, make_box_mesh
 
 ON_THE_PLANE = 1e-9
 """Over the length: distance within which a node lies on a plane."""
@@ -34,13 +34,13 @@ class SleeperShape:
     """Along the sleeper."""
 
     @property
-    def stations(self) -> FloatArray:
+    def stations(self) -> Floats:
         """Ends of the sleeper and of its seats, and its centre [m], (7,)."""
         middle, apart, half = self.length / 2, self.seat_distance / 2, self.seat_length / 2
         right = np.array([0.0, apart - half, apart + half, middle])
         return np.concatenate([middle - right[:0:-1], middle + right])
 
-    def width_at(self, z: FloatArray) -> FloatArray:
+    def width_at(self, z: Floats) -> Floats:
         """Width b(z) [m]."""
         return self.width - (self.width - self.top_width) * np.asarray(z) / self.height
 
@@ -101,7 +101,7 @@ def make_half_sleeper(shape: SleeperShape, along: int, across: int, up: int) -> 
     return TetMesh(whole.nodes[nodes], number[whole.elements[kept]], node_sets=sets)
 
 
-def _cells_shared(shares: FloatArray, count: int) -> IntArray:
+def _cells_shared(shares: Floats, count: int) -> Integers:
     """``count`` whole cells by shares that add up to one, one each at least."""
     if count < len(shares):
         raise MeshError(

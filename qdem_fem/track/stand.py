@@ -17,9 +17,8 @@ import numpy as np
 from qdem_fem.bodies import Body, Rigid
 from qdem_fem.contact import SphereContacts
 from qdem_fem.contact.spheres import SphereContact, compute_pair_stiffness
-from qdem_fem.files import NotConverged, StepWarning
+from qdem_fem.files import Floats, NotConverged, StepWarning
 from qdem_fem.march import Simulation
-from qdem_fem.mesh import FloatArray
 from qdem_fem.track.bed import Bed, enter_bed, guide_sleeper, write_bed
 from qdem_fem.track.recipe import SLEEPER, BedRecipe, make_bed_bodies, make_bed_grains
 
@@ -63,7 +62,7 @@ class Stand:
         )
 
 
-def find_friction_in_use(run: Simulation, recipe: BedRecipe, friction: float) -> FloatArray:
+def find_friction_in_use(run: Simulation, recipe: BedRecipe, friction: float) -> Floats:
     """Friction in use ``|F_t|/(mu F_n)`` of each pair that touches [-], (p,).
 
     ``F_n`` is k_n times the overlap; what else there is of the force is across it.

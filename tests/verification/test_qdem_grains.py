@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from qdem_fem.files.arrays import Floats, Integers
 from qdem_fem.files.errors import MeshError
 from qdem_fem.grains.grading import BALLAST, Grading, draw_sizes
 from qdem_fem.grains.hulls import (
@@ -39,7 +40,6 @@ from qdem_fem.grains.meshing import (
 )
 from qdem_fem.grains.sets import GrainSet, load_grains, make_grains, save_grains
 from qdem_fem.grains.sieve import find_sieve_size
-from qdem_fem.mesh.checks import FloatArray, IntArray
 from qdem_fem.mesh.surface import find_surface_faces
 from qdem_fem.mesh.tetrahedra import find_gradients
 from trackbed.command import main
@@ -52,7 +52,7 @@ ICOSAHEDRON = np.vstack([np.roll(ICOSAHEDRON, shift, axis=1) for shift in range(
 TURN = Rotation.from_rotvec([0.3, -1.1, 0.7]).as_matrix()
 
 
-def halved(nodes: FloatArray, faces: IntArray, sphere: bool) -> tuple[FloatArray, IntArray]:
+def halved(nodes: Floats, faces: Integers, sphere: bool) -> tuple[Floats, Integers]:
     """Every face cut into four; new nodes pushed onto the unit sphere where asked."""
     edges = find_surface_edges(faces)
     finer = np.vstack([nodes, nodes[edges.nodes].mean(axis=1)])
@@ -61,7 +61,7 @@ def halved(nodes: FloatArray, faces: IntArray, sphere: bool) -> tuple[FloatArray
     return finer, quarter_faces(faces, edges)
 
 
-def sphericity(nodes: FloatArray, faces: IntArray) -> float:
+def sphericity(nodes: Floats, faces: Integers) -> float:
     return find_sphericity(
         integrate_polyhedron(nodes, faces).volume, find_surface_area(nodes, faces)
     )
@@ -85,7 +85,7 @@ def test_box_volume_and_centroid_are_exact_wherever_it_lies() -> None:
         (TETRAHEDRON, (pi / (6 * sqrt(3))) ** (1 / 3), 1 / sqrt(3)),
     ],
 )  # fmt: skip
-def test_sphericity_and_inscribed_sphere(nodes: FloatArray, psi: float, inscribed: float) -> None:
+def test_sphericity_and_inscribed_sphere(nodes: Floats, psi: float, inscribed: float) -> None:
     """Closed forms, at any place, size and orientation."""
     faces = find_hull_faces(nodes)
     for size, shift in ((1.0, 0.0), (1e-3, 1.0), (1e3, -5e3)):
@@ -157,7 +157,7 @@ def test_inscribed_sphere_touches_four_planes_and_cuts_none(seed: int, count: in
         (CUBE * [2, 1.5, 0.2], 1.7 / sqrt(2)),
     ],
 )
-def test_sieve_size_closed_forms(nodes: FloatArray, size: float) -> None:
+def test_sieve_size_closed_forms(nodes: Floats, size: float) -> None:
     """To 5e-5, about twice the last random turn of the search."""
     assert find_sieve_size(nodes @ TURN.T + 3.0) == pytest.approx(size, rel=5e-5)
 

@@ -14,17 +14,7 @@ from qdem_fem.track.loads.train import (
 )
 
 __all__ = [
-    "MOST_SAMPLES",
-    "RATE",
-    "RailKind",
-    "Roughness",
-    "Track",
-    "Train",
-    "WheelFlat",
-    "WheelKind",
-    "find_flat_forces",
-    "find_rolling_forces",
-    "find_seat_share",
-    "make_train_record",
+    "MOST_SAMPLES", "RATE", "RailKind", "Roughness", "Track", "Train", "WheelFlat", "WheelKind",
+    "find_flat_forces", "find_rolling_forces", "find_seat_share", "make_train_record",
     "write_load_record",
 ]  # fmt: skip

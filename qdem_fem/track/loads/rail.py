@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from qdem_fem.files import ConditionError
-from qdem_fem.mesh import FloatArray
+from qdem_fem.files import ConditionError, Floats
 
 QUIET = 12.0
 """Distance from the sleeper, over the elastic length, within which an axle counts: e^-12."""
@@ -45,7 +44,7 @@ def refuse_unless_positive(thing: Any, where: str) -> None:
             )
 
 
-def find_seat_share(distance: FloatArray, track: Track) -> FloatArray:
+def find_seat_share(distance: Floats, track: Track) -> Floats:
     """Share of a wheel load that a rail seat takes from a wheel at ``distance`` x from it [m].
 
     The foundation carries p = P/(2 L) e^-s (cos s + sin s) a metre, s = |x|/L; over the spacing a
@@ -56,7 +55,7 @@ def find_seat_share(distance: FloatArray, track: Track) -> FloatArray:
     """
     x, half = np.asarray(distance, float), track.spacing / 2
 
-    def carried(s: FloatArray) -> FloatArray:
+    def carried(s: Floats) -> Floats:
         size = np.abs(s)
         return np.asarray(np.sign(s) * (1 - np.exp(-size) * np.cos(size)))
 

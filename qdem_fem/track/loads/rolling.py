@@ -24,8 +24,7 @@ from math import pi
 
 import numpy as np
 
-from qdem_fem.files import ConditionError
-from qdem_fem.mesh import FloatArray
+from qdem_fem.files import ConditionError, Floats
 from qdem_fem.track.loads.rail import QUIET, Track, refuse_unless_positive
 from qdem_fem.track.loads.roughness import (
     RAIL,
@@ -36,7 +35,7 @@ from qdem_fem.track.loads.roughness import (
     find_contact_filter,
 )
 
-Response = Callable[[FloatArray], ComplexArray]
+Response = Callable[[Floats], ComplexArray]
 
 STEEL_MODULUS = 206e9 / (2 * (1 - 0.3**2))
 """E* of steel on steel [Pa]."""
@@ -80,9 +79,7 @@ def find_hertz_contact(load: float, rolling: Rolling) -> tuple[float, float]:
     return size, 2 * STEEL_MODULUS * size
 
 
-def find_foundation_stiffness(
-    frequency: FloatArray, track: Track, rolling: Rolling
-) -> ComplexArray:
+def find_foundation_stiffness(frequency: Floats, track: Track, rolling: Rolling) -> ComplexArray:
     """s(f) [N/m^2], (m,): force a metre over deflection of the rail, s = s_p (s_b - w^2 m)/(s_p +
     s_b - w^2 m) of pads, and ballast under sleepers spread along the rail (Thompson, sec. 3.3).
 
@@ -101,7 +98,7 @@ def find_foundation_stiffness(
 
 
 def _find_beam(
-    frequency: FloatArray, track: Track, rolling: Rolling
+    frequency: Floats, track: Track, rolling: Rolling
 ) -> tuple[ComplexArray, ComplexArray]:
     """s/(s - w^2 m_r) [-] and the wavenumber k [1/m] of waves exp(i w t - i k |x|) that die out,
     E I k^4 = w^2 m_r - s."""
@@ -111,14 +108,14 @@ def _find_beam(
     return support / stiff, number
 
 
-def find_rail_receptance(frequency: FloatArray, track: Track, rolling: Rolling) -> ComplexArray:
+def find_rail_receptance(frequency: Floats, track: Track, rolling: Rolling) -> ComplexArray:
     """Deflection under a unit force, -(1 + i)/(4 E I k^3) [m/N], (m,); L^3/(8 E I) at f = 0."""
     _, number = _find_beam(frequency, track, rolling)
     return np.asarray(-(1 + 1j) / (4 * track.rail_stiffness * number**3))
 
 
 def find_seat_response(
-    distance: FloatArray, frequency: FloatArray, track: Track, rolling: Rolling
+    distance: Floats, frequency: Floats, track: Track, rolling: Rolling
 ) -> ComplexArray:
     """What a seat takes of a unit force on the rail at ``distance`` x (n,) from it [m], (n, m).
 
@@ -129,7 +126,7 @@ def find_seat_response(
     """
     carried, number = _find_beam(frequency, track, rolling)
 
-    def sum_side(place: FloatArray) -> ComplexArray:
+    def sum_side(place: Floats) -> ComplexArray:
         size = np.abs(place)[:, None] * number
         return np.asarray(np.sign(place)[:, None] * (2 - np.exp(-1j * size) - np.exp(-size)))
 
@@ -138,7 +135,7 @@ def find_seat_response(
 
 
 def find_force_response(
-    frequency: FloatArray, speed: float, load: float, track: Track, rolling: Rolling
+    frequency: Floats, speed: float, load: float, track: Track, rolling: Rolling
 ) -> ComplexArray:
     """Dynamic contact force over roughness [N/m], (m,), at a wheel load [N]."""
     size, stiffness = find_hertz_contact(load, rolling)
@@ -147,9 +144,7 @@ def find_force_response(
     return np.asarray(find_contact_filter(frequency, speed, size) / through)
 
 
-def sum_lines(
-    time: FloatArray, frequency: FloatArray, lines: ComplexArray, response: Response
-) -> FloatArray:
+def sum_lines(time: Floats, frequency: Floats, lines: ComplexArray, response: Response) -> Floats:
     """Re sum over m of lines (m, b) e^(2 pi i f t), (2, n, b), at ``time`` (n,) [s]: as it is,
     and with each term times its ``response`` (n, m), a function of frequencies."""
     total = np.zeros((2, len(time), lines.shape[1]))
@@ -162,9 +157,9 @@ def sum_lines(
 
 
 def roll_on_rail(
-    time: FloatArray, speed: float, load: float, axles: int, track: Track, rolling: Rolling,
+    time: Floats, speed: float, load: float, axles: int, track: Track, rolling: Rolling,
     roughness: Roughness, seat: int,
-) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+) -> tuple[Floats, Floats]:  # fmt: skip
     """Dynamic contact force of each axle's wheel on one rail, and what the rail seat takes of it
     [N], (n, b), at ``time`` (n,) [s] since that wheel was over the seat.
 
@@ -180,7 +175,7 @@ def roll_on_rail(
     ]
     wheel, on_wheel = drawn[0][0], np.stack([lines for _, lines in drawn], axis=1)
 
-    def take_force(some: FloatArray) -> ComplexArray:
+    def take_force(some: Floats) -> ComplexArray:
         return find_seat_response(speed * time, some, track, rolling)
 
     forces = np.zeros((2, len(time), axles))
@@ -197,9 +192,9 @@ def roll_on_rail(
 
 
 def find_rolling_forces(
-    time: FloatArray, speed: float, axles: FloatArray, loads: FloatArray, track: Track,
+    time: Floats, speed: float, axles: Floats, loads: Floats, track: Track,
     roughness: Roughness, rolling: Rolling | None = None,
-) -> FloatArray:  # fmt: skip
+) -> Floats:  # fmt: skip
     """What rolling adds to the force on each rail seat [N], (k, r), at even times (k,) [s].
 
     At ``time`` 0 the first of the ``axles`` (b,), by their distance behind it [m], is over the

@@ -15,8 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from qdem_fem.files import ConditionError
-from qdem_fem.mesh import FloatArray
+from qdem_fem.files import ConditionError, Floats
 
 ComplexArray = NDArray[np.complex128]
 
@@ -80,9 +79,7 @@ class Roughness:
             )  # fmt: skip
 
 
-def find_roughness_power(
-    levels: Sequence[float], frequency: FloatArray, speed: float
-) -> FloatArray:
+def find_roughness_power(levels: Sequence[float], frequency: Floats, speed: float) -> Floats:
     """Power of a roughness over frequency S(f) [m^2/Hz], (m,), one-sided, at a ``speed`` [m/s].
 
     A third octave of level L about a wavelength v/f holds (1 um)^2 10^(L/10) of mean square; the
@@ -96,7 +93,7 @@ def find_roughness_power(
     )
 
 
-def find_contact_filter(frequency: FloatArray, speed: float, size: float) -> FloatArray:
+def find_contact_filter(frequency: Floats, speed: float, size: float) -> Floats:
     """H_c [-], (m,): what a contact of radius a averages out, (1 + pi/4 (k a)^3)^(-1/2) with
     k = 2 pi f/v (Remington, J. Acoust. Soc. Am. 81, 1987, 1805-1823)."""
     return np.asarray((1 + pi / 4 * (2 * pi * frequency / speed * size) ** 3) ** -0.5)
@@ -104,7 +101,7 @@ def find_contact_filter(frequency: FloatArray, speed: float, size: float) -> Flo
 
 def draw_roughness_lines(
     levels: Sequence[float], length: float, speed: float, roughness: Roughness, seed: list[int]
-) -> tuple[FloatArray, ComplexArray]:
+) -> tuple[Floats, ComplexArray]:
     """Frequencies n v/``length`` [Hz] and complex heights [m], (m,): r = Re sum h e^(i w t).
 
     The roughness repeats after a ``length`` [m], a turn of a wheel for instance.  Sizes are the

@@ -19,8 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from qdem_fem.files import ConditionError
-from qdem_fem.mesh import FloatArray
+from qdem_fem.files import ConditionError, Floats
 from qdem_fem.track.loads.rail import QUIET, Track, find_seat_share, refuse_unless_positive
 from qdem_fem.track.loads.rolling import find_rolling_forces
 from qdem_fem.track.loads.roughness import Roughness
@@ -73,7 +72,7 @@ class Train:
             )
 
     @property
-    def wheel_loads(self) -> FloatArray:
+    def wheel_loads(self) -> Floats:
         """Of an axle, on the rails of seat 1 and 2 [N], (2,)."""
         return self.axle_load * np.array([self.first_share, 1 - self.first_share])
 
@@ -83,7 +82,7 @@ class Train:
         return (self.cars - 1) * self.car_length + self.bogie_distance + self.axle_distance
 
     @property
-    def axles(self) -> FloatArray:
+    def axles(self) -> Floats:
         """Distance of each axle behind the first [m], (4 cars,)."""
         car = np.array([0.0, self.axle_distance])
         car = np.concatenate([car, self.bogie_distance + car])
@@ -112,8 +111,8 @@ class WheelFlat:
 
 
 def find_seat_forces(
-    time: FloatArray, train: Train, track: Track, flats: Sequence[WheelFlat] = ()
-) -> FloatArray:
+    time: Floats, train: Train, track: Track, flats: Sequence[WheelFlat] = ()
+) -> Floats:
     """Force on seat 1 and 2 [N], (k, 2), the first axle being over the sleeper at ``time`` 0.
 
     Raises `ConditionError` as `find_flat_forces`.
@@ -128,8 +127,8 @@ def find_seat_forces(
 
 
 def find_flat_forces(
-    front: FloatArray, axles: FloatArray, speed: float, track: Track, flats: Sequence[WheelFlat]
-) -> FloatArray:
+    front: Floats, axles: Floats, speed: float, track: Track, flats: Sequence[WheelFlat]
+) -> Floats:
     """What flats add to the force on a rail seat [N], (k,), acting where their wheel is.
 
     ``front`` (k,): how far the first axle is past the sleeper [m]; ``axles`` (b,): distance of each
@@ -159,9 +158,9 @@ def find_flat_forces(
 class LoadRecord:
     """Pressures sampled at an even rate."""
 
-    time: FloatArray
+    time: Floats
     """[s], (k,), growing evenly."""
-    pressure: FloatArray
+    pressure: Floats
     """Pressure on seat 1 and 2 [Pa], (k, 2); negative where the rail lifts the sleeper."""
 
     @property

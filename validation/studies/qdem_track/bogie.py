@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from qdem_fem.files.arrays import Floats
 from qdem_fem.files.errors import UsageError
 from qdem_fem.files.output import read_table
-from qdem_fem.mesh.checks import FloatArray
 from qdem_fem.report.spectra import smooth_spectrum, transform_record
 from qdem_fem.report.track import (
     BANDWIDTH,
@@ -31,7 +31,7 @@ APART = 8.0
 """Of the frequencies kept in the record [Hz]."""
 
 
-def passages(bogie: BogieTable) -> tuple[FloatArray, FloatArray]:
+def passages(bogie: BogieTable) -> tuple[Floats, Floats]:
     """Times at which the two axles are on the sleeper, and at which each passage ends (2,) [s].
 
     The first ends half-way to the second, the second when that axle is ``lead`` behind.
@@ -41,7 +41,7 @@ def passages(bogie: BogieTable) -> tuple[FloatArray, FloatArray]:
     return on, np.array([on.mean(), on[1] + bogie.lead / bogie.speed])
 
 
-def settlement_at(time: FloatArray, down: FloatArray, ends: FloatArray) -> list[dict[str, float]]:
+def settlement_at(time: Floats, down: Floats, ends: Floats) -> list[dict[str, float]]:
     """Greatest settlement within each passage, and that at its end [m], of a point that is ``down``
     [m] below where it was at ``time`` [s].
 
@@ -87,7 +87,7 @@ def measure_packing(folder: Path, seed: int, friction: float) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def spectra_of(prepared: TrackPrepared, rows: dict[str, FloatArray]) -> dict[str, list[float]]:
+def spectra_of(prepared: TrackPrepared, rows: dict[str, Floats]) -> dict[str, list[float]]:
     """Every `APART` Hz: the load [N s], acceleration of S2 [m/s], mobility of B2 [m/(s N)]."""
     time, load = rows["time"], prepared.load
     frequency, spectrum = transform_record(time, np.interp(time, load.times, load.values[:, 2]))
