@@ -14,7 +14,7 @@ Two traps in the printed text.
 Sign: eq. 9 takes n "from the triangle surface to the corresponding vertex", into the cell.  But
 Cauchy's t = T n is the traction on a body whose *outward* normal is n, so eq. 10 as printed is
 minus the force on the particle: a stretched tetrahedron would push its particles further apart.
-The functions here use the outward normal; ``as_printed=True`` gives the printed sign.
+The functions here use the outward normal.
 
 Count: process 2 announces six triangles with the volume centroid and lists five; the missing one
 is <vc, fc_124, fc_134>, between the cells of particles 1 and 4.
@@ -127,23 +127,6 @@ def area_vector(triangle: Floats) -> Floats:
     return np.asarray(np.cross(a, b) / 2)
 
 
-def cell_volumes(vertices: Floats) -> Floats:
-    """Volumes [m^3] of the four cells, (..., 4): a quarter of the tetrahedron's each.
-
-    By the divergence theorem, V = 1/3 sum S n.(x - x_j) over the surface; the outer faces of cell
-    j hold x_j and add nothing.
-    """
-    triangles = interior_triangles(vertices)
-    towards_second = area_vector(triangles)
-    volumes = np.zeros(vertices.shape[:-1])
-    for interface, (i, j, _, _) in enumerate(INTERFACES):
-        for vertex, sign in ((i, 1), (j, -1)):
-            arm = triangles[..., interface, :, 0, :] - vertices[..., vertex, None, :]
-            outward = sign * towards_second[..., interface, :, :]
-            volumes[..., vertex] += np.sum(outward * arm, axis=(-2, -1)) / 3
-    return volumes
-
-
 # --- from stress to forces on particles: eqs 9 to 11 --------------------------------------------
 
 
@@ -152,12 +135,11 @@ def force_on_triangle(stress: Floats, area_vector: Floats) -> Floats:
     return np.einsum("...ij,...j->...i", stress, area_vector)
 
 
-def cell_forces(vertices: Floats, stress: Floats, *, as_printed: bool = False) -> Floats:
+def cell_forces(vertices: Floats, stress: Floats) -> Floats:
     """f_j: sum of the forces on the triangles of cell j [N], (..., 4, 3) (eq. 10).
 
     ``vertices`` (..., 4, 3) [m] are the current ones, ``stress`` (..., 3, 3) [Pa] is Cauchy's.
-    Normals point out of the cell, which restores; ``as_printed`` takes them into it, towards the
-    vertex, and gives exactly the opposite.  Do not simulate with it: it blows up.
+    Normals point out of the cell, which restores.
     """
     triangles = area_vector(interior_triangles(vertices))
     forces = np.zeros(np.shape(vertices))
@@ -166,22 +148,6 @@ def cell_forces(vertices: Floats, stress: Floats, *, as_printed: bool = False) -
             f = force_on_triangle(stress, triangles[..., interface, triangle, :])
             forces[..., i, :] += f  # the normal is towards j: out of cell i,
             forces[..., j, :] -= f  # and into cell j
-    return -forces if as_printed else forces
-
-
-def cell_forces_from_faces(vertices: Floats, stress: Floats) -> Floats:
-    """The paper's simpler alternative to eq. 10: each outer face shares its force equally [N].
-
-    Shapes as `cell_forces`.  T S n with n out of the tetrahedron is what the surroundings do to
-    it; what it does to its particles is the opposite, so the minus is needed here too.
-    """
-    x = np.moveaxis(np.asarray(vertices, float), -2, 0)
-    forces = np.zeros(np.shape(vertices))
-    for face in ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)):  # counter-clockwise from outside
-        outward = area_vector(np.stack([x[vertex] for vertex in face], axis=-2))
-        third = force_on_triangle(stress, outward) / 3
-        for vertex in face:
-            forces[..., vertex, :] -= third
     return forces
 
 
@@ -202,8 +168,6 @@ def internal_forces_constructed(
     velocity: Floats,
     lame: tuple[ArrayLike, ArrayLike],
     viscous: tuple[ArrayLike, ArrayLike] = (0.0, 0.0),
-    *,
-    as_printed: bool = False,
 ) -> Floats:
     """Internal forces on all particles [N], (n, 3): the whole of section 2, eqs 1 to 11.
 
@@ -215,5 +179,5 @@ def internal_forces_constructed(
     strain = strain_finger(deformation_gradient(reference, current))
     rate = strain_rate(velocity_gradient(current, velocity[elements]))
     stress = stress_elastic(strain, *lame) + stress_viscous(rate, *viscous)  # eq. 8
-    forces = cell_forces(current, stress, as_printed=as_printed)
+    forces = cell_forces(current, stress)
     return particle_forces(elements, forces, len(nodes))

@@ -44,7 +44,7 @@ class Given(NamedTuple):
     held: Constraints = NO_CONSTRAINTS
     probes: Probes = NO_PROBES
     gravity: Floats | None = None
-    """(steps + 1, 3) [m/s^2]; None: there is none."""
+    """(3,) [m/s^2]; None: there is none."""
 
 
 NOTHING = Given(np.ones((2, 1)))
@@ -183,12 +183,11 @@ class Assembly:
             (self.mass * np.einsum("nc,nc->n", own, own, dtype=float)[self.place]).sum()
         )
 
-    def moment(self) -> tuple[Floats, Floats]:
-        """``sum m u`` [kg m] and ``sum m v`` [kg m/s] of the fields as they are, (3,) each."""
+    def moment(self) -> Floats:
+        """``sum m u`` [kg m] of the displacement as it is, (3,)."""
         if not len(self.elements):
-            return np.zeros(3), np.zeros(3)
-        place, speed = (np.einsum("n,nc->c", self.mass, self.field(name)) for name in FIELDS)
-        return place, speed
+            return np.zeros(3)
+        return np.einsum("n,nc->c", self.mass, self.field("displacement"))
 
     def _choose_frames(self, conditions: Conditions, gravity: bool) -> None:
         """Give frames to the bodies that are free, and take them from those that no longer are."""
@@ -258,12 +257,12 @@ class Assembly:
         )
 
     def pack_gravity(self, gravity: Floats | None) -> Any:
-        """Gravity (k, 3) [m/s^2] as the kernel reads it, four numbers a step; None without."""
+        """Gravity (3,) [m/s^2] as the kernel reads it, four numbers; None without."""
         if gravity is None:
             return None
-        accelerations = make_aligned_zeros(4 * len(gravity), self.dtype)
-        accelerations.reshape(-1, 4)[:, :3] = gravity
-        return accelerations
+        acceleration = make_aligned_zeros(4, self.dtype)
+        acceleration[:3] = gravity
+        return acceleration
 
     def run_kernel(
         self, state: Fields, steps: int, step: float, given: Given, work: Floats
@@ -292,7 +291,7 @@ class Assembly:
             self._seen_from_frames(frames, given),
         )
         seen = frames.turned(own)
-        return seen if given.gravity is None or not frames.falls else seen + given.gravity[0]
+        return seen if given.gravity is None or not frames.falls else seen + given.gravity
 
     def accelerations_own(
         self, displacement: Floats, velocity: Floats, given: Given = NOTHING
@@ -329,9 +328,13 @@ class Assembly:
 
     def hold(self, values: Floats, held: Constraints) -> Floats:
         """``values`` (n, 3) without their parts along held components and roller normals."""
+        return take_out_held(self.by_place(values), held).reshape(-1, 4)[self.place, :3]
+
+    def by_place(self, field: Floats) -> Floats:
+        """A nodal field (n, 3) in the kernel's order, four numbers a node."""
         flat = np.zeros(4 * self.n_nodes)
-        flat.reshape(-1, 4)[self.place, :3] = values
-        return take_out_held(flat, held).reshape(-1, 4)[self.place, :3]
+        flat.reshape(-1, 4)[self.place, :3] = field
+        return flat
 
     def lists(self, conditions: Conditions, gravity: bool) -> tuple[Loads, Constraints]:
         """The kernel's lists of loads and constraints; in single precision, frames to suit."""

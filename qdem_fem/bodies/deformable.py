@@ -138,6 +138,15 @@ class Body:
         )
         return compute_cauchy_stress(gradient, nominal, self.strain)
 
+    def elastic_energy(self, displacement: Floats, strain: Strain) -> Floats:
+        """Stored energy of the elements [J], (m,), at a displacement (n, 3) [m]."""
+        gradients, volumes = self.gradients
+        found: Floats = MEASURES[strain].compute_stored_energy(
+            compute_displacement_gradient(gradients, self.elements, displacement),
+            volumes, self.material.lame_first, self.material.lame_second,
+        )  # fmt: skip
+        return found
+
     def von_mises(self) -> Floats:
         """Von Mises stress of the elements [Pa], (m,)."""
         return compute_von_mises(self.stress())

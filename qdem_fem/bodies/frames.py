@@ -154,10 +154,10 @@ class BodyFrames:
         )
 
     def journey(self, steps: int, step: float, gravity: Floats | None) -> Journey:
-        """Where frames go in ``steps``; ``gravity`` (steps + 1, 3) at the times of the steps."""
+        """Where frames go in ``steps`` under ``gravity`` (3,) [m/s^2]."""
         if gravity is None or not self.falls:
             return Journey(np.zeros((steps, 3)), np.zeros((steps, 3)))
-        faster = step * np.cumsum(gravity[:steps], axis=0)
+        faster = step * np.cumsum(np.tile(gravity, (steps, 1)), axis=0)
         return Journey(faster, step * np.cumsum(faster, axis=0))
 
     def shift_after(self, steps: int, step: float, journey: Journey) -> Floats:

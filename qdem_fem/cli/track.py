@@ -31,7 +31,6 @@ def _register_grains(parser: argparse.ArgumentParser) -> None:
         "--sizes", type=float, nargs=2, metavar=("LEAST", "GREATEST"),
         help="sieves, m, in place of EN 13450 31.5/50 A; 0.045 0.055: the paper's grains",
     )  # fmt: skip
-    parser.add_argument("--workers", type=int, default=1, help="processes (default: %(default)s)")
     parser.set_defaults(command=make_grain_file)
 
 
@@ -69,9 +68,7 @@ def make_grain_file(arguments: argparse.Namespace) -> int:
     grading = BALLAST
     if arguments.sizes is not None:
         grading = Grading(np.array(arguments.sizes), np.array([0.0, 1.0]))
-    grains = make_grains(
-        arguments.count, arguments.seed, recipe, grading, arguments.workers, arguments.shape
-    )
+    grains = make_grains(arguments.count, arguments.seed, recipe, grading, arguments.shape)
     save_grains(arguments.out, grains)
     print(f"{arguments.out}: {len(grains)} grains, {grains.tetrahedra.sum()} tetrahedra")
     return 0

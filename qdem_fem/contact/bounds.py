@@ -37,17 +37,12 @@ from qdem_fem.contact.system import System
 from qdem_fem.files import Floats, Integers
 
 
-def find_no_rigid_bound(stiffness: Floats) -> Floats:
-    """`qdem_fem.rigid.RigidBodies.frequency_bound` where there are none."""
-    return np.zeros_like(stiffness)
-
-
 def bound_spring_network(
     ends: Integers,
     stiffness: Floats,
     wall: Floats,
     inverse_mass: Floats,
-    rigid: Callable[[Floats], Floats] = find_no_rigid_bound,
+    rigid: Callable[[Floats], Floats] = np.zeros_like,
 ) -> float:
     """Bound on omega^2 [1/s^2] of springs between nodes, and of nodes to walls.
 
@@ -67,7 +62,7 @@ def bound_allowed_contacts(
     normal: Floats,
     inverse_mass: Floats,
     contacts: float,
-    rigid: Callable[[Floats], Floats] = find_no_rigid_bound,
+    rigid: Callable[[Floats], Floats] = np.zeros_like,
 ) -> float:
     """Bound on omega^2 [1/s^2] while no vertex has more than so many contacts of its own ``k_n``.
 

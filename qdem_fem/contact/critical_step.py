@@ -11,7 +11,6 @@ import numpy as np
 
 from qdem_fem.bodies import Body, find_element_step
 from qdem_fem.contact.system import System
-from qdem_fem.element import compute_displacement_gradient, compute_elastic_energy
 from qdem_fem.files import Floats
 
 LANCZOS_TOLERANCE = 1e-3
@@ -173,13 +172,7 @@ def find_governing_element(run: System, mode: Floats) -> tuple[Body, int]:
     for body, start in zip(run.bodies, run.first_node, strict=False):
         if body.rigid:
             continue
-        gradients, volumes = body.gradients
-        moved = mode[start : start + len(body.nodes)]
-        gradient = compute_displacement_gradient(gradients, body.elements, moved)
-        material = body.material
-        energy = compute_elastic_energy(
-            gradient, volumes, material.lame_first, material.lame_second, "small"
-        )
+        energy = body.elastic_energy(mode[start : start + len(body.nodes)], "small")
         found.append((float(energy.max()), body, int(np.argmax(energy))))
     _, body, element = max(found, key=lambda entry: entry[0])
     return body, element

@@ -18,7 +18,6 @@ from qdem_fem.contact.search import (
     choose_skin,
     extents,
     find_near_walls,
-    find_outer_nodes,
     make_pairs,
     renew_pairs,
 )
@@ -52,15 +51,7 @@ class SphereContacts(Contacts):
     """By how much a pair's reach may be more for no body to meet its image across the width [m]."""
 
     def __init__(self, run: System, asked: SphereContact) -> None:
-        outer, joined = [], []
-        for body, start in zip(run.bodies, run.first_node, strict=False):
-            master = run.master[start : start + len(body.nodes)] - start
-            nodes, slab = find_outer_nodes(body, master, asked.periodic)
-            outer.append(nodes)
-            joined.append(slab)
-        super().__init__(run, asked, outer)
-        self.slab = np.array(joined)
-        """Whether a body is one with its images across the width, (bodies,)."""
+        super().__init__(run, asked)
         counts = np.diff(self.first_vertex)
 
         def by_body(values: list[float]) -> Floats:
@@ -129,12 +120,11 @@ class SphereContacts(Contacts):
         run = self.run
         fixed = np.flatnonzero(run.master != np.arange(len(run.master)))
         for b in np.unique(np.searchsorted(run.first_node, fixed, side="right") - 1):
-            if not self.slab[b]:
-                nodes = slice(*run.first_node[b : b + 2])
-                master = run.master[nodes] - run.first_node[b]
-                check_joined(run.bodies[b], master, side, self.where)
+            nodes = slice(*run.first_node[b : b + 2])
+            master = run.master[nodes] - run.first_node[b]
+            check_joined(run.bodies[b], master, side, self.where)
         size = self.extents(position, side)
-        self.room = check_extents(run.bodies, size, self.slab, self.reach, side, self.where)
+        self.room = check_extents(run.bodies, size, self.reach, side, self.where)
 
     def idle(self) -> int:
         """Pairs of the list that do not touch."""

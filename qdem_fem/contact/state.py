@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Any
@@ -16,7 +16,6 @@ from qdem_fem.bodies import Given
 from qdem_fem.contact.bounds import (
     bound_allowed_contacts,
     find_near_step,
-    find_no_rigid_bound,
     shorten_step_by_contact,
 )
 from qdem_fem.contact.critical_step import CriticalStep
@@ -24,7 +23,7 @@ from qdem_fem.contact.spheres import LOOK_AGAIN, NEAR, TOO_DEEP, SphereContact
 from qdem_fem.contact.surface import SurfaceContact, check_inside
 from qdem_fem.contact.system import System
 from qdem_fem.contact.window import advance_contact, run_window
-from qdem_fem.files import ConditionError, ContactTooDeep, Floats, Integers, StepWarning, Unstable
+from qdem_fem.files import ContactTooDeep, Floats, Integers, StepWarning, Unstable
 
 CHECKED = 64
 """Steps between two looks at whether the contacts there are allow the step: a look costs two."""
@@ -65,10 +64,8 @@ class Contacts(ABC):
     reach: float
     """Way within which two vertices may be looked at as touching [m]."""
 
-    def __init__(
-        self, run: System, asked: SphereContact | SurfaceContact, outer: Sequence[Integers]
-    ) -> None:
-        """``outer``: the nodes of every body that contact acts on."""
+    def __init__(self, run: System, asked: SphereContact | SurfaceContact) -> None:
+        outer = [np.unique(body.surface) for body in run.bodies]
         self.run, self.asked, self.contacts = run, asked, asked.contacts
         starts = run.first_node[:-1]
         self.nodes = np.concatenate([own + start for own, start in zip(outer, starts, strict=True)])
@@ -111,9 +108,7 @@ class Contacts(ABC):
     def find_near_springs(self) -> tuple[Integers, Floats, Floats]:
         """Ends (p, 2), k_n (p,) and k_n to walls (c,) [N/m] of all contacts there can be before
         pairs are looked for again: no vertex then is half a skin from where it was."""
-        raise ConditionError(
-            "only spheres know what is near", where="contact, contacts", remedy="give a number"
-        )
+        raise NotImplementedError("only spheres know what is near")
 
     @abstractmethod
     def describe_deepest(self) -> tuple[str, str]:
@@ -154,7 +149,7 @@ class Contacts(ABC):
     def bound_rigid(self, stiffness: Floats) -> Floats:
         """`RigidBodies.frequency_bound` of springs (c,) [N/m] at the vertices."""
         if self.run.rigid is None:
-            return find_no_rigid_bound(stiffness)
+            return np.zeros_like(stiffness)
         return self.run.rigid.frequency_bound(self.nodes, stiffness)
 
     def forget_bounds(self) -> None:

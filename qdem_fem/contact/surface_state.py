@@ -49,7 +49,7 @@ class SurfaceContacts(Contacts):
         )
         self.skin = self.deep = self.depth
         self.reach = 2 * (self.depth + self.skin)
-        super().__init__(run, asked, [np.unique(body.surface) for body in run.bodies])
+        super().__init__(run, asked)
         counts, starts = np.diff(self.first_vertex), self.first_vertex
         share = place_face_points(int(asked.points))
         parts: list[list[Any]] = [[] for _ in range(8)]

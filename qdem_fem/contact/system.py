@@ -126,9 +126,10 @@ class System:
                 self._lists = self.rigid.split_lists(*self._lists, self.motion.work)
         return self._lists
 
-    def gravity_at(self, times: Floats) -> Floats | None:
-        """Gravity [m/s^2], (k, 3), at ``times`` (k,) [s]; None without."""
-        return None if self.gravity is None else self.gravity.sample(times)
+    @property
+    def gravity_vector(self) -> Floats | None:
+        """Gravity [m/s^2], (3,); None without."""
+        return None if self.gravity is None else self.gravity.constant
 
     def note_conditions_changed(self, ties: bool) -> None:
         """Make the lists again when next needed; ``ties``: what is held has changed, too."""

@@ -35,18 +35,6 @@ WINDOW_ONE: Any = kernel.choose_window_kernel(1)
 WINDOW_THREADS: Any = kernel.choose_window_kernel(2)
 
 
-def take_gravity_from(gravity: Any, k: int) -> Any:
-    """Accelerations from step k on; None without gravity."""
-    return None if gravity is None else gravity[4 * k :]
-
-
-@overload(take_gravity_from, strict=False)
-def _gravity_from(gravity: Any, k: int) -> Any:
-    if isinstance(gravity, types.NoneType):
-        return lambda gravity, k: None
-    return lambda gravity, k: gravity[4 * k :]
-
-
 def advance_contact(
     contact: Any, threads: Any, displacement: Any, velocity: Any, step: float
 ) -> int:
@@ -98,19 +86,19 @@ def build_contact_window(made_from: str) -> Any:
                 for c in range(3):
                     forces[force_at[i] + c] += pull[i, c]
             ahead = Probes(probes.node_at, probes.record, probes.stride, probes.first - k)
-            row, fall = table[k : k + 2], take_gravity_from(gravity, k)
+            row = table[k : k + 2]
             if rigid is not None:
                 advance_rigid(
-                    rigid, forces, state.displacement, state.velocity, row, fall, work, step
+                    rigid, forces, state.displacement, state.velocity, row, gravity, work, step
                 )
             if threads is None:
                 _, bad = WINDOW_ONE(
-                    law, viscous, layout, state, loads, held, ahead, row, fall, work, step, 1
+                    law, viscous, layout, state, loads, held, ahead, row, gravity, work, step, 1
                 )
                 said = advance_contact(contact, None, state.displacement, state.velocity, step)
             else:
                 _, bad = WINDOW_THREADS(
-                    law, viscous, layout, state, loads, held, ahead, row, fall, work, step, 1
+                    law, viscous, layout, state, loads, held, ahead, row, gravity, work, step, 1
                 )
                 said = advance_contact(contact, True, state.displacement, state.velocity, step)
             if bad > 0.0 or said != GO_ON:

@@ -7,14 +7,9 @@ from qdem_fem.element.kinematics import (
     compute_von_mises,
 )
 from qdem_fem.element.material import Material
-from qdem_fem.element.strain_measures import (
-    MEASURES,
-    Strain,
-    compute_cauchy_stress,
-    compute_elastic_energy,
-)
+from qdem_fem.element.strain_measures import MEASURES, Strain, compute_cauchy_stress
 
 __all__ = [
     "MEASURES", "Material", "Strain", "compute_cauchy_stress", "compute_displacement_gradient",
-    "compute_elastic_energy", "compute_volume_change", "compute_von_mises", "stress",
+    "compute_volume_change", "compute_von_mises", "stress",
 ]  # fmt: skip

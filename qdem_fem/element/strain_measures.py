@@ -12,8 +12,6 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal
 
-from numpy.typing import ArrayLike
-
 from qdem_fem.element.kinematics import IDENTITY, compute_volume_change, transposed
 from qdem_fem.files import Floats
 from trackbed.choices import find_choices
@@ -35,15 +33,3 @@ def compute_cauchy_stress(H: Floats, nominal: Floats, strain: Strain) -> Floats:
     if not MEASURES[strain].OBJECTIVE:
         return nominal
     return nominal @ transposed(IDENTITY + H) / (1 + compute_volume_change(H))[..., None, None]
-
-
-def compute_elastic_energy(
-    H: Floats,
-    volume: Floats,
-    lame_first: ArrayLike,
-    lame_second: ArrayLike,
-    strain: Strain,
-) -> Floats:
-    """Stored energy of every element [J], (m,); ``volume`` is V0 (m,) [m^3]."""
-    found: Floats = MEASURES[strain].compute_stored_energy(H, volume, lame_first, lame_second)
-    return found

@@ -31,26 +31,20 @@ def write_bodies_vtu(path: Path, bodies: Sequence[Any]) -> None:
 
     counts = [len(body.nodes) for body in bodies]
     first = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    run = bodies[0].mover  # finds the velocities of all its bodies at once
+    velocity = [body.velocity for body in bodies] if run is None else [run.velocities(bodies)]
     number = np.repeat(np.arange(len(bodies)), [len(body.elements) for body in bodies])
     mesh = meshio.Mesh(
         np.concatenate([body.nodes for body in bodies]),
         [("tetra", np.concatenate([b.elements + n for b, n in zip(bodies, first, strict=True)]))],
         {
             "displacement": np.concatenate([body.displacement for body in bodies]),
-            "velocity": join_velocities(bodies),
+            "velocity": np.concatenate(velocity),
         },
         {"von_mises": [np.concatenate([body.von_mises() for body in bodies])], "body": [number]},
     )
     with replace_file(path) as temporary:
         mesh.write(temporary, file_format="vtu", compression=None)
-
-
-def join_velocities(bodies: Sequence[Any]) -> Any:
-    """`Body.velocity` of bodies of one simulation or of none, one after the other, (n, 3) [m/s]."""
-    run = bodies[0].mover
-    if run is None:
-        return np.concatenate([body.velocity for body in bodies])
-    return run.velocities(bodies)
 
 
 def write_pvd(path: Path, files: Sequence[tuple[float, str]]) -> None:

@@ -2,8 +2,10 @@
 
 from qdem_fem.grains.grading import BALLAST, Grading
 from qdem_fem.grains.hulls import GrainRecipe
+from qdem_fem.grains.measures import find_edge_angles, find_surface_edges
 from qdem_fem.grains.sets import GrainSet, make_grains, save_grains
 
 __all__ = [
-    "BALLAST", "Grading", "GrainRecipe", "GrainSet", "make_grains", "save_grains",
+    "BALLAST", "Grading", "GrainRecipe", "GrainSet", "find_edge_angles", "find_surface_edges",
+    "make_grains", "save_grains",
 ]  # fmt: skip

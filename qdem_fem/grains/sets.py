@@ -1,4 +1,4 @@
-"""Many grains: made by seed on any number of processors, saved, loaded, meshed.
+"""Many grains: made by seed, saved, loaded, meshed.
 
 trackbed grains --count 5700 --seed 1 --out grains.npz
 """
@@ -8,10 +8,8 @@ from __future__ import annotations
 import os
 import zipfile
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from functools import partial
-from multiprocessing import get_context
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -23,10 +21,9 @@ from qdem_fem.grains.meshing import make_grain_tetrahedra
 from qdem_fem.grains.sieve import find_sieve_size
 from qdem_fem.mesh import TetMesh
 from trackbed.choices import find_choice
+from trackbed.run_files import write_whole
 
 GRAINS_FORMAT = 1
-BATCH = 50
-"""Grains a process makes at a time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,31 +73,24 @@ def get_shape(name: str) -> Callable[[np.random.Generator, GrainRecipe], GrainFo
 
 def make_grains(
     count: int, seed: int, recipe: GrainRecipe | None = None, grading: Grading = BALLAST,
-    workers: int = 1, shape: str = "hulls",
+    shape: str = "hulls",
 ) -> GrainSet:  # fmt: skip
     """``count`` random grains of a ``shape`` whose sieve sizes follow ``grading``.
 
     Grain i depends on ``seed``, i, shape and recipe only; sizes on ``seed``, ``count`` and the
-    grading: the same set for any number of ``workers`` (processes).  Raises `MeshError` for a
-    recipe that random grains do not meet, a count below one, or a seed below zero, `UsageError`
-    for a shape that there is not.
+    grading.  Raises `MeshError` for a recipe that random grains do not meet, a count below one, or
+    a seed below zero, `UsageError` for a shape that there is not.
     """
-    get_shape(shape)
-    if count < 1 or workers < 1 or seed < 0:
+    draw, recipe = get_shape(shape), recipe or GrainRecipe()
+    if count < 1 or seed < 0:
         raise MeshError(
-            f"{count} grains of seed {seed} on {workers} processors",
+            f"{count} grains of seed {seed}",
             where="grains_make",
-            remedy="use a seed of 0 or more, and 1 or more of the others",
+            remedy="use a seed of 0 or more, and 1 grain or more",
         )
     sizes = draw_sizes(grading, count, np.random.default_rng([seed, count]))
-    make = partial(_make_batch, recipe=recipe or GrainRecipe(), seed=seed, shape=shape)
-    batches = [range(at, min(at + BATCH, count)) for at in range(0, count, BATCH)]
-    if workers == 1:
-        made = [make(batch) for batch in batches]
-    else:
-        with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
-            made = list(pool.map(make, batches))
-    forms, own = zip(*(one for batch in made for one in batch), strict=True)
+    forms = [draw(np.random.default_rng([seed, i, GRAINS_FORMAT]), recipe) for i in range(count)]
+    own = [find_sieve_size(form.nodes) for form in forms]
     scales = sizes / np.array(own)
     return GrainSet(
         corners=np.array([form.corner_faces.max() + 1 for form in forms]),
@@ -112,29 +102,18 @@ def make_grains(
     )
 
 
-def _make_batch(
-    grains: range, recipe: GrainRecipe, seed: int, shape: str
-) -> list[tuple[GrainForm, float]]:
-    """Grains of no set size, and the sieve size that each has."""
-    draw = get_shape(shape)
-    forms = [draw(np.random.default_rng([seed, one, GRAINS_FORMAT]), recipe) for one in grains]
-    return [(form, find_sieve_size(form.nodes)) for form in forms]
-
-
 def save_grains(path: str | os.PathLike[str], grains: GrainSet) -> None:
     """Write a set of grains, atomically, as .npz: 24 bytes a node, 3 bytes a face."""
-    target = Path(path)
-    temporary = target.with_name(target.name + ".partial")
-    with temporary.open("wb") as stream:
-        np.savez(
-            stream,
-            format=np.array(GRAINS_FORMAT),
-            corners=grains.corners.astype(np.uint8),
-            nodes=grains.nodes,
-            corner_faces=grains.corner_faces.astype(np.uint8),
-            shape=np.stack([grains.sizes, grains.sphericity, grains.roundness]),
-        )
-    temporary.replace(target)
+    stream = BytesIO()
+    np.savez(
+        stream,
+        format=np.array(GRAINS_FORMAT),
+        corners=grains.corners.astype(np.uint8),
+        nodes=grains.nodes,
+        corner_faces=grains.corner_faces.astype(np.uint8),
+        shape=np.stack([grains.sizes, grains.sphericity, grains.roundness]),
+    )
+    write_whole(Path(path), stream.getvalue())
 
 
 def load_grains(path: str | os.PathLike[str]) -> GrainSet:

@@ -227,11 +227,11 @@ class StaticProblem:
         row = conditions.table(now)[0]
         self.external = np.zeros(4 * assembly.n_nodes)
         np.add.at(self.external, loads.node_at, loads.weight * row[loads.series])
-        gravity = simulation.gravity_at(now)
+        gravity = simulation.gravity_vector
         if gravity is not None:
             # the masses of the simulation itself, with what mass scaling added
             weight = np.zeros((assembly.n_nodes, 4))
-            weight[place, :3] = own.mass[:, None] * gravity[0]
+            weight[place, :3] = own.mass[:, None] * gravity
             used = own.mass > 0
             self.external.reshape(-1, 4)[place[used]] += weight[place[used]]
         self.held, self.target = held, held.weight * row[held.series]
@@ -242,9 +242,7 @@ class StaticProblem:
 
     def start(self) -> Floats:
         """The present displacement with given components at their values."""
-        u = np.zeros(4 * self.assembly.n_nodes)
-        u.reshape(-1, 4)[self.assembly.place, :3] = self.initial
-        u = self.project(u)
+        u = self.project(self.assembly.by_place(self.initial))
         u[self.held.node_at] = self.target
         return u
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from qdem_fem.element import compute_displacement_gradient, compute_elastic_energy
 from qdem_fem.march.leapfrog import find_half_work, find_velocity, find_viscous_half
 from qdem_fem.march.state import State
 
@@ -28,19 +27,16 @@ class Energy:
 
 
 def find_energy(run: State) -> Energy:
-    """Energies now [J]; elastic energy as `qdem_fem.element.compute_elastic_energy`."""
+    """Energies now [J]; elastic energy as `qdem_fem.Body.elastic_energy`."""
     velocity, motion = find_velocity(run), run.motion
     kinetic = 0.5 * float((run.assembly.mass * (velocity**2).sum(axis=1)).sum())
     if run.rigid is not None:
         kinetic += run.rigid.kinetic(run.rigid.now(run.acting()))
     elastic = sum(
-        compute_elastic_energy(
-            compute_displacement_gradient(body.gradients[0], body.elements, body.displacement),
-            body.gradients[1], body.material.lame_first, body.material.lame_second, run.strain,
-        ).sum()
+        body.elastic_energy(body.displacement, run.strain).sum()
         for body in run.bodies
         if not body.rigid
-    )  # fmt: skip
+    )
     external, viscous = float(motion.work[:2].sum()) + motion.gravity_work, float(motion.work[2])
     if motion.behind:
         external += float(find_half_work(run, run.assembly.field("velocity"), velocity).sum())

@@ -78,9 +78,8 @@ def find_resultants(run: State) -> Floats:
     total = np.zeros((len(run.bodies), 3))
     np.add.at(total, find_bodies_of(run, contacts.nodes), contacts.kernel.force)
     now = np.array([run.time])
-    gravity = run.gravity_at(now)
-    if gravity is not None:
-        total += compute_masses(run)[:, None] * gravity[0]
+    if run.gravity_vector is not None:
+        total += compute_masses(run)[:, None] * run.gravity_vector
     for load in run.conditions.loads:
         force = load.weights * load.driver.sample(now)[0]
         np.add.at(total, find_bodies_of(run, load.nodes), force)
@@ -130,12 +129,12 @@ def find_grounded(run: State) -> NDArray[np.bool_]:
     All of them without gravity: nothing falls there.
     """
     assert run.contacts is not None
-    gravity, count = run.gravity_at(np.array([run.time])), len(run.bodies)
+    gravity, count = run.gravity_vector, len(run.bodies)
     if gravity is None:
         return np.ones(count, bool)
     pairs, walled = run.contacts.find_touching_bodies()
-    held = [one.nodes for one in run.conditions.held if gravity[0, list(one.components)].any()]
-    held += [one.nodes for one in run.conditions.rollers if one.normal @ gravity[0, :3]]
+    held = [one.nodes for one in run.conditions.held if gravity[list(one.components)].any()]
+    held += [one.nodes for one in run.conditions.rollers if one.normal @ gravity]
     on = np.unique(np.concatenate([walled, *(find_bodies_of(run, nodes) for nodes in held)]))
     one = np.concatenate([pairs[:, 0], on])
     other = np.concatenate([pairs[:, 1], np.full(len(on), count)])  # the ground is one more
@@ -264,8 +263,8 @@ def _judged(run: State, greatest: float, peaks: int, steps: int, time: float) ->
     forces = np.linalg.norm(run.contacts.kernel.force, axis=1)
     forces = forces[forces > 0]  # on vertices that touch something, walls included
     size = np.linalg.norm(find_resultants(run), axis=1)
-    gravity = run.gravity_at(np.array([run.time]))
-    weight = 0.0 if gravity is None else compute_masses(run) * float(np.linalg.norm(gravity[0]))
+    gravity = run.gravity_vector
+    weight = 0.0 if gravity is None else compute_masses(run) * float(np.linalg.norm(gravity))
     return Rest(
         unbalanced=float(np.sqrt((size**2).mean()) / forces.mean()) if len(forces) else np.inf,
         kinetic=greatest / stored if stored > 0 else np.inf,

@@ -23,8 +23,8 @@ def find_velocity(run: State) -> Floats:
         _, held = run.pack_lists()
         table = run.conditions.table(run.time + run.step * np.arange(2.0))
         ahead = held.weight * (table[1] - table[0])[held.series] / run.step
-        flat = _by_place(run, velocity + change)
-        flat[held.node_at] = 0.5 * (_by_place(run, velocity)[held.node_at] + ahead)
+        flat = run.assembly.by_place(velocity + change)
+        flat[held.node_at] = 0.5 * (run.assembly.by_place(velocity)[held.node_at] + ahead)
         velocity = flat.reshape(-1, 4)[run.assembly.place, :3]
     if run.rigid is not None:
         velocity[run.rigid.nodes] = run.rigid.velocity_field(run.acting())
@@ -42,7 +42,7 @@ def take_velocities_behind(run: State) -> None:
         if run.rigid is not None:
             run.rigid.kick_half(-1, run.acting(), run.motion.work)
         _, held = run.pack_lists()
-        held.previous[:] = _by_place(run, behind)[held.node_at]
+        held.previous[:] = run.assembly.by_place(behind)[held.node_at]
         run.assembly.set_field("velocity", behind)
         run.motion.work[2] -= find_viscous_half(run)
         run.motion.behind = True
@@ -68,7 +68,7 @@ def admit_state(run: State) -> None:
     _, held = run.pack_lists()
     table = run.conditions.table(np.array([run.time]))[0]
     set_by_user = run.assembly.field("displacement")
-    flat = _by_place(run, run.assembly.hold(set_by_user, held))
+    flat = run.assembly.by_place(run.assembly.hold(set_by_user, held))
     flat[held.node_at] = held.weight * table[held.series]
     admitted = flat.reshape(-1, 4)[run.assembly.place, :3]
     if not np.array_equal(admitted, set_by_user):
@@ -82,12 +82,12 @@ def find_half_work(run: State, behind: Floats, level: Floats) -> Floats:
     """
     loads, held = run.pack_lists()
     table = run.conditions.table(np.array([run.time]))[0]
-    mean = _by_place(run, 0.5 * (behind + level))
+    mean = run.assembly.by_place(0.5 * (behind + level))
     force = loads.weight * table[loads.series]
     work = np.array([0.5 * run.step * float(force @ mean[loads.node_at]), 0.0])
     if held.weight.any():  # the impulse that moved the nodes as prescribed
         free = find_free_accelerations(run, run.assembly.field("displacement"), behind)
-        missing = _by_place(run, level - behind - 0.5 * run.step * free)
+        missing = run.assembly.by_place(level - behind - 0.5 * run.step * free)
         inverse = np.asarray(run.assembly.state.inverse_mass, dtype=float)
         mass = 1 / inverse[held.node_at // 4]
         work[1] = mass @ (missing * mean)[held.node_at]
@@ -108,7 +108,7 @@ def find_free_accelerations(run: State, displacement: Floats, velocity: Floats) 
     """What the forces would make of all nodes now if none were held [m/s^2], (n, 3)."""
     loads, _ = run.pack_lists()
     now = np.full(2, run.time)
-    given = Given(run.conditions.table(now), loads, gravity=run.gravity_at(now))
+    given = Given(run.conditions.table(now), loads, gravity=run.gravity_vector)
     free = run.assembly.accelerations(displacement, velocity, given)
     return free if run.contacts is None else free + run.contacts.accelerations()
 
@@ -117,10 +117,3 @@ def _accelerations(run: State, displacement: Floats, velocity: Floats) -> Floats
     """Accelerations now [m/s^2], (n, 3), zero where held."""
     change = find_free_accelerations(run, displacement, velocity)
     return run.assembly.hold(change, run.pack_lists()[1])
-
-
-def _by_place(run: State, field: Floats) -> Floats:
-    """A nodal field (n, 3) in the kernel's order, four numbers a node."""
-    flat = np.zeros((run.assembly.n_nodes, 4))
-    flat[run.assembly.place, :3] = field
-    return flat.ravel()

@@ -9,7 +9,7 @@ from qdem_fem.bodies import Body
 from qdem_fem.contact.spheres import SphereContact
 from qdem_fem.contact.surface import SurfaceContact
 from qdem_fem.element import MEASURES
-from qdem_fem.files import ConditionError, is_real
+from qdem_fem.files import ConditionError, Driver, is_real
 
 Contact = SphereContact | SurfaceContact
 WORDS = {
@@ -66,6 +66,16 @@ def check_options(
         )
     if threads is not None and threads != int(threads):
         raise ConditionError(f"{threads!r} is no number of threads", where="simulation, threads")
+
+
+def make_gravity(gravity: Any) -> Driver | None:
+    """Gravity [m/s^2], three components; raises `ConditionError` for one that changes with time."""
+    driver = None if gravity is None else Driver(gravity, 3, "gravity")
+    if driver is not None and driver.varying is not None:
+        raise ConditionError(
+            "it does not change with time", where="gravity", remedy="load the bodies instead"
+        )
+    return driver
 
 
 def check_contact(contact: Any, precision: str, device: str) -> None:

@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from qdem_fem.bodies import Body, Held, Roller
+from qdem_fem.bodies import Body
 from qdem_fem.contact import choose_assembly
 from qdem_fem.element import Strain
-from qdem_fem.files import ConditionError, Driver, Floats, Value, is_real
+from qdem_fem.files import ConditionError, Floats, is_real
 from qdem_fem.march.checkpoint import read_checkpoint, write_checkpoint
 from qdem_fem.march.conditioned_bodies import ConditionedBodies
 from qdem_fem.march.dynamic_relaxation import StaticAnswer, relax
@@ -25,8 +26,8 @@ from qdem_fem.march.options import (
     check_options,
     check_rigid,
     list_bodies,
+    make_gravity,
 )
-from qdem_fem.march.reactions import find_reaction
 from qdem_fem.march.state import STEP_SAFETY
 from qdem_fem.march.steps import march
 
@@ -53,10 +54,10 @@ class Simulation(ConditionedBodies):
 
     ``strain``: ``"finger"`` (the paper), or another of `qdem_fem.element.MEASURES`;
     ``precision``: ``"float64"`` or ``"float32"``; ``step`` [s], or ``safety`` times the critical
-    step; ``gravity`` [m/s^2], three components, constant or a series; ``threads``: all by
-    default, the result does not depend on it; ``mass_scaling`` [s]: raise the density of
-    elements whose own critical step is shorter than this; ``device``: ``"cpu"``, or ``"cuda"``
-    for a GPU (`qdem_fem.kernel.cuda.assembly`), whose results repeat to round-off only;
+    step; ``gravity`` [m/s^2], three components; ``threads``: all by default, the result does not
+    depend on it; ``mass_scaling`` [s]: raise the density of elements whose own critical step is
+    shorter than this; ``device``: ``"cpu"``, or ``"cuda"`` for a GPU
+    (`qdem_fem.kernel.cuda.assembly`), whose results repeat to round-off only;
     ``contact``: how bodies touch, a `qdem_fem.SphereContact` or `SurfaceContact`; by default not.
 
     Bodies of one name are numbered, as messages name them.  In single precision a free body has
@@ -76,7 +77,7 @@ class Simulation(ConditionedBodies):
         precision: Literal["float64", "float32"] = "float64",
         step: float | None = None,
         safety: float = STEP_SAFETY,
-        gravity: Value | None = None,
+        gravity: ArrayLike | None = None,
         threads: int | None = None,
         mass_scaling: float | None = None,
         device: Literal["cpu", "cuda"] = "cpu",
@@ -91,8 +92,7 @@ class Simulation(ConditionedBodies):
         choose_assembly(device)
         check_rigid(own, precision, device)
         super().__init__(
-            own, strain, precision, threads, mass_scaling, device,
-            None if gravity is None else Driver(gravity, 3, "gravity"),
+            own, strain, precision, threads, mass_scaling, device, make_gravity(gravity),
             contact=contact, given_step=None if step is None else float(step), safety=safety,
         )  # fmt: skip
         for body in self.bodies:
@@ -138,10 +138,9 @@ class Simulation(ConditionedBodies):
         chosen = {name: self._probe(name, probe) for name, probe in (probes or {}).items()}
         every = np.concatenate([*chosen.values(), np.zeros(0, int)])
         samples = march(self, steps, stride, every, progress)
-        values, column = {}, 0
-        for name, nodes in chosen.items():
-            values[name] = samples.record[:, column : column + len(nodes)].mean(axis=1)
-            column += len(nodes)
+        ends = np.cumsum([len(nodes) for nodes in chosen.values()])
+        parts = zip(chosen, np.split(samples.record, ends, axis=1), strict=False)
+        values = {name: part.mean(axis=1) for name, part in parts}
         return History(samples.step_numbers * self.step, values)
 
     def relax(self, tolerance: float = 1e-8, max_steps: int = 100_000) -> StaticAnswer:
@@ -158,10 +157,6 @@ class Simulation(ConditionedBodies):
                 said = f"{what} have no static answer here"
                 raise ConditionError(said, where="relax", remedy=remedy)
         return relax(self, tolerance, max_steps)
-
-    def reaction(self, condition: Held | Roller) -> Floats:
-        """Total force [N], (3,), that `fix`, `prescribe` or `roller` exerts on the body now."""
-        return find_reaction(self, condition)
 
     def velocities(self, bodies: Sequence[Body]) -> Floats:
         """`Body.velocity` of some bodies, one after the other, computed once [m/s], (n, 3)."""
@@ -202,7 +197,8 @@ class Simulation(ConditionedBodies):
         self.motion.put_in = nan
         if name == "displacement":
             self.motion.displacement_set = True
-            self.note_displacement_changed()
+            if self._contacts is not None:  # are to be found again: the user moved a body
+                self._contacts.stale = True
 
     def _own(self, body: Body) -> slice:
         start = self._offset(body)

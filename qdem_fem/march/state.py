@@ -92,14 +92,13 @@ class State(System):
 
         self.pack_lists()
         now = self.time + self.step * np.arange(2.0)
-        gravity = self.gravity_at(now[:1])
         place, force = np.zeros(0, np.int64), np.zeros((0, 3))
         if self.contacts is not None:
             self.contacts.refresh()
             place, force = self.contacts.place, self.contacts.kernel.force
         return Acting(
             self.motion.behind, self.step, self.conditions.table(now),
-            None if gravity is None else gravity[0], place, force,
+            self.gravity_vector, place, force,
         )  # fmt: skip
 
     def note_conditions_changed(self, ties: bool) -> None:
@@ -109,11 +108,6 @@ class State(System):
             self._critical = None
             if self._contacts is not None:
                 self._contacts.forget_bounds()
-
-    def note_displacement_changed(self) -> None:
-        """Find contacts again when next needed: the user moved a body."""
-        if self._contacts is not None:
-            self._contacts.stale = True
 
 
 def make_contacts(run: System, contact: Contact) -> Contacts:

@@ -18,8 +18,6 @@ from qdem_fem.march.leapfrog import admit_state, take_velocities_behind
 from qdem_fem.march.state import State
 
 WINDOW_STEPS = 4096
-GRAVITY_STEPS = 16
-"""Steps over which the momentum is interpolated for the work of a gravity that changes."""
 UNSTABLE_GROWTH = 10.0
 """Kinetic energy over all energy ever put in, above which a motion is called unstable."""
 
@@ -36,7 +34,7 @@ def march(
     Raises `Unstable` and `ElementInverted`; `StepWarning` when an element makes the step short, or
     it is too long.
     """
-    motion, assembly = run.motion, run.assembly
+    motion, assembly, gravity = run.motion, run.assembly, run.gravity_vector
     if steps:
         motion.step = run.step
     if motion.displacement_set:
@@ -53,8 +51,6 @@ def march(
     if samples.first_step == motion.steps_done and len(samples.record):
         samples.record[0] = assembly.field("displacement")[nodes]
     most = max(16, min(WINDOW_STEPS, assembly.window_work // max(1, len(assembly.elements))))
-    if run.gravity is not None and run.gravity.varying is not None:
-        most = GRAVITY_STEPS
     end = motion.steps_done + steps
     window = assembly.window if run.contacts is None else run.contacts.window
     try:
@@ -63,7 +59,6 @@ def march(
             count = min(most, end - motion.steps_done, assembly.steps_most(run.step))
             times = run.step * (motion.steps_done + np.arange(count + 1, dtype=float))
             probes = samples.probes(4 * assembly.place[nodes], motion.steps_done)
-            gravity = run.gravity_at(times)
             before = find_moment(run) if gravity is not None else None
             given = Given(run.conditions.table(times), loads, held, probes, gravity)
             if run.contacts is None and run.rigid is not None:
@@ -72,10 +67,7 @@ def march(
                 done, bad = window(count, run.step, given, motion.work)
             motion.steps_done += done
             if gravity is not None and before is not None and done:
-                after = find_moment(run)
-                motion.gravity_work += compute_gravity_work(
-                    gravity[: done + 1], before, after, run.step
-                )
+                motion.gravity_work += float(gravity @ (find_moment(run) - before))
             check_motion(run, bad)
             if run.contacts is not None:
                 run.contacts.check_step(
@@ -137,37 +129,10 @@ def find_set_energy(run: State) -> float:
     return energy.kinetic + abs(energy.elastic) + energy.contact
 
 
-def find_moment(run: State) -> tuple[Floats, Floats]:
-    """``sum m u`` [kg m] and ``sum m v`` [kg m/s] half a step before, (3,) each."""
-    place, speed = run.assembly.moment()
-    if run.rigid is not None:
-        place, speed = (a + b for a, b in zip((place, speed), run.rigid.moment(), strict=True))
-    return place, speed
-
-
-def compute_gravity_work(
-    gravity: Floats,
-    before: tuple[Floats, Floats],
-    after: tuple[Floats, Floats],
-    step: float,
-) -> float:
-    """Work of gravity (k + 1, 3) [m/s^2] in a window of k steps [J], by `find_moment` at its ends.
-
-    ``sum dt (g(t_k) + g(t_k+1))/2 P(k+1/2)``: its mean multiplies the way of the centre of mass,
-    exactly; for the rest the momentum P within the window is the derivative of the cubic through
-    places and momenta at its ends.
-    """
-    acting = 0.5 * (gravity[:-1] + gravity[1:])
-    mean = acting.mean(axis=0)
-    work = float(mean @ (after[0] - before[0]))
-    if not (acting - mean).any():
-        return work
-    (start, first), (end, last) = ((m - 0.5 * step * p, p) for m, p in (before, after))
-    count = len(acting)
-    s = np.arange(1, count + 1)[:, None] / count
-    way = (end - start) / (count * step)
-    momentum = 6 * s * (1 - s) * way + (1 - s) * (1 - 3 * s) * first + s * (3 * s - 2) * last
-    return work + float(step * ((acting - mean) * momentum).sum())
+def find_moment(run: State) -> Floats:
+    """``sum m u`` [kg m], (3,), whose change times gravity is its work."""
+    moment = run.assembly.moment()
+    return moment if run.rigid is None else moment + run.rigid.moment()
 
 
 def check_motion(run: State, bad: float) -> None:
@@ -210,13 +175,10 @@ def raise_inverted(run: State) -> None:
 def find_inverted(bodies: Sequence[Body], displacement: Floats) -> tuple[str, int, str] | None:
     """The body and element whose volume is most negative, and a sentence; None if none is."""
     found: list[tuple[float, str, int, int]] = []
-    start = 0
-    for body in bodies:
+    ends = np.cumsum([len(body.nodes) for body in bodies])[:-1]
+    for body, moved in zip(bodies, np.split(displacement, ends), strict=True):
         if body.rigid:
-            start += len(body.nodes)
             continue
-        moved = displacement[start : start + len(body.nodes)]
-        start += len(body.nodes)
         jacobian = 1 + compute_volume_change(
             compute_displacement_gradient(body.gradients[0], body.elements, moved)
         )

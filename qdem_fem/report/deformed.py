@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from qdem_fem.files import Floats, Integers
+from qdem_fem.files import Floats
 from qdem_fem.report.figures import choose_unit, round_below, write_figure
 
 if TYPE_CHECKING:
@@ -24,8 +24,8 @@ AZIMUTH, ELEVATION = -62.0, 24.0
 HEIGHT, WIDTHS, BAR_WIDTH = 4.4, (2.9, 7.7), 1.8
 """Of the picture of bodies, least and greatest width, and what its colour bar takes [in]: a tall
 body in a wide frame would stand beside an empty half."""
-FEATURE = np.cos(np.radians(30))
-"""Cosine of the angle between two faces above which their edge is no feature of the shape."""
+FEATURE = np.radians(30)
+"""Angle between two faces below which their edge is no feature of the shape [rad]."""
 OUTLINED = 20
 """Most bodies whose undeformed edges are drawn: of a heap they would hide it."""
 
@@ -122,27 +122,15 @@ def _outline(panel: Axes, bodies: Sequence[Any], frame: Floats) -> None:
     """Sharp edges of the undeformed bodies."""
     from matplotlib.collections import LineCollection
 
-    lines = [
-        (body.nodes @ frame.T)[find_feature_edges(body.nodes, body.surface)] for body in bodies
-    ]
+    from qdem_fem.grains import find_edge_angles, find_surface_edges
+
+    lines = []
+    for body in bodies:
+        edges = find_surface_edges(body.surface)
+        _, angle = find_edge_angles(body.nodes, body.surface, edges)
+        lines.append((body.nodes @ frame.T)[edges.nodes[np.abs(angle) > FEATURE]])
     places = np.concatenate(lines)[:, :, [0, 2]]
     panel.add_collection(LineCollection(list(places), colors="#555555", linewidths=0.5))
-
-
-def find_feature_edges(nodes: Floats, faces: Integers) -> Integers:
-    """Edges (e, 2) whose two faces meet at a sharp angle, or that have not two faces."""
-    normal = np.cross(
-        nodes[faces[:, 1]] - nodes[faces[:, 0]], nodes[faces[:, 2]] - nodes[faces[:, 0]]
-    )
-    normal /= np.linalg.norm(normal, axis=1)[:, None]
-    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    owner = np.repeat(np.arange(len(faces)), 3)
-    order = np.lexsort(edges.T)
-    edges, owner = edges[order], owner[order]
-    unique, first, count = np.unique(edges, axis=0, return_index=True, return_counts=True)
-    second = np.minimum(first + 1, len(owner) - 1)
-    cosine = np.einsum("ij,ij->i", normal[owner[first]], normal[owner[second]])
-    return np.asarray(unique[(count != 2) | (cosine < FEATURE)])
 
 
 def _draw_frame(panel: Axes, frame: Floats) -> None:

@@ -30,12 +30,6 @@ FEWEST_SAMPLES = 5
 """Samples of a record that has spectra: with rest before them, second differences leave four."""
 
 
-def find_velocities(time: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Times half-way between samples and velocity [m/s] there, (k - 1,) each, of an even series of
-    displacements (k,) [m]."""
-    return (time[1:] + time[:-1]) / 2, np.diff(values) / _interval(time)
-
-
 def find_accelerations(time: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Times and acceleration [m/s2], (k - 2,) each, of an even series of displacements (k,) [m]."""
     return time[1:-1], np.diff(values, 2) / _interval(time) ** 2
@@ -60,7 +54,7 @@ def find_acceleration_spectrum(time: Floats, values: Floats) -> tuple[Floats, Fl
 def find_grain_mobility(time: Floats, values: Floats, load: Series) -> tuple[Floats, Floats]:
     """Frequencies [Hz] and |V|/|F| [m/(s N)] of a grain displaced by ``values`` [m] under a load
     (k, 3) [N] (Fig. 12), smoothed as spectra are; nan where the load is silent."""
-    when, velocity = find_velocities(time, values)
+    when, velocity = (time[1:] + time[:-1]) / 2, np.diff(values) / _interval(time)
     force = average_between(time, load.times, load.values[:, 2])
     frequency, ratio = find_mobility(when, force, velocity, BANDWIDTH)
     seen = frequency <= HIGHEST

@@ -124,11 +124,6 @@ class RigidBodies:
             np.ascontiguousarray(self.arm[chosen]),
         )
 
-    def number_of(self, node: int) -> int:
-        """The rigid body that a node is of, in the numbers of all bodies; -1: none."""
-        row = int(self.of_place[self.assembly.place[node]])
-        return int(self.body[row]) if row >= 0 else -1
-
     def set_field(self, body: Body, name: str, values: Floats) -> None:
         """Take a displacement or velocity (n, 3) of all nodes of a body.
 
@@ -195,10 +190,9 @@ class RigidBodies:
         turning = (motion.spin * self.omega(motion.spin)).sum(axis=1)
         return np.asarray(0.5 * (self.mass * (motion.velocity**2).sum(axis=1) + turning))
 
-    def moment(self) -> tuple[Floats, Floats]:
-        """``sum M d`` [kg m] and ``sum M V`` [kg m/s], (3,) each."""
-        state = self._every
-        return self.mass @ state.shift, self.mass @ state.velocity
+    def moment(self) -> Floats:
+        """``sum M d`` [kg m], (3,)."""
+        return np.asarray(self.mass @ self._every.shift)
 
     def stored(self) -> dict[str, NDArray[Any]]:
         """The state, to the bit."""

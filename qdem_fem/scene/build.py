@@ -15,6 +15,11 @@ if TYPE_CHECKING:
     from qdem_fem.mesh import TetMesh
     from qdem_fem.tables import Prepared
 
+OPTIONS = (
+    "strain", "precision", "step", "safety", "gravity", "threads", "device", "mass_scaling",
+)  # fmt: skip
+"""Keys of the table ``[simulation]`` that are options of a `qdem_fem.Simulation`."""
+
 
 def make_simulation(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
     """The `qdem_fem.Simulation` of a scene and its bodies by name.
@@ -40,18 +45,8 @@ def make_simulation(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
         )
         for body in scene.body
     }
-    run = Simulation(
-        list(bodies.values()),
-        strain=table.strain,
-        precision=table.precision,
-        step=table.step,
-        safety=table.safety,
-        gravity=table.gravity,
-        threads=table.threads,
-        device=table.device,
-        mass_scaling=table.mass_scaling,
-        contact=choose_contact(scene.contact),
-    )
+    options: dict[str, Any] = {name: getattr(table, name) for name in OPTIONS}
+    run = Simulation(list(bodies.values()), contact=choose_contact(scene.contact), **options)
     problems = []
     for step in prepared.conditions:
         arguments = [_argument(value, table.method) for value in step.arguments]

@@ -115,7 +115,8 @@ def _meshes(text: SceneText, folder: Path) -> tuple[dict[str, TetMesh], list[Pro
             problems.append(wrong.problem)
             continue
         except MeshError as error:
-            problems.append(Problem(f"{key}.mesh", describe_error(error), _of_file(error)))
+            file = error.where if error.where.startswith("mesh file") else ""
+            problems.append(Problem(f"{key}.mesh", describe_error(error), file))
             continue
         for region in regions:
             if region not in mesh.element_sets:
@@ -137,10 +138,6 @@ def list_mesh_tables(text: SceneText) -> Iterator[tuple[str, str, Mesh, list[str
         elif isinstance(entry, dict) and isinstance(entry.get("name"), str):
             with suppress(ValidationError):
                 yield key, entry["name"], Mesh.model_validate(entry.get("mesh")), []
-
-
-def _of_file(error: MeshError) -> str:
-    return error.where if error.where.startswith("mesh file") else ""
 
 
 def _condition(

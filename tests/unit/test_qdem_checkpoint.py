@@ -59,7 +59,7 @@ CASES: dict[str, dict[str, Any]] = {
     "paper": {},
     "single": {"precision": "float32"},
     "viscous": {"material": {"shear_viscosity": 2e4}},
-    "gravity": {"gravity": q.Series([0, 1e-4], [[0, 0, 0], [0, 0, -9.81]])},
+    "gravity": {"gravity": (0, 0, -9.81)},
     "driven": {"condition": shaken, "strain": "svk"},
     "all": {
         "condition": shaken, "precision": "float32", "strain": "svk",

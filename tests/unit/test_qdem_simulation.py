@@ -107,15 +107,6 @@ def test_free_fall_is_exact() -> None:
     assert energy.external == pytest.approx(energy.kinetic, rel=1e-10)
 
 
-def test_gravity_that_changes() -> None:
-    """g(t) = a t: the speed is the trapezoidal sum of g, which is a t^2/2 exactly."""
-    body = stone()
-    run = alone(body, gravity=lambda t: [0.0, 0.0, -100 * t])
-    run.advance(200 * run.step)
-    used = np.unique(body.elements)
-    np.testing.assert_allclose(body.velocity[used, 2], -50 * run.time**2, rtol=1e-11)
-
-
 # --- conservation --------------------------------------------------------------------------------
 
 
@@ -173,7 +164,6 @@ LOADS: dict[str, tuple[Any, Callable[[q.Simulation, q.Body], Any]]] = {
         ),
     ),
     "gravity": ([0, 0, -9.81], lambda run, body: None),
-    "changing gravity": (q.ramp(0.1, [0, 0, -9.81]), lambda run, body: None),
 }
 
 

@@ -345,6 +345,7 @@ BAD_CALLS: dict[str, tuple[str, Callable[[], object]]] = {
     "step 0": ("0", lambda: free(OTHER, step=0)),
     "text step": ("'1'", lambda: free(OTHER, step="1")),
     "safety": ("-1", lambda: free(OTHER, safety=-1)),
+    "changing gravity": ("change with time", lambda: free(OTHER, gravity=q.ramp(1.0, [0, 0, 1]))),
     "mass scaling": ("nan", lambda: free(OTHER, mass_scaling=nan)),
     "gravity": ("1 component", lambda: free(OTHER, gravity=9.81)),
     "no bodies": ("at least one", lambda: q.Simulation([])),

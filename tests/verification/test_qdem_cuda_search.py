@@ -94,11 +94,11 @@ def test_a_list_differs_where_a_sphere_does() -> None:
 
 
 @pytest.mark.parametrize("parts", [1, 5, 64])
-def test_energy_and_momentum_are_summed(simulator: Executor, parts: int) -> None:
+def test_energy_and_moment_are_summed(simulator: Executor, parts: int) -> None:
     """Every p-th node by one thread, 23 nodes in all: to the rounding of as many terms."""
     random = np.random.default_rng(parts)
     (u, v), mass = random.uniform(1.0, 2.0, (2, 23, 4)), random.uniform(1.0, 2.0, 23)
-    expected = [(mass[:, None] * v[:, :3] ** 2).sum(), *mass @ u[:, :3], *mass @ v[:, :3]]
+    expected = [(mass[:, None] * v[:, :3] ** 2).sum(), *mass @ u[:, :3]]
     found = simulator.submit(sum_motion, u, v, mass, parts).result()
     np.testing.assert_allclose(found, expected, rtol=3 * 23 * EPS)
 

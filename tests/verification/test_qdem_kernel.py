@@ -366,12 +366,13 @@ from qdem_fem.mesh.generation import make_box_mesh
 
 mesh = make_box_mesh((2.4, 0.25, 0.22), (72, 12, 11), "five")
 body = q.Body(mesh, q.Material(45e9, 0.167, 2350.0))
-run = q.Simulation([body], threads=1, gravity=lambda t: (0, 0, np.sin(1e3 * t)))
+run = q.Simulation([body], threads=1, gravity=(0, 0, -9.81))
 run.fix(body, body.nodes[:, 0] == 0)
 run.advance(run.step)
 time.sleep(0.3)  # threads of BLAS that the critical step woke are asleep again
 clock, cpu = time.perf_counter(), time.process_time()
-run.advance(600 * run.step)
+for _ in range(40):
+    run.advance(15 * run.step)
 print((time.process_time() - cpu) / (time.perf_counter() - clock))
 """
 

@@ -446,12 +446,11 @@ def test_held_and_driven_freedoms() -> None:
     body = spun(brick(), [1.0, 2, 3], [1.0, 1, 1])
     run = q.Simulation([body], step=1e-4, contact=FAR, threads=1)
     started = total(run)
-    fixed = run.fix(body, low)
+    run.fix(body, low)
     run.load(body, 0, [1.0, 2, 3])
     run.advance(0.01)
     assert not body.displacement.any()
     assert not body.velocity.any()
-    np.testing.assert_allclose(run.reaction(fixed), [-1.0, -2, -3], rtol=1e-12)
     assert run.energy().kinetic == 0.0
     assert run.energy().external == pytest.approx(-started, rel=1e-12)
 
@@ -466,12 +465,11 @@ def test_held_and_driven_freedoms() -> None:
     body = brick()
     run = q.Simulation([body], step=1e-4, contact=FAR, threads=1)
     mass = body.rigid_mass.mass
-    driven = run.prescribe(body, body.nodes[:, 2] > -1, "x", lambda t: 3 * t**2)
+    run.prescribe(body, body.nodes[:, 2] > -1, "x", lambda t: 3 * t**2)
     run.advance(0.1)
     np.testing.assert_allclose(body.displacement, np.tile([0.03, 0, 0], (27, 1)), atol=1e-12)
     assert run.energy().kinetic == pytest.approx(mass * 0.6**2 / 2, rel=1e-9)
     assert run.energy().external == pytest.approx(run.energy().kinetic, rel=1e-2)
-    assert run.reaction(driven)[0] == pytest.approx(6 * mass, rel=1e-5)
 
 
 @pytest.mark.parametrize(

@@ -152,9 +152,7 @@ def twin(
         bulk_viscosity=20.0 * viscous,
     )  # fmt: skip
     body = q.Body((mesh.nodes, mesh.elements), material, name="block")
-    gravity = (
-        None if conditions is no_condition else (lambda t: (0.3, 0.0, -9.81 * np.cos(300 * t)))
-    )
+    gravity = None if conditions is no_condition else (0.3, 0.0, -9.81)
     run = q.Simulation(
         [body], strain=strain, precision=precision, step=1.5e-3, gravity=gravity, threads=1,
         device=device,

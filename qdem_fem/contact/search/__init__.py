@@ -1,6 +1,7 @@
 """Which pairs may touch."""
 
 from qdem_fem.contact.search import cells
+from qdem_fem.contact.search.cells import longer
 from qdem_fem.contact.search.pairs import (
     NO_IMAGE,
     Pairs,
@@ -14,11 +15,10 @@ from qdem_fem.contact.search.periodic import (
     check_extents,
     check_joined,
     extents,
-    find_outer_nodes,
     find_partners,
 )
 
 __all__ = [
     "NO_IMAGE", "Pairs", "PeriodicWidth", "cells", "check_extents", "check_joined", "choose_skin",
-    "extents", "find_near_walls", "find_outer_nodes", "find_partners", "make_pairs", "renew_pairs",
+    "extents", "find_near_walls", "find_partners", "longer", "make_pairs", "renew_pairs",
 ]  # fmt: skip

@@ -193,9 +193,9 @@ def find_pairs(
 
 @njit(cache=True)
 def longer(array: Any, least: int) -> Any:  # pragma: no cover
-    """A copy with room for at least so many, and twice as many as before."""
-    grown = np.empty(max(2 * array.size, least), array.dtype)
-    grown[: array.size] = array
+    """A copy with room for at least so many rows, and twice as many as before."""
+    grown = np.empty((max(2 * len(array), least), *array.shape[1:]), array.dtype)
+    grown[: len(array)] = array
     return grown
 
 

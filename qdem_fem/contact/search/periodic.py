@@ -10,8 +10,8 @@ and n is found when pairs are looked for, and kept with them.  So a force depend
 wherever the side is, and a spring does not know that its bodies cross it.
 
 Where a body and its own image would touch, contact of a body with itself would be needed, which is
-not computed: such a body is refused.  A slab as wide as the width, whose faces `find_partners` has
-joined, is one with its images, and allowed.
+not computed: such a body is refused, and so is one whose faces `find_partners` has joined along the
+axis.
 """
 
 from __future__ import annotations
@@ -21,7 +21,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from qdem_fem.files import ConditionError, Floats, Integers, is_real
 
@@ -31,8 +30,8 @@ if TYPE_CHECKING:
 
 WHERE = "contact, periodic"
 NEAR = 1e-6
-"""Share of the width within which a joined face is a width from its partner, and a wall along it.
-Mesh files keep single precision or a few digits."""
+"""Share of the width within which joined nodes do not lie apart along the axis.  Mesh files keep
+single precision or a few digits."""
 
 
 @dataclass(frozen=True)
@@ -96,44 +95,8 @@ def find_partners(
     return a, b[place]
 
 
-def find_outer_nodes(
-    body: Body, master: Integers, side: PeriodicWidth | None
-) -> tuple[Integers, bool]:
-    """Nodes of a body that others may touch (k,), and whether it is one with its images.
-
-    Faces that `periodic` has joined across the width lie within the body and its images: of two
-    nodes that are one, the lower is taken where an outer face has it.  ``master`` (n,): the node
-    that each moves with.
-    """
-    none = np.zeros(0, np.int64)
-    low, high = (none, none) if side is None else find_joined_twins(body.nodes, master, side)
-    within = np.isin(body.surface, low).all(axis=1) | np.isin(body.surface, high).all(axis=1)
-    return np.setdiff1d(body.surface[~within], high), len(low) > 0
-
-
-def find_joined_twins(
-    nodes: Floats, master: Integers, side: PeriodicWidth
-) -> tuple[Integers, Integers]:
-    """Nodes ``low`` and ``high`` of a body that are one node a width apart: periodic faces.
-
-    ``nodes`` (n, 3) [m]; ``master`` (n,): the node that each moves with.
-    """
-    shared = np.flatnonzero(np.bincount(master, minlength=len(nodes))[master] > 1)
-    if not len(shared):
-        return shared, shared
-    from scipy.spatial import cKDTree
-
-    tree = cKDTree(nodes[shared])
-    near = NEAR * side.width
-    distance, found = tree.query(nodes[shared] + side.way, distance_upper_bound=near)
-    there = np.isfinite(distance)
-    low, high = shared[there], shared[found[there]]
-    one = master[low] == master[high]
-    return low[one], high[one]
-
-
 def check_joined(body: Body, master: Integers, side: PeriodicWidth, where: str) -> None:
-    """Raise `ConditionError` for faces that are joined along the axis, but not over the width."""
+    """Raise `ConditionError` for faces that are joined along the axis."""
     apart = body.nodes[:, side.number] - body.nodes[master, side.number]
     most = float(np.abs(apart).max(initial=0.0))
     if most > NEAR * side.width:
@@ -141,7 +104,7 @@ def check_joined(body: Body, master: Integers, side: PeriodicWidth, where: str) 
             f"faces of {body.name} are joined over {most:.4g} m along {side.axis}, where contact "
             f"repeats every {side.width:.4g} m",
             where=where,
-            remedy="make the body as wide as the width, or do not join it along this axis",
+            remedy="do not join it along this axis",
         )
 
 
@@ -159,18 +122,12 @@ def extents(along: Floats, first: Integers) -> Floats:
 
 
 def check_extents(
-    bodies: Sequence[Body],
-    size: Floats,
-    joined: NDArray[np.bool_],
-    reach: float,
-    side: PeriodicWidth,
-    where: str,
+    bodies: Sequence[Body], size: Floats, reach: float, side: PeriodicWidth, where: str
 ) -> float:
     """Raise `ConditionError` for a body that comes within ``reach`` [m] of its own image.
 
-    ``size``: `extents` of the bodies along the axis [m]; ``joined``: whether a body's faces are;
-    then it may be as wide as the width, and no wider.  Returns by how much the reach could be more
-    [m].
+    ``size``: `extents` of the bodies along the axis [m].  Returns by how much the reach could be
+    more [m].
     """
     room = side.width / 2 - reach
     if room <= 0:
@@ -180,14 +137,13 @@ def check_extents(
             where=where,
             remedy="take a wider layer",
         )
-    left = np.where(joined, side.width * (1 + NEAR), side.width - reach) - size
+    left = side.width - reach - size
     if (left <= 0).any():
         at = int(np.argmin(left))
         raise ConditionError(
             f"{bodies[at].name} is {size[at]:.4g} m long along {side.axis}: with a reach of "
             f"contact of {reach:.4g} m it would touch its own image, {side.width:.4g} m from it",
             where=where,
-            remedy="take a wider layer, or, for a deformable slab as wide as the layer, join "
-            "its faces by periodic",
+            remedy="take a wider layer",
         )
-    return min(room, float(left[~joined].min(initial=np.inf)))
+    return min(room, float(left.min()))

@@ -131,24 +131,20 @@ def check_contact_number(value: Any, name: str, *, above: bool) -> None:
 def check_contact_planes(planes: Sequence[ContactPlane]) -> None:
     """Raise `ConditionError` for a wall without a place, a direction or a friction."""
     for number, plane in enumerate(planes):
-        _check_plane(plane, f"plane.{number}")
-
-
-def _check_plane(plane: ContactPlane, name: str) -> None:
-    for quantity in ("point", "normal"):
-        try:
-            vector = np.asarray(getattr(plane, quantity), dtype=float)
-        except (TypeError, ValueError):
-            vector = np.zeros(0)
-        if vector.shape != (3,) or not np.isfinite(vector).all():
-            raise ConditionError(
-                f"{getattr(plane, quantity)!r} are not three numbers",
-                where=f"contact, {name}.{quantity}",
-            )
-        if quantity == "normal" and not vector.any():
-            raise ConditionError("it has no direction", where=f"contact, {name}.normal")
-    if plane.friction is not None:
-        check_contact_number(plane.friction, f"{name}.friction", above=False)
+        name = f"plane.{number}"
+        for quantity, given in (("point", plane.point), ("normal", plane.normal)):
+            try:
+                vector = np.asarray(given, dtype=float)
+            except (TypeError, ValueError):
+                vector = np.zeros(0)
+            if vector.shape != (3,) or not np.isfinite(vector).all():
+                raise ConditionError(
+                    f"{given!r} are not three numbers", where=f"contact, {name}.{quantity}"
+                )
+            if quantity == "normal" and not vector.any():
+                raise ConditionError("it has no direction", where=f"contact, {name}.normal")
+        if plane.friction is not None:
+            check_contact_number(plane.friction, f"{name}.friction", above=False)
 
 
 def check_planes_along(periodic: Any, planes: Sequence[ContactPlane]) -> None:

@@ -11,18 +11,11 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from qdem_fem.contact.search import longer
 from qdem_fem.contact.surface.arrays import Near, Surface
 from qdem_fem.contact.surface.geometry import blend
 from qdem_fem.files import Integers
 from qdem_fem.kernel import row
-
-
-@njit(cache=True)
-def grown(values: Any, count: int) -> Any:  # pragma: no cover
-    """Room for twice as many."""
-    longer = np.empty((2 * count, *values.shape[1:]), values.dtype)
-    longer[:count] = values[:count]
-    return longer
 
 
 @njit(cache=True)
@@ -78,12 +71,12 @@ def find_points_nearby(
                 for f in range(first_face[b], first_face[b + 1]):
                     if are_boxes_near(points, points, q, face_low, face_high, f, reach):
                         if total == len(faces):
-                            faces = grown(faces, total)
+                            faces = longer(faces, total + 1)
                         faces[total] = f
                         total += 1
                 if total > begin:
                     if count == len(found):
-                        found = grown(found, count)
+                        found = longer(found, count + 1)
                     found[count, 0], found[count, 1], found[count, 2] = q, b, begin
                     count += 1
     first = np.empty(count + 1, np.int64)
@@ -109,7 +102,7 @@ def find_edges_nearby(
                 for j in range(first_edge[b], first_edge[b + 1]):
                     if are_boxes_near(edge_low, edge_high, i, edge_low, edge_high, j, reach):
                         if count == len(found):
-                            found = grown(found, count)
+                            found = longer(found, count + 1)
                         found[count, 0], found[count, 1] = i, j
                         count += 1
     return found[:count].copy()

@@ -34,6 +34,7 @@ from qdem_fem.contact.spheres import (
     find_body_value,
 )
 from qdem_fem.files import Floats, Integers
+from qdem_fem.mesh import find_area_vectors
 
 DEPTH = 0.1
 """Greatest depth, over the median edge of the surfaces."""
@@ -100,9 +101,7 @@ def find_sharp_edges(nodes: Floats, faces: Integers) -> tuple[Integers, Integers
     ``nodes`` (n, 3) [m], ``faces`` (f, 3) outward.  The second is (e, 2): the nodes opposite of
     each edge in its two faces.
     """
-    across = np.cross(
-        nodes[faces[:, 1]] - nodes[faces[:, 0]], nodes[faces[:, 2]] - nodes[faces[:, 0]]
-    )
+    across = find_area_vectors(nodes, faces)
     normal = across / np.linalg.norm(across, axis=1, keepdims=True)
     seen: dict[tuple[int, int], tuple[int, int]] = {}
     edges, opposite = [], []

@@ -183,7 +183,7 @@ def count_block_rows(viscous: Any) -> int:
 @compiled()
 def move_piece(
     start: int, stop: int, shifts: Any, first: int, last: int, forces: Any, inverse_mass: Any,
-    displacement: Any, velocity: Any, step: Any, gravity: Any, k: int,
+    displacement: Any, velocity: Any, step: Any, gravity: Any,
 ) -> None:  # fmt: skip
     """Velocity Verlet for the nodes ``start`` to ``stop``: ``v += dt f/m``, ``u += dt v``.
 
@@ -201,7 +201,7 @@ def move_piece(
         change = load_row(forces, here) * (step * inverse_mass[node])
         clear_row(forces, here)
         if gravity is not None:
-            change = change + load_row(gravity, 4 * k) * step
+            change = change + load_row(gravity, 0) * step
         faster = load_row(velocity, at) + change
         store_row(velocity, at, faster)
         store_row(displacement, at, load_row(displacement, at) + faster * step)
@@ -276,7 +276,7 @@ def build_window(variant: str) -> Any:
         """Compute up to ``steps`` time steps; returns how many, and the count of bad elements.
 
         ``law``: one of `LAWS`; ``viscous``: True or None; ``table`` (steps + 1, series):
-        amplitudes at the times of the steps; ``gravity`` (4 (steps + 1),) [m/s^2] or None;
+        amplitudes at the times of the steps; ``gravity`` (4,) [m/s^2] or None;
         ``work`` (3,) [J], of the loads, of prescribed motion and taken by viscosity, is added to.
         Stops after a step that met an inverted element or NaN.
         """
@@ -300,13 +300,13 @@ def build_window(variant: str) -> Any:
                     move_piece(
                         piece_first[p], piece_stop[p], window_shift, piece_window[p],
                         piece_window[p + 1], forces, inverse_mass, displacement, velocity, step,
-                        gravity, k,
+                        gravity,
                     )  # fmt: skip
             for s in prange(piece_first.size - shared):
                 move_piece(
                     piece_first[shared + s], piece_stop[shared + s], window_shift,
                     piece_window[shared + s], piece_window[shared + s + 1], forces, inverse_mass,
-                    displacement, velocity, step, gravity, k,
+                    displacement, velocity, step, gravity,
                 )  # fmt: skip
             work[1] += apply_constraints(held, table[k + 1], state, step)
             if viscous is not None:

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import NDArray
 
 from qdem_fem.bodies import EVERY, Assembly, Body, Given
 from qdem_fem.element import Strain
@@ -117,16 +117,10 @@ class CudaAssembly(Assembly):
     window_work = 2_000_000_000
 
     def __init__(
-        self,
-        bodies: Sequence[Body],
-        master: Integers,
-        strain: Strain,
-        dtype: DTypeLike,
-        threads: int | None,
-        density_factor: Floats | None = None,
+        self, bodies: Sequence[Body], master: Integers, strain: Strain, *more: Any
     ) -> None:
         require_gpu()
-        super().__init__(bodies, master, strain, dtype, threads, density_factor)
+        super().__init__(bodies, master, strain, *more)
         layout = self.packed.layout
         lanes = count_lane(self.dtype)
         width = kernel.ROWS_VISCOUS if self.viscous else kernel.ROWS_ELASTIC
@@ -144,12 +138,9 @@ class CudaAssembly(Assembly):
         """`Assembly.kinetic`; fields stay on the GPU, where no body has a frame."""
         return super().kinetic() if self.frames is not None else 0.5 * float(self._sums()[0])
 
-    def moment(self) -> tuple[Floats, Floats]:
+    def moment(self) -> Floats:
         """`Assembly.moment`; fields stay on the GPU, where no body has a frame."""
-        if self.frames is not None:
-            return super().moment()
-        found = self._sums()
-        return found[1:4], found[4:]
+        return super().moment() if self.frames is not None else self._sums()[1:]
 
     def _sums(self) -> Floats:
         return sum_motion(self.state.displacement, self.state.velocity, self._mass)
@@ -185,7 +176,7 @@ class CudaAssembly(Assembly):
         taken = int(samples.max(initial=-1)) + 1
         memory = cuda.to_device(acted.memory)
         record = cuda.to_device(np.zeros((max(taken, 1), max(len(probes.node_at), 1), 3)))
-        accelerations = np.zeros(3) if gravity is None else np.ravel(gravity)
+        accelerations = np.zeros(3) if gravity is None else gravity
         status = cuda.to_device(np.array([0, steps, 0, 0], dtype=np.int32))
         taken_by_viscosity = cuda.to_device(
             np.zeros(self._rows.shape[1] if self.viscous else 1)  # an empty array had better not be

@@ -249,8 +249,8 @@ def build_node_motion(gravity: bool) -> Any:
         """Loads, ``v += dt (f/m + g)``, ``u += dt v`` (eq. 11), constraints and probes.
 
         ``first`` (n + 1,): the node's part of ``actions`` (A, 4), ``weights`` (A, 3) and
-        ``memory`` (A, 2); ``amplitudes`` (steps + 1, series); ``accelerations`` (3 (steps + 1),)
-        [m/s^2]; ``sample``: where in ``record`` (samples, probes, 3) this step is written, or -1.
+        ``memory`` (A, 2); ``amplitudes`` (steps + 1, series); ``accelerations`` (3,) [m/s^2];
+        ``sample``: where in ``record`` (samples, probes, 3) this step is written, or -1.
         """
         if k >= status[LIMIT]:
             return
@@ -267,7 +267,7 @@ def build_node_motion(gravity: bool) -> Any:
             for c in range(3):
                 change = forces[at + c] * (step * inverse_mass)
                 if gravity:
-                    change += accelerations[3 * k + c] * step
+                    change += accelerations[c] * step
                 forces[at + c] = 0
                 faster = velocity[at + c] + change
                 velocity[at + c] = faster

@@ -1,6 +1,6 @@
 """Sums on a GPU: of all nodes, and of all numbers before each.
 
-Energy and momentum, which a march asks for behind every window: a thread adds every p-th node's
+Energy and moment, which a march asks for behind every window: a thread adds every p-th node's
 part, p threads in all, and the host adds the p sums: in a fixed order, and with a few of them to be
 read in place of two fields.
 
@@ -27,14 +27,14 @@ NUMBERS_A_THREAD = 64
 
 @cuda.jit
 def sum_motion_parts(displacement: Any, velocity: Any, mass: Any, sums: Any) -> None:
-    """``sums`` (p, 7) over every p-th node: of m v.v, of m u (3), of m v (3), in double precision.
+    """``sums`` (p, 4) over every p-th node: of m v.v, of m u (3), in double precision.
 
     ``mass`` (n,) [kg]; fields flat, four numbers a node.
     """
     part = cuda.grid(1)
     if part >= sums.shape[0]:
         return
-    energy, ux, uy, uz, vx, vy, vz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    energy, ux, uy, uz = 0.0, 0.0, 0.0, 0.0
     for node in range(part, mass.size, sums.shape[0]):
         m, at = mass[node], 4 * node
         px, py, pz = m * velocity[at], m * velocity[at + 1], m * velocity[at + 2]
@@ -42,15 +42,13 @@ def sum_motion_parts(displacement: Any, velocity: Any, mass: Any, sums: Any) -> 
         ux += m * displacement[at]
         uy += m * displacement[at + 1]
         uz += m * displacement[at + 2]
-        vx, vy, vz = vx + px, vy + py, vz + pz
     sums[part, 0] = energy
     sums[part, 1], sums[part, 2], sums[part, 3] = ux, uy, uz
-    sums[part, 4], sums[part, 5], sums[part, 6] = vx, vy, vz
 
 
 def sum_motion(displacement: Any, velocity: Any, mass: Any) -> NDArray[np.float64]:
-    """`sum_motion_parts` of all nodes, (7,), on the host."""
-    sums = cuda.device_array((min(PARTS, mass.size), 7))
+    """`sum_motion_parts` of all nodes, (4,), on the host."""
+    sums = cuda.device_array((min(PARTS, mass.size), 4))
     sum_motion_parts[grid(sums.shape[0])](displacement, velocity, mass, sums)
     found: NDArray[np.float64] = sums.copy_to_host().sum(axis=0)
     return found

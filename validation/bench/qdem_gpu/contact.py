@@ -59,7 +59,7 @@ def state_of(run: q.Simulation) -> dict[str, Any]:
         "velocity": np.concatenate([body.velocity for body in run.bodies]),
         "force": kernel.force, "spring": touching.spring, "pull": touching.force,
         "wall spring": kernel.planes.spring, "slid": kernel.slid,
-        "sums": np.concatenate([[run.assembly.kinetic()], *run.assembly.moment()]),
+        "sums": np.append(run.assembly.kinetic(), run.assembly.moment()),
         "gravity": np.array([run.motion.gravity_work]),
         "energies": np.array([energy.contact, energy.friction, energy.kinetic, energy.elastic]),
         "counts": np.array([contacts.renewals, contacts.lasted, len(touching.first)]),
