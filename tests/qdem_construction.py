@@ -69,11 +69,6 @@ def strain_finger(deformation: Floats) -> Floats:
     return (deformation @ np.swapaxes(deformation, -1, -2) - np.eye(3)) / 2
 
 
-def stress_elastic(strain: Floats, lame_first: ArrayLike, lame_second: ArrayLike) -> Floats:
-    """T_E = lambda_E tr(eps) I + 2 mu_E eps [Pa], (..., 3, 3) (eq. 2)."""
-    return isotropic(strain, lame_first, lame_second)
-
-
 def velocity_gradient(current: Floats, velocity: Floats) -> Floats:
     """L = dv dx^-1 [1/s], (..., 3, 3), from positions [m] and velocities [m/s] (eq. 5)."""
     return edge_vectors(velocity) @ np.linalg.inv(edge_vectors(current))
@@ -82,13 +77,6 @@ def velocity_gradient(current: Floats, velocity: Floats) -> Floats:
 def strain_rate(velocity_gradient: Floats) -> Floats:
     """D = (L + L^T)/2 [1/s], (..., 3, 3); the spin W = L - D makes no stress (eq. 6)."""
     return (velocity_gradient + np.swapaxes(velocity_gradient, -1, -2)) / 2
-
-
-def stress_viscous(
-    strain_rate: Floats, viscous_first: ArrayLike, viscous_second: ArrayLike
-) -> Floats:
-    """T_D = lambda_D tr(D) I + 2 mu_D D [Pa], viscosities in Pa s, (..., 3, 3) (eq. 7)."""
-    return isotropic(strain_rate, viscous_first, viscous_second)
 
 
 # --- the four cells of a tetrahedron: processes 1 to 3 -----------------------------------------
@@ -178,6 +166,6 @@ def internal_forces_constructed(
     reference, current = nodes[elements], (nodes + displacement)[elements]
     strain = strain_finger(deformation_gradient(reference, current))
     rate = strain_rate(velocity_gradient(current, velocity[elements]))
-    stress = stress_elastic(strain, *lame) + stress_viscous(rate, *viscous)  # eq. 8
+    stress = isotropic(strain, *lame) + isotropic(rate, *viscous)  # eqs 2, 7 and 8
     forces = cell_forces(current, stress)
     return particle_forces(elements, forces, len(nodes))

@@ -37,12 +37,7 @@ class Body:
     """
 
     def __init__(
-        self,
-        mesh: Any,
-        material: Material,
-        name: str = "body",
-        *,
-        rigid: Rigid = False,
+        self, mesh: Any, material: Material, name: str = "body", *, rigid: Rigid = False
     ) -> None:
         if not isinstance(name, str):
             raise ConditionError(f"{name!r} is no name", where="body", remedy="give a text")
@@ -170,8 +165,7 @@ class Body:
             chosen = np.flatnonzero(chosen)
         elif chosen.dtype.kind not in "iu" and chosen.size:
             raise ConditionError(
-                f"nodes are named by a mask or by whole numbers, not by {chosen.dtype}",
-                where=where,
+                f"nodes are named by a mask or by whole numbers, not by {chosen.dtype}", where=where
             )
         elif chosen.shape == (count,) and count > 2 and np.isin(chosen, (0, 1)).all():
             raise ConditionError(

@@ -13,11 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qdem_fem.bodies import Given
-from qdem_fem.contact.bounds import (
-    bound_allowed_contacts,
-    find_near_step,
-    shorten_step_by_contact,
-)
+from qdem_fem.contact.bounds import bound_allowed_contacts, find_near_step, shorten_step_by_contact
 from qdem_fem.contact.critical_step import CriticalStep
 from qdem_fem.contact.spheres import LOOK_AGAIN, NEAR, TOO_DEEP, SphereContact
 from qdem_fem.contact.surface import SurfaceContact, check_inside

@@ -9,12 +9,7 @@ from typing import Any, NamedTuple
 
 from numpy.typing import ArrayLike
 
-from qdem_fem.element.kinematics import (
-    IDENTITY,
-    compute_quadratic_energy,
-    isotropic,
-    transposed,
-)
+from qdem_fem.element.kinematics import IDENTITY, compute_quadratic_energy, isotropic, transposed
 from qdem_fem.element.stress import Nine, compute_viscous_stress
 from qdem_fem.files import Floats
 

@@ -11,11 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from qdem_fem.files import Floats, Integers, MeshError
-from qdem_fem.grains.measures import (
-    find_surface_edges,
-    integrate_polyhedron,
-    number_edges,
-)
+from qdem_fem.grains.measures import find_surface_edges, integrate_polyhedron, number_edges
 from qdem_fem.mesh import TetMesh, name_some
 
 SPOKE = 0.5

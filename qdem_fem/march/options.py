@@ -12,11 +12,7 @@ from qdem_fem.element import MEASURES
 from qdem_fem.files import ConditionError, Driver, is_real
 
 Contact = SphereContact | SurfaceContact
-WORDS = {
-    "strain": tuple(MEASURES),
-    "precision": ("float64", "float32"),
-    "device": ("cpu", "cuda"),
-}
+WORDS = {"strain": tuple(MEASURES), "precision": ("float64", "float32"), "device": ("cpu", "cuda")}
 
 
 def list_bodies(bodies: Any) -> list[Body]:

@@ -23,11 +23,7 @@ UNSTABLE_GROWTH = 10.0
 
 
 def march(
-    run: State,
-    steps: int,
-    stride: int,
-    nodes: Integers,
-    progress: Callable[[float], None] | None,
+    run: State, steps: int, stride: int, nodes: Integers, progress: Callable[[float], None] | None
 ) -> Samples:
     """Compute ``steps``; returns the displacement of ``nodes`` every ``stride`` steps.
 

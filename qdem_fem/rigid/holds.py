@@ -29,12 +29,7 @@ class RigidHold:
 
 
 def find_hold(
-    own: RigidMass,
-    arm: Floats,
-    component: Integers,
-    series: Integers,
-    weight: Floats,
-    where: str,
+    own: RigidMass, arm: Floats, component: Integers, series: Integers, weight: Floats, where: str
 ) -> RigidHold:
     """The hold of a body by components of some nodes.
 

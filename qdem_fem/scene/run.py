@@ -166,10 +166,7 @@ def run_static(prepared: Prepared, run: Any, bodies: dict[str, Any], folder: Run
     """
     started, cpu = time.perf_counter(), time.process_time()
     answer = run.relax(tolerance=prepared.scene.simulation.tolerance)
-    cost = {
-        "cpu_s": time.process_time() - cpu,
-        "wall_s": time.perf_counter() - started,
-    }
+    cost = {"cpu_s": time.process_time() - cpu, "wall_s": time.perf_counter() - started}
     probes = {name: (bodies[body], nodes) for name, (body, nodes) in prepared.probes.items()}
     names = ("residual", "error_estimate", "steps")
     done = Done(run, bodies, None, cost, {name: float(getattr(answer, name)) for name in names})

@@ -2,6 +2,4 @@
 
 from qdem_fem.contact.cuda.sphere_state import CudaSphereContacts
 
-__all__ = [
-    "CudaSphereContacts",
-]
+__all__ = ["CudaSphereContacts"]

@@ -11,15 +11,7 @@ import numpy as np
 from numba import njit
 
 from qdem_fem import kernel as compiling
-from qdem_fem.contact.spheres import (
-    GO_ON,
-    LOOK_AGAIN,
-    TOO_DEEP,
-    minus,
-    put_row,
-    series,
-    slider,
-)
+from qdem_fem.contact.spheres import GO_ON, LOOK_AGAIN, TOO_DEEP, minus, put_row, series, slider
 from qdem_fem.contact.spheres import law as contact_kernel
 from qdem_fem.contact.surface import geometry as contact_surface_geometry
 from qdem_fem.contact.surface.geometry import (
