@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
 from rigid_lcp import BodySpace
-
-Floats = NDArray[np.float64]
+from rigid_lcp.arrays import Floats
 
 
 def contact_rows(normal: Floats, arm: Floats) -> Floats:

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rigid_lcp import FrictionProblem
+from rigid_lcp.arrays import Floats
 from rigid_lcp.unique.micro_displacements import (
     bodies_of,
     contact_stiffness,
     free_motion,
     mass_free_jacobian,
 )
-
-Floats = NDArray[np.float64]
 
 
 def find_least_forces(problem: FrictionProblem, stiffness: ArrayLike = 1.0) -> Floats:

@@ -8,17 +8,16 @@ from __future__ import annotations
 from math import cos, sin, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from rigid_lcp import Disc, HalfSpace, Polygon, Polyhedron, Scene, Simulation
+from rigid_lcp.arrays import Floats
 from rigid_lcp.motion.state import Motion
 from rigid_lcp.scene.simulation import Method
 from rigid_lcp.shapes.rotations import quaternion_of_rotation, quaternion_rate, rotate
 from tests.rigid_solids import ballast_stone
 from validation.bench.rigid.scenes import DENSITY, FLOOR, G, gravity_on
 
-Floats = NDArray[np.float64]
 EXACT = {"rtol": 1e-13, "atol": 1e-13, "method": "DOP853"}
 """How SciPy solves the equations of motion: to round-off, as good as a closed form here."""
 

@@ -9,15 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, friction_problem
 from tests.rigid_collision_sets import contact_rows
 from validation.bench.rigid import packings
 from validation.bench.rigid.friction_problems import read_problem
 
-Floats = NDArray[np.float64]
 GRAVITY, STEP = 9.81, 1e-3
 
 

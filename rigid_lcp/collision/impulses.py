@@ -30,8 +30,9 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.collision.passing import SPEED_ROUND_OFF
 from rigid_lcp.collision.restitution_scale import Share
 from rigid_lcp.errors import ProblemError, UsageError
@@ -51,8 +52,6 @@ from rigid_lcp.friction.problem import (
     require_number,
     require_whole,
 )
-
-Floats = NDArray[np.float64]
 
 COLLISION_ROUNDS, COLLISION_ROUNDS_ROUGH = 500, 50
 """Rounds of a collision until the rest ends without restitution: without friction, where masses of
@@ -174,7 +173,7 @@ def collide(
 
 
 def run_collision_round(
-    bodies: BodySpace, velocity: Floats, taking: NDArray[np.int64], eps: Floats, mu: Floats,
+    bodies: BodySpace, velocity: Floats, taking: Ints, eps: Floats, mu: Floats,
     dim: int, law: Law, tolerance: float,
 ) -> tuple[Floats, FrictionSolution, float, float]:  # fmt: skip
     """Impulses of one round on the contacts that take part; the solution, its error; the factor of

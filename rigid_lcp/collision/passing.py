@@ -27,12 +27,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Bools, Floats
 from rigid_lcp.friction.problem import BodySpace, FrictionSolution
 
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 Solve = Callable[[BodySpace, Floats, Floats], tuple[FrictionSolution, float]]
 """Impulses of the contacts of J with relative velocities q (nc, dim) and friction (nc,), and their
 error [-]."""
@@ -88,15 +86,15 @@ class Impulses:
     """Whether approaching contacts were closed without restitution as rounds were too many."""
 
 
-def find_bouncing(closing: Closing) -> Flags:
+def find_bouncing(closing: Closing) -> Bools:
     """Contacts (nc,) that close within the step and approach faster than ``slow``."""
     c = closing
     closes = c.gap + 0.5 * c.h * c.offset[:, 0] <= 0
-    found: Flags = closes & (c.before < -c.slow) & (c.restitution > 0)
+    found: Bools = closes & (c.before < -c.slow) & (c.restitution > 0)
     return found
 
 
-def find_contact_shift(closing: Closing, bounce: Flags, turning: Floats | float = 0.0) -> Floats:
+def find_contact_shift(closing: Closing, bounce: Bools, turning: Floats | float = 0.0) -> Floats:
     """What is added to u (nc, dim) so that ``u_N`` may not be negative [m/s].
 
     ``e u_N-`` where contacts ``bounce``, else ``2 g / h``: an open one may close, not more.
@@ -110,7 +108,7 @@ def find_contact_shift(closing: Closing, bounce: Flags, turning: Floats | float 
     return shift
 
 
-def find_hit_by_others(closing: Closing, bounce: Flags, found: Impulses, diagonal: Floats) -> Flags:
+def find_hit_by_others(closing: Closing, bounce: Bools, found: Impulses, diagonal: Floats) -> Bools:
     """Contacts (nc,) that are open, do not ``bounce``, and were closed by the impulses of those
     that do, faster than ``slow``.
 
@@ -123,7 +121,7 @@ def find_hit_by_others(closing: Closing, bounce: Flags, found: Impulses, diagona
     apart = ~bounce & ((c.gap > c.touching) | (c.before > c.slow)) & (c.restitution > 0)
     push = found.impulse[:, 0]
     alone = found.velocity[:, 0] - 2.0 * c.turning - diagonal * push
-    hit: Flags = apart & (push > 0) & (alone < -c.slow)
+    hit: Bools = apart & (push > 0) & (alone < -c.slow)
     return hit
 
 
@@ -169,11 +167,11 @@ def find_impulses_in_turn(bodies: BodySpace, closing: Closing, solve: Solve) -> 
     return Impulses(impulse, velocity, worst, message, cut_off)
 
 
-def needs_impulse(closing: Closing, least: float) -> Flags:
+def needs_impulse(closing: Closing, least: float) -> Bools:
     """Contacts (nc,) that do not part with ``-e u_N`` by themselves, to round-off ``least`` [m/s].
 
     Turning bodies may approach each other at the start of a step and part at its end as fast as
     that: no impulse answers to them, however many rounds there are.
     """
-    needs: Flags = closing.offset[:, 0] + closing.restitution * closing.before < -least
+    needs: Bools = closing.offset[:, 0] + closing.restitution * closing.before < -least
     return needs

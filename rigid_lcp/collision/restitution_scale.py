@@ -16,14 +16,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Bools, Floats
 from rigid_lcp.collision.passing import SPEED_ROUND_OFF, Closing, Impulses
 from rigid_lcp.friction.auto import islands
 from rigid_lcp.friction.problem import BodySpace, FrictionProblem
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -39,8 +36,8 @@ class StepVelocities:
 
 
 def gains_energy(
-    bodies: BodySpace, closing: Closing, velocities: StepVelocities, found: Impulses, bounce: Flags
-) -> Flags:
+    bodies: BodySpace, closing: Closing, velocities: StepVelocities, found: Impulses, bounce: Bools
+) -> Bools:
     """Contacts (nc,) of the islands (`rigid_lcp.friction.auto.islands`) in which some ``bounce``
     and whose impulses make energy."""
     gains = np.zeros(len(bounce), dtype=bool)
@@ -81,7 +78,7 @@ class Share:
         """What is to be tried next, (count,) [-]."""
         self._least, self._most = np.zeros(count), np.ones(count)
 
-    def next(self, gains: Flags) -> bool:
+    def next(self, gains: Bools) -> bool:
         """Whether another share is to be tried, where those tried now made energy (count,)."""
         before = self.now
         self._most = np.where(gains, before, self._most)

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Bools, Floats, Ints
 from rigid_lcp.contact.arrays import Contacts
 from rigid_lcp.contact.near_pairs import (
     DISC,
@@ -25,10 +25,6 @@ from rigid_lcp.contact.near_pairs import (
 )
 from rigid_lcp.errors import SceneError
 from rigid_lcp.shapes import Disc, HalfSpace, Polygon
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 TIE_IN_PLANE = 1e-9
 """Separations that differ by less than this share of a grain's reach are equal: then the face of

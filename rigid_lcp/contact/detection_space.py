@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.contact.arrays import Contacts
 from rigid_lcp.contact.manifold import (
     CANDIDATE_COLUMNS,
@@ -39,9 +39,6 @@ from rigid_lcp.contact.solids import CORNER_EDGE, CORNERS, EDGE_CORNER, find_sol
 from rigid_lcp.contact.spheres import touch_sphere_plane, touch_sphere_solid, touch_sphere_sphere
 
 __all__ = ["detect_3d", "shapes_3d"]
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 def detect_3d(

@@ -9,12 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.contact.separation import NEARLY_OPPOSITE, Solids, cross, cross_edges, dot
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 TIE_IN_SPACE = 1e-9
 """Share of a body's reach below which lengths are equal: round-off never renames a contact."""

@@ -7,11 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
+from rigid_lcp.arrays import Bools, Floats, Ints
 
 POLYGON, DISC, HALF_SPACE = 0, 1, 2
 """Kinds of shapes as the kernels know them."""

@@ -6,16 +6,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Bools, Floats, Ints
 from rigid_lcp.contact.near_pairs import HALF_SPACE
 from rigid_lcp.contact.separation import NEARLY_OPPOSITE, TILT, Solids
 from rigid_lcp.errors import SceneError, ShapeError
 from rigid_lcp.shapes import HalfSpace, Polyhedron, Sphere, rotation_matrix
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 POLYHEDRON, SPHERE = 0, 1
 """Kinds of shapes as the kernels know them, with `HALF_SPACE`."""

@@ -14,10 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from rigid_lcp.arrays import Floats, Ints
 
 TILT = 1e-9
 """Round-off allowed where a normal lies just between two face normals [rad]."""

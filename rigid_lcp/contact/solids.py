@@ -15,8 +15,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.contact.manifold import (
     EDGES,
     SAME_CONTACT,
@@ -35,9 +35,6 @@ from rigid_lcp.contact.separation import (
     separate_edges,
     separate_faces,
 )
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 CORNER_EDGE, EDGE_CORNER, CORNERS = 3, 4, 5
 """Corner of a on an edge of b; corner of b on an edge of a; corner on corner."""

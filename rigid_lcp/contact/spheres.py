@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.contact.manifold import within_face
 from rigid_lcp.contact.separation import Solids, dot
-
-Floats = NDArray[np.float64]
 
 
 @njit(cache=True)

@@ -6,15 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import NoSolution, NotConverged
 from rigid_lcp.friction.auto import solve_friction
 from rigid_lcp.friction.methods import dantzig, pivoting
 from rigid_lcp.friction.problem import BodySpace, FrictionSolution, friction_problem
 from rigid_lcp.motion.time_stepping import forces_error
-
-Floats = NDArray[np.float64]
 
 LASTING_MOST = 200
 """Contacts above which a dense solve is no short cut."""

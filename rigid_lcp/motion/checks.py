@@ -8,8 +8,9 @@ from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import SceneError, UsageError
 from rigid_lcp.motion.state import Motion
 from rigid_lcp.shapes import real_numbers, require_vector
@@ -17,7 +18,6 @@ from rigid_lcp.shapes import real_numbers, require_vector
 if TYPE_CHECKING:
     from rigid_lcp.shapes import HalfSpace
 
-Floats = NDArray[np.float64]
 Loads = Callable[[float, Motion], ArrayLike | None]
 """Forces and torques (n, 3) in 2D, (n, 6) in 3D [N, N m] at a time [s] and state."""
 

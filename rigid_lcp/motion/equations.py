@@ -9,14 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.contact import Contacts, contact_frames
 from rigid_lcp.friction.problem import BodySpace
 from rigid_lcp.motion.state import Motion
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 def body_space(

@@ -8,13 +8,11 @@ goes fastest, or is pushed most, and by what.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rigid_lcp.errors import ProblemError, SceneError
 from rigid_lcp.motion.state import Motion
 from rigid_lcp.motion.world import World
-
-Floats = NDArray[np.float64]
 
 SAFE = 1e300
 """An energy [J] that is bounded by this need not be computed to be known as finite."""

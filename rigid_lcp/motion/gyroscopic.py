@@ -7,8 +7,9 @@ spin w in the world frame.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.shapes import (
     quaternion_of_matrix,
     quaternion_of_rotation,
@@ -19,8 +20,6 @@ from rigid_lcp.shapes import (
     turn_quaternion,
     unit_quaternion,
 )
-
-Floats = NDArray[np.float64]
 
 
 def principal_inertia(inertia: ArrayLike) -> tuple[Floats, Floats]:

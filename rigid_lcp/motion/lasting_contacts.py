@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Bools, Floats, Ints
 from rigid_lcp.collision import Collision, collide
 from rigid_lcp.contact import Contacts, choose_tangents, contact_rows
 from rigid_lcp.errors import NotConverged
@@ -17,10 +17,6 @@ from rigid_lcp.motion.acceleration_forces import ACCEPTED
 from rigid_lcp.motion.equations import body_space, find_response, relative_velocity
 from rigid_lcp.motion.state import Motion, displace_motion, replace_rates
 from rigid_lcp.motion.world import World
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 TOUCH = 1e-9
 """Gap below which two bodies touch, as a share of the smallest body's size."""

@@ -27,19 +27,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
+from rigid_lcp.arrays import Bools, Floats, Ints
 from rigid_lcp.contact import Contacts
 from rigid_lcp.friction.auto import solve_friction
 from rigid_lcp.motion.equations import body_space, find_response
 from rigid_lcp.motion.state import Motion, displace_motion, replace_rates
 from rigid_lcp.motion.world import World
 from rigid_lcp.shapes import quaternion_of_rotation, rotate
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 OVERLAP_ALLOWED = 1e-12
 """Overlap that is left alone, as a share of the smallest body's size."""

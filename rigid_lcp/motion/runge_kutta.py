@@ -27,8 +27,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.contact import ContactForces, Contacts
 from rigid_lcp.errors import NoSolution, NotConverged, Overlapping, ProblemError, RigidError
 from rigid_lcp.motion.acceleration_forces import find_forces
@@ -50,9 +51,6 @@ from rigid_lcp.motion.state import Motion, replace_rates
 from rigid_lcp.motion.time_stepping import contact_forces
 from rigid_lcp.motion.world import World
 from rigid_lcp.shapes import quaternion_rate
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 CLEAN_STEPS = 3
 """Steps without an overlap before the step is doubled (section 9)."""

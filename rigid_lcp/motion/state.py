@@ -9,11 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.shapes import turn_quaternion
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -15,17 +15,13 @@ factors is at most 1 (each is at most ``m_a / sqrt(m_a m_b)``), so speeds passed
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Bools, Floats, Ints
 from rigid_lcp.contact import Contacts
 from rigid_lcp.motion.equations import relative_velocity
 from rigid_lcp.motion.overlap_removal import OVERLAP_ALLOWED
 from rigid_lcp.motion.state import Motion
 from rigid_lcp.motion.world import World
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 FASTER = 1e-6
 """Part by which a speed has to be greater than one that was taken into account [-]."""

@@ -29,8 +29,9 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.collision import (
     Closing,
     Impulses,
@@ -61,7 +62,6 @@ from rigid_lcp.motion.struck_bodies import (
 )
 from rigid_lcp.motion.world import World
 
-Floats = NDArray[np.float64]
 SolveFrom = Callable[..., tuple[FrictionSolution, float]]
 """Impulses and their error [-] from the contacts' `BodySpace`, q (nc, dim), friction (nc,) and, if
 known, a start (nc * dim,)."""

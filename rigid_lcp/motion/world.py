@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rigid_lcp.arrays import Bools, Floats, Ints
 from rigid_lcp.contact import Contacts, detect_2d, detect_3d, shapes_2d, shapes_3d
 from rigid_lcp.errors import SceneError
 from rigid_lcp.friction.problem import MOST_FRICTION
@@ -29,9 +30,6 @@ from rigid_lcp.motion.gyroscopic import (
 )
 from rigid_lcp.motion.state import Motion, displace_motion
 from rigid_lcp.shapes import HalfSpace, require_vector
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -148,7 +146,7 @@ class World:
     """Contacts of places and angles within a margin [m], one number or (n,)."""
 
     @property
-    def movable(self) -> NDArray[np.bool_]:
+    def movable(self) -> Bools:
         """Bodies whose motion follows from forces, (n,)."""
         return self.columns >= 0
 

@@ -7,13 +7,11 @@ from io import BytesIO
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.contact import ContactForces
 from rigid_lcp.motion import Motion, Scene
 from rigid_lcp.shapes import HalfSpace, rotation_matrix
-
-Floats = NDArray[np.float64]
 
 STONE, EDGE, FIXED = "#e9e4da", "#8a8174", "#c9ced6"
 STICK, SLIDE = "#0b5fa5", "#d1495b"

@@ -9,14 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import ShapeError
 from rigid_lcp.motion import Loads, Motion, Scene
 from rigid_lcp.scene.types import BodyTable, Grains, Load, SceneTables, find_faults
 from trackbed.scene_files import Guide, read_scene
 
-Floats = NDArray[np.float64]
 GUIDE = Guide("pile", "run.duration=0.1")
 GRID_SPACING = 1.05
 """Distance of the grid points of grains over their largest diameter."""
@@ -135,7 +134,7 @@ def loads_of(file: SceneFile) -> Loads | None:
     rows = [first + names.index(load.body) for load in tables.load]
     columns = 3 if tables.dimensions == 2 else 6
 
-    def loads(time: float, motion: Motion) -> NDArray[np.float64]:
+    def loads(time: float, motion: Motion) -> Floats:
         forces = np.zeros((len(motion.position), columns))
         for row, load in zip(rows, tables.load, strict=True):
             forces[row, : tables.dimensions] += force_at(load, time)
@@ -144,7 +143,7 @@ def loads_of(file: SceneFile) -> Loads | None:
     return loads
 
 
-def force_at(load: Load, time: float) -> NDArray[np.float64]:
+def force_at(load: Load, time: float) -> Floats:
     """Force of a load [N] at a time [s]: cyclic ones start at their least force, or its phase."""
     most = np.array(load.force)
     if time < load.begin or (load.end is not None and time > load.end):

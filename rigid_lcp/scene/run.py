@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import UsageError
 from rigid_lcp.motion import Scene
 from rigid_lcp.scene.file import SceneFile, loads_of, scene_build
@@ -19,7 +19,6 @@ from rigid_lcp.scene.simulation import NO_STEP, Simulation
 from rigid_lcp.wear import Breakage, Wear
 from trackbed.run_files import write_whole
 
-Floats = NDArray[np.float64]
 Progress = Callable[[float, float, Simulation], None]
 """Called after every frame: time reached, duration [s], the run."""
 

@@ -11,8 +11,9 @@ from math import ceil, inf, nan
 from typing import Any, Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.contact import ContactForces
 from rigid_lcp.errors import (
     NotConverged,
@@ -55,8 +56,6 @@ from rigid_lcp.wear import (
     step_wear,
     wear_on_after_break,
 )
-
-Floats = NDArray[np.float64]
 
 OVERLAP_AT_START = 1e-6
 """Overlap that a start may have, as a share of the smallest body's size."""

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from math import inf
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import ShapeError
 from rigid_lcp.shapes.numbers import require_finite_shape
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

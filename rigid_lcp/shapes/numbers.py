@@ -5,11 +5,10 @@ from __future__ import annotations
 from sys import float_info
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import SceneError, ShapeError
-
-Floats = NDArray[np.float64]
 
 LEAST, MOST = 1e-50, 1e50
 """Lengths that a shape may have [m]: their fourth powers are numbers still."""

@@ -13,13 +13,11 @@ from numbers import Integral
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.errors import ShapeError
 from rigid_lcp.shapes.numbers import LEAST, MOST, require_finite_shape, require_length
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 STRAIGHT = 1e-12
 """Sine of the turn at a vertex below which three vertices count as one line [-]."""

@@ -10,13 +10,11 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.errors import ShapeError
 from rigid_lcp.shapes.numbers import LEAST, MOST, require_finite_shape, require_length
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 FLATNESS = 1e-9
 """Corners within this share of the size of a plane lie in it: round-off of coordinates is far

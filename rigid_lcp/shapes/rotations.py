@@ -9,11 +9,10 @@ Formulas: Shuster, J. Astronaut. Sci. 41 (1993) 439.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import SceneError
-
-Floats = NDArray[np.float64]
 
 
 def unit_quaternion(quaternion: ArrayLike) -> Floats:

@@ -12,15 +12,15 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from rigid_lcp.arrays import Floats, Ints
+
 Indices = NDArray[Any]
 
 
 @njit(cache=True)
 def split_jacobian(
     start: Indices, index: Indices, value: Floats, dim: int, size: int
-) -> tuple[Integers, Integers, Floats]:
+) -> tuple[Ints, Ints, Floats]:
     """``first``, ``body`` and ``block`` of J, which is given by rows."""
     contacts = (len(start) - 1) // dim
     first = np.zeros(contacts + 1, dtype=np.int64)
@@ -61,7 +61,7 @@ def diagonal_blocks(start: Indices, index: Indices, value: Floats, size: int) ->
 
 
 @njit(cache=True)
-def body_pairs(first: Integers, body: Integers, bodies: int) -> Integers:
+def body_pairs(first: Ints, body: Ints, bodies: int) -> Ints:
     """``row * bodies + column`` of every block that a contact adds to, as `add_contacts` goes."""
     total = 0
     for c in range(len(first) - 1):
@@ -128,9 +128,7 @@ def _add_contacts(dim: int, size: int) -> Any:
     any where these are zero."""
 
     @njit(cache=True)
-    def add(
-        matrix: Floats, first: Integers, block: Floats, places: Integers, stiffness: Floats
-    ) -> None:
+    def add(matrix: Floats, first: Ints, block: Floats, places: Ints, stiffness: Floats) -> None:
         rows = dim if dim > 0 else block.shape[1]
         columns = size if size > 0 else block.shape[2]
         half = np.empty((columns, rows))
@@ -160,7 +158,7 @@ _add_2d, _add_3d, _add_any = (_add_contacts(*shape) for shape in ((2, 3), (3, 6)
 
 @njit(cache=True)
 def add_contacts(
-    matrix: Floats, first: Integers, block: Floats, places: Integers, stiffness: Floats
+    matrix: Floats, first: Ints, block: Floats, places: Ints, stiffness: Floats
 ) -> None:
     """Add ``J_c^T K_c J_c`` of every contact, ``K = A^-1 B``, to the blocks of the body matrix."""
     if block.shape[1:] == (2, 3):
@@ -172,9 +170,7 @@ def add_contacts(
 
 
 @njit(cache=True)
-def push_bodies(
-    first: Integers, body: Integers, block: Floats, bodies: int, force: Floats
-) -> Floats:
+def push_bodies(first: Ints, body: Ints, block: Floats, bodies: int, force: Floats) -> Floats:
     """``J^T r``, (bodies * size,), of forces r (nc, dim)."""
     dim, size = block.shape[1:]
     push = np.zeros((bodies, size))
@@ -188,7 +184,7 @@ def push_bodies(
 
 @njit(cache=True)
 def subtract_motion(
-    first: Integers, body: Integers, block: Floats, stiffness: Floats, force: Floats,
+    first: Ints, body: Ints, block: Floats, stiffness: Floats, force: Floats,
     velocity: Floats,
 ) -> Floats:  # fmt: skip
     """``r - K J v``, (nc * dim,), of forces r (nc, dim) and velocities v (bodies * size,)."""

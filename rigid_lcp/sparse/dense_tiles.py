@@ -15,14 +15,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from llvmlite import ir
 from numba import njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from rigid_lcp.arrays import Floats
 
 TILE = 4
 """Rows of a tile, and numbers in a vector: rows and columns are padded to multiples of it."""

@@ -13,10 +13,9 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 from numba import njit
-from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
-Integers = NDArray[np.int64]
+from rigid_lcp.arrays import Ints
 
 FEW_BLOCKS = 1000
 """Up to so many blocks the order is found by a full table."""
@@ -25,7 +24,7 @@ MUCH_FLOPS = 1e8
 
 
 @njit(cache=True)
-def symmetric_pattern(blocks: int, rows: Integers, columns: Integers) -> tuple[Integers, Integers]:
+def symmetric_pattern(blocks: int, rows: Ints, columns: Ints) -> tuple[Ints, Ints]:
     """Neighbours of each block, itself among them, rising: ``neighbour[start[i]:start[i + 1]]``."""
     start = np.zeros(blocks + 1, dtype=np.int64)
     for k in range(len(rows)):
@@ -51,7 +50,7 @@ def symmetric_pattern(blocks: int, rows: Integers, columns: Integers) -> tuple[I
     return start, every[:done].copy()
 
 
-def elimination_order(start: Integers, neighbour: Integers, size: int) -> Integers:
+def elimination_order(start: Ints, neighbour: Ints, size: int) -> Ints:
     """Which block is eliminated at each place, (blocks,); ``size``: rows of a block."""
     order = minimum_degree(start, neighbour)
     flops = elimination_flops(start, neighbour, order, size)
@@ -62,13 +61,13 @@ def elimination_order(start: Integers, neighbour: Integers, size: int) -> Intege
     return order
 
 
-def elimination_flops(start: Integers, neighbour: Integers, order: Integers, size: int) -> float:
+def elimination_flops(start: Ints, neighbour: Ints, order: Ints, size: int) -> float:
     """About what LU factors cost in this order, column by column."""
     below = find_column_parents(start, neighbour, order)[1].astype(float)
     return float(2.0 * size**3 * (below * (below + 1.0) + 1.0 / 3.0).sum())
 
 
-def nested_dissection(start: Integers, neighbour: Integers) -> Integers | None:
+def nested_dissection(start: Ints, neighbour: Ints) -> Ints | None:
     """Blocks in METIS's order of nested dissection; None where ``pymetis`` is not installed, as
     there are processors that it is not built for."""
     try:
@@ -83,12 +82,12 @@ def nested_dissection(start: Integers, neighbour: Integers) -> Integers | None:
     return np.asarray(order, dtype=np.int64)
 
 
-def minimum_degree(start: Integers, neighbour: Integers) -> Integers:
+def minimum_degree(start: Ints, neighbour: Ints) -> Ints:
     """Blocks in an order of minimum degree: that of SuperLU (multiple), or for few blocks our own,
     which costs less than to call it."""
     blocks = len(start) - 1
     if blocks <= FEW_BLOCKS:
-        found: Integers = minimum_degree_dense(start, neighbour)
+        found: Ints = minimum_degree_dense(start, neighbour)
         return found
     graph = sp.csc_array((np.full(len(neighbour), -1.0), neighbour, start), (blocks, blocks))
     laplacian = graph + sp.diags_array(np.full(blocks, 2.0 * blocks))
@@ -100,7 +99,7 @@ def minimum_degree(start: Integers, neighbour: Integers) -> Integers:
 
 
 @njit(cache=True)
-def minimum_degree_dense(start: Integers, neighbour: Integers) -> Integers:
+def minimum_degree_dense(start: Ints, neighbour: Ints) -> Ints:
     """The same by a full table of neighbours, in the time of its size."""
     blocks = len(start) - 1
     linked = np.zeros((blocks, blocks), dtype=np.bool_)
@@ -131,9 +130,7 @@ def minimum_degree_dense(start: Integers, neighbour: Integers) -> Integers:
 
 
 @njit(cache=True)
-def find_column_parents(
-    start: Integers, neighbour: Integers, order: Integers
-) -> tuple[Integers, Integers]:
+def find_column_parents(start: Ints, neighbour: Ints, order: Ints) -> tuple[Ints, Ints]:
     """Parent of each column of the factors (-1: none) and its rows below the diagonal."""
     blocks = len(order)
     rank = np.empty(blocks, dtype=np.int64)
@@ -166,7 +163,7 @@ def find_column_parents(
 
 
 @njit(cache=True)
-def postorder(parent: Integers) -> Integers:
+def postorder(parent: Ints) -> Ints:
     """Columns so that each subtree is a run that ends with its root."""
     blocks = len(parent)
     child, sister = np.full(blocks, -1), np.full(blocks, -1)

@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Ints
 from rigid_lcp.sparse.dense_tiles import TILE
 from rigid_lcp.sparse.elimination_order import (
     elimination_order,
@@ -23,8 +23,6 @@ from rigid_lcp.sparse.elimination_order import (
     postorder,
     symmetric_pattern,
 )
-
-Integers = NDArray[np.int64]
 
 FRONT_COLUMNS = 192
 """Columns of a front at most: longer ones are split, child under child."""
@@ -37,24 +35,24 @@ class EliminationTree(NamedTuple):
 
     size: int
     """Rows of a block."""
-    order: Integers
+    order: Ints
     """Which block of the caller's is eliminated at each place, (blocks,)."""
-    first: Integers
+    first: Ints
     """First block column of each front, and the end of the last, (fronts + 1,)."""
-    row_start: Integers
-    rows: Integers
+    row_start: Ints
+    rows: Ints
     """Block rows below the columns of front f, rising: ``rows[row_start[f]:row_start[f + 1]]``."""
-    relative: Integers
+    relative: Ints
     """Places of the same rows in the parent's front (columns first, then rows), in blocks."""
-    parent: Integers
+    parent: Ints
     """(fronts,), -1 for a root."""
-    entry_start: Integers
-    entry: Integers
+    entry_start: Ints
+    entry: Ints
     """Which blocks of the matrix are added to front f: ``entry[entry_start[f]:...]``."""
-    entry_row: Integers
-    entry_column: Integers
+    entry_row: Ints
+    entry_column: Ints
     """Their places in it."""
-    factor_start: Integers
+    factor_start: Ints
     """Where the numbers of each front's factors begin, (fronts + 1,)."""
     front_most: int
     rest_most: int
@@ -63,7 +61,7 @@ class EliminationTree(NamedTuple):
     that wait at one time."""
 
 
-def elimination_tree(blocks: int, size: int, rows: Integers, columns: Integers) -> EliminationTree:
+def elimination_tree(blocks: int, size: int, rows: Ints, columns: Ints) -> EliminationTree:
     """The tree of a matrix of ``blocks`` block rows with entries at (rows, columns).
 
     ``size``: rows of a block.  The pattern is taken for symmetric: where (i, j) is an entry, (j, i)
@@ -107,7 +105,7 @@ def front_cost(width: int, below: int, size: int) -> float:
 
 
 @njit(cache=True)
-def merge_columns(parent: Integers, count: Integers, size: int) -> Integers:
+def merge_columns(parent: Ints, count: Ints, size: int) -> Ints:
     """First column of each front (fronts + 1,): a front is merged with its last child if cheaper.
 
     ``parent``, ``count``: of the columns in postorder.
@@ -144,8 +142,8 @@ def merge_columns(parent: Integers, count: Integers, size: int) -> Integers:
 
 @njit(cache=True)
 def find_front_rows(
-    start: Integers, neighbour: Integers, order: Integers, first: Integers, count: Integers
-) -> tuple[Integers, Integers, Integers]:
+    start: Ints, neighbour: Ints, order: Ints, first: Ints, count: Ints
+) -> tuple[Ints, Ints, Ints]:
     """Rows of every front below its columns (``row_start``, ``rows``), and its parent."""
     blocks, fronts = len(order), len(first) - 1
     rank = np.empty(blocks, dtype=np.int64)
@@ -187,9 +185,7 @@ def find_front_rows(
 
 
 @njit(cache=True)
-def find_places_in_parent(
-    first: Integers, row_start: Integers, rows: Integers, parent: Integers
-) -> Integers:
+def find_places_in_parent(first: Ints, row_start: Ints, rows: Ints, parent: Ints) -> Ints:
     """Where each row of a front is in its parent's front."""
     relative = np.empty(len(rows), dtype=np.int64)
     for f in range(len(parent)):
@@ -199,9 +195,7 @@ def find_places_in_parent(
 
 
 @njit(cache=True)
-def place_in_front(
-    row: int, front: int, first: Integers, row_start: Integers, rows: Integers
-) -> int:
+def place_in_front(row: int, front: int, first: Ints, row_start: Ints, rows: Ints) -> int:
     """Place of a block row among a front's columns and rows."""
     if row < first[front + 1]:
         return row - first[front]
@@ -211,8 +205,8 @@ def place_in_front(
 
 @njit(cache=True)
 def find_entry_places(
-    rows: Integers, columns: Integers, first: Integers, row_start: Integers, found: Integers
-) -> tuple[Integers, Integers, Integers]:
+    rows: Ints, columns: Ints, first: Ints, row_start: Ints, found: Ints
+) -> tuple[Ints, Ints, Ints]:
     """Front to which each block (rows, columns) is added, and its place in it."""
     entries = len(rows)
     front = np.empty(entries, dtype=np.int64)
@@ -229,7 +223,7 @@ def find_entry_places(
 
 
 @njit(cache=True)
-def measure_stack(parent: Integers, below: Integers) -> int:
+def measure_stack(parent: Ints, below: Ints) -> int:
     """Most numbers that wait on the stack of updates."""
     waiting = np.zeros(len(parent) + 1, dtype=np.int64)
     now = most = 0

@@ -22,11 +22,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.sparse.dense_tiles import divide_rows, subtract_product
 from rigid_lcp.sparse.elimination_tree import EliminationTree, padded
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 Spots = NDArray[np.uint64]
 
 
@@ -105,7 +104,7 @@ def add_entry(
 
 @njit(cache=True)
 def add_update(
-    factors: Floats, begin: int, rest: Floats, stack: Floats, top: int, places: Integers,
+    factors: Floats, begin: int, rest: Floats, stack: Floats, top: int, places: Ints,
     size: int, pivots: int, rows: int, spots: Spots,
 ) -> None:  # fmt: skip
     """Add what a child left, from ``top`` of ``stack``, its blocks at ``places`` of the front.

@@ -39,9 +39,10 @@ from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.sparse.linalg import splu
 
+from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.errors import ProblemError
 from rigid_lcp.friction.problem import BodySpace, FrictionProblem, friction_problem
 from rigid_lcp.unique.elastic_network import ElasticNetwork, coulomb_spring, slider_forces
@@ -53,9 +54,6 @@ from rigid_lcp.unique.micro_displacements import (
     mass_free_jacobian,
     stiffest_mode,
 )
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 FIRST_STEP = 1e3
 """First h in units of the stiffest mode's time."""

@@ -17,13 +17,12 @@ from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
+from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.friction.methods import gauss_seidel, newton
 from rigid_lcp.friction.problem import friction_problem
 
-Floats = NDArray[np.float64]
 SWEEPS = 300
 """Of Gauss-Seidel in a step."""
 
@@ -97,7 +96,7 @@ class ElasticNetwork:
         return sp.csr_array(self.jacobian @ self.jacobian.T)
 
     @cached_property
-    def own_order(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def own_order(self) -> tuple[Ints, Ints]:
         """The contacts in an order that is theirs, not that of the numbers, and its rows of W.
 
         Gauss-Seidel's way depends on the order; where there are several states so does its end.

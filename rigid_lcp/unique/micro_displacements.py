@@ -36,14 +36,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.sparse.linalg import splu
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import ProblemError
 from rigid_lcp.friction.problem import BodySpace, FrictionProblem, Status, natural_residual
 from rigid_lcp.unique.elastic_network import coulomb_spring
 
-Floats = NDArray[np.float64]
 ForceLaw = Callable[[Floats, Floats, Floats], Floats]
 """Eq. 38: ``law(deformation, stiffness, friction) -> force``, see `coulomb_spring`."""
 

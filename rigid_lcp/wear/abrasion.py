@@ -18,8 +18,8 @@ from sys import float_info
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.contact import FEATURE_BITS, MOST_EDGES, ContactForces, Contacts, contact_frames
 from rigid_lcp.errors import ShapeError
 from rigid_lcp.motion import Motion, relative_velocity, require_number_in, require_whole_in
@@ -29,9 +29,6 @@ from rigid_lcp.wear.fragmentation import scene_at, take_on_motion
 
 if TYPE_CHECKING:
     from rigid_lcp.motion import Body, Scene
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 STIFFNESS_LEFT = 0.1

@@ -17,8 +17,8 @@ from sys import float_info
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.contact import ContactForces
 from rigid_lcp.errors import SceneError, ShapeError
 from rigid_lcp.motion import Motion, require_number_in, require_whole_in
@@ -30,8 +30,6 @@ from rigid_lcp.wear.strength import Break, find_splitting_line
 if TYPE_CHECKING:
     from rigid_lcp.motion import Body, Scene
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 DUST = 100
 """Parts of a grain of the start, on average, beyond which grains break without end: without a size

@@ -12,14 +12,12 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.contact import FACE_BITS, MOST_EDGES
 from rigid_lcp.errors import ShapeError
 from rigid_lcp.shapes import Polygon, Polyhedron
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Solid = Polygon | Polyhedron
 
 CLEARANCE = 1e-6

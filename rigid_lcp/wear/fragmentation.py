@@ -14,8 +14,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import ShapeError
 from rigid_lcp.motion import turn_arm
 from rigid_lcp.shapes import rotate, rotate_back
@@ -24,7 +25,6 @@ from rigid_lcp.wear.cuts import CLEARANCE, Solid, find_volume, take_part
 if TYPE_CHECKING:
     from rigid_lcp.motion import Body, Motion, Scene
 
-Floats = NDArray[np.float64]
 
 SLIVER = 1e-3
 """Least width of a part across the cut in 2D, as a share of the width of the whole [-]."""

@@ -7,8 +7,8 @@ import sys
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.sparse.body_matrix import (
     add_contacts,
     body_pairs,
@@ -37,7 +37,6 @@ from rigid_lcp.sparse.products import (
 from tests.rigid_networks import random_bodies, random_pairs
 
 BODIES, CONTACTS = 7, 12
-Floats = NDArray[np.float64]
 
 
 def arrays(matrix: sp.csr_array) -> tuple[Floats, ...]:

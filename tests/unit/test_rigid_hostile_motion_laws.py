@@ -8,11 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from rigid_lcp import Disc, HalfSpace, Polygon, Scene, Simulation
-
-Floats = NDArray[np.float64]
+from rigid_lcp.arrays import Floats
 
 CORNERS = {"time-stepping": (5, 6, 7, 8, 4), "acceleration": (5, 6)}
 """Polygons of the scene; at acceleration level an event takes some 75 steps."""

@@ -9,14 +9,12 @@ import pytest
 import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from rigid_lcp import solve_friction
+from rigid_lcp.arrays import Floats
 from rigid_lcp.friction.problem.cones import natural_map, natural_residual
 from rigid_lcp.friction.problem.definition import friction_problem, judge_forces
 from tests.rigid_static_problems import tower
-
-Floats = NDArray[np.float64]
 
 W = np.diag([1.0, 2.0, 1.0, 2.0])
 Q = np.array([-1.0, 0.5, 1.0, 0.0])

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.friction.methods.gauss_seidel import sweep_blocks
 from rigid_lcp.friction.problem.definition import FrictionProblem, friction_problem
 from rigid_lcp.friction.sweeps.blocks import find_relative_velocities, lay_out_bodies
@@ -21,8 +21,6 @@ from rigid_lcp.friction.sweeps.body_kernel import inverses, pack_contacts
 from rigid_lcp.friction.sweeps.contact_kernel import visit_all
 from tests.rigid_local import solve_contact
 from tests.rigid_networks import random_bodies, random_pairs
-
-Floats = NDArray[np.float64]
 
 
 def some_problem(seed: int, dim: int, contacts: int, mu: float) -> FrictionProblem:

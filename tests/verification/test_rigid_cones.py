@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.friction.problem.cones import natural_map, natural_residual
 from rigid_lcp.friction.problem.definition import friction_problem
 
-Floats = NDArray[np.float64]
 ROUND_OFF = 1e-12
 """Ten times 2e-16 (mu + 1) (push + rho speed) / push at the ends of the ranges below."""
 NUMBER = st.floats(-1e3, 1e3, allow_nan=False).map(lambda x: 0.0 if abs(x) < 1e-9 else x)

@@ -6,17 +6,15 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from rigid_lcp import HalfSpace, Sphere
+from rigid_lcp.arrays import Floats
 from rigid_lcp.contact.arrays import Contacts, contact_frames
 from rigid_lcp.contact.detection_space import detect_3d, shapes_3d
 from rigid_lcp.motion.equations import inertial_acceleration, relative_velocity
 from rigid_lcp.motion.state import Motion, displace_motion
 from rigid_lcp.shapes.rotations import quaternion_of_rotation, quaternion_product, rotate
 from tests.rigid_solids import CUBE, UPRIGHT, contacts, near_pair
-
-Floats = NDArray[np.float64]
 
 
 @settings(max_examples=40, deadline=None)

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.friction.methods.gauss_seidel import Sweeper, gauss_seidel
 from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, friction_problem
 from rigid_lcp.friction.sweeps.blocks import lay_out_bodies
@@ -18,8 +18,6 @@ from tests.rigid_local import solve_contact
 from tests.rigid_networks import random_bodies, random_pairs
 from validation.bench.rigid.friction_problems import read_problem
 from validation.bench.rigid.packings import tower
-
-Floats = NDArray[np.float64]
 
 
 def random_problem(dim: int, seed: int, bodies: int = 6, contacts: int = 12) -> FrictionProblem:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.friction.problem.cones import natural_map
 from rigid_lcp.friction.sweeps.sliding_direction import (
     find_all_directions,
@@ -15,8 +15,6 @@ from rigid_lcp.friction.sweeps.sliding_direction import (
     find_real_roots,
 )
 from tests.rigid_local import solve_contact
-
-Floats = NDArray[np.float64]
 
 
 def law_error(block: Floats, offset: Floats, friction: float, force: Floats) -> float:

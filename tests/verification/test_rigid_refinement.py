@@ -7,17 +7,15 @@ from math import atan, cos, sin
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
 import rigid_lcp as r
+from rigid_lcp.arrays import Floats
 from rigid_lcp.friction.attempts.refinement import gmres, refined
 from rigid_lcp.friction.attempts.sticking import sticking
 from rigid_lcp.friction.linear.factorisation import factorisation
 from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, friction_problem
 from tests.rigid_networks import stack_on_slope
 from validation.bench.rigid.scenes import light_on_heavy, stack
-
-Floats = NDArray[np.float64]
 
 G = 9.81
 

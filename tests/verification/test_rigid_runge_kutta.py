@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from rigid_lcp import Disc, HalfSpace, Polygon, Scene, Simulation, box
+from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import NoSolution, NotConverged
 from rigid_lcp.motion.state import Motion
 from rigid_lcp.scene.simulation import Method
@@ -25,7 +25,6 @@ from validation.bench.rigid.scenes import (
     stack,
 )
 
-Floats = NDArray[np.float64]
 NEEDLE = Polygon([(-1, 0), (0, -0.01), (1, 0), (0, 0.01)])
 
 

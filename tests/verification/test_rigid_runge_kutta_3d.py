@@ -6,14 +6,13 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from rigid_lcp import HalfSpace, Polyhedron, Scene, Simulation, Sphere, box
+from rigid_lcp.arrays import Floats
 from rigid_lcp.scene.simulation import Method
 from rigid_lcp.shapes.rotations import quaternion_of_rotation, rotate
 from tests import rigid_motions as motions
 
-Floats = NDArray[np.float64]
 G = 9.81
 DENSITY = 1e3
 FLOOR = HalfSpace([0.0, 0.0, 1.0], 0.0)

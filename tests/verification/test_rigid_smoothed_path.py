@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.friction.attempts.smoothed_path import (
     SMOOTHED,
     begin_path,
@@ -26,8 +26,6 @@ from rigid_lcp.friction.problem.definition import (
     friction_problem,
 )
 from validation.bench.rigid.packings import packing, tower
-
-Floats = NDArray[np.float64]
 
 
 def jordan_root(vector: Floats) -> Floats:

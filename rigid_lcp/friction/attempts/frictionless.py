@@ -26,6 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 from scipy.sparse.linalg import splu
 
+from rigid_lcp.arrays import Bools, Floats
 from rigid_lcp.errors import ProblemError
 from rigid_lcp.friction.problem import (
     FrictionProblem,
@@ -44,8 +45,6 @@ from rigid_lcp.friction.sweeps import (
     normal_sweeps,
 )
 
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 Indices = NDArray[np.int32]
 Solve = Callable[[Floats], Floats]
 

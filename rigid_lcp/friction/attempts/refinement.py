@@ -18,8 +18,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.friction.linear import Factorisation, SingularSystem, Solve, factorisation
 from rigid_lcp.friction.methods import alart_curnier
 from rigid_lcp.friction.problem import (
@@ -28,8 +28,6 @@ from rigid_lcp.friction.problem import (
     FrictionSolution,
     judge_forces,
 )
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -34,13 +34,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.friction.linear import Factorisation, SingularSystem, factorisation
 from rigid_lcp.friction.methods import newton, spring_size
 from rigid_lcp.friction.problem import FrictionProblem, FrictionSolution, judge_forces, length
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -15,13 +15,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.friction.attempts.refinement import gmres
 from rigid_lcp.friction.linear import Factorisation, SingularSystem, factorisation
 from rigid_lcp.friction.problem import FrictionProblem, FrictionSolution, judge_forces, length
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -15,22 +15,20 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
+from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.friction.problem import BodySpace, FrictionProblem, FrictionSolution, judge_forces
 from rigid_lcp.friction.sweeps import NONE, solve_contacts_apart
 from rigid_lcp.sparse import diagonal_blocks
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 Method = Callable[..., FrictionSolution]
 
 ISLAND_ROUNDS = 4
 """Times the islands are solved again, ten times finer each, until the whole is fine enough."""
 
 
-def islands(problem: FrictionProblem) -> list[Integers]:
+def islands(problem: FrictionProblem) -> list[Ints]:
     """Contacts of every island, (contacts of it,) each, by W's pattern or by shared bodies."""
     contacts, dim = problem.contacts, problem.dim
     if contacts == 0:
@@ -51,7 +49,7 @@ def islands(problem: FrictionProblem) -> list[Integers]:
     return np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
 
 
-def cut_out_island(problem: FrictionProblem, contacts: Integers) -> FrictionProblem:
+def cut_out_island(problem: FrictionProblem, contacts: Ints) -> FrictionProblem:
     """The problem of some contacts alone: their rows, and of the bodies only those they touch."""
     dim = problem.dim
     rows = contact_rows(contacts, dim)
@@ -67,14 +65,14 @@ def cut_out_island(problem: FrictionProblem, contacts: Integers) -> FrictionProb
     return FrictionProblem(matrix, problem.offset[rows], problem.friction[contacts], dim, space)
 
 
-def contact_rows(contacts: Integers, dim: int) -> Integers:
+def contact_rows(contacts: Ints, dim: int) -> Ints:
     """Rows of W that belong to some contacts (or freedoms that belong to bodies), in order."""
     return (np.asarray(contacts)[:, None] * dim + np.arange(dim)).ravel()
 
 
 def join_islands(
     problem: FrictionProblem,
-    parts: Sequence[Integers],
+    parts: Sequence[Ints],
     solutions: Sequence[FrictionSolution],
     tolerance: float,
 ) -> FrictionSolution:
@@ -146,9 +144,7 @@ def solve_islands(
     return joined
 
 
-def solve_singles(
-    problem: FrictionProblem, contacts: Integers, tolerance: float
-) -> FrictionSolution:
+def solve_singles(problem: FrictionProblem, contacts: Ints, tolerance: float) -> FrictionSolution:
     """Exact forces of contacts that feel no other, put together as a problem of their own."""
     dim = problem.dim
     apart = cut_out_island(problem, contacts)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigid_lcp.friction.attempts import heaviness, seem_loose, seem_to_stick, smoothed_path
 from rigid_lcp.friction.auto.sweeps import TURNS, take_turns
@@ -13,8 +12,6 @@ from rigid_lcp.friction.auto.trial import LIMITS, Trial
 from rigid_lcp.friction.linear import SingularSystem
 from rigid_lcp.friction.methods import Path, PathStep, interior_point
 from rigid_lcp.friction.problem import FrictionSolution, length
-
-Floats = NDArray[np.float64]
 
 PATH_END_PATIENCE = 3
 """Steps of Newton that may fail to halve the residual: from the end of a path it begins to converge

@@ -16,16 +16,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rigid_lcp.arrays import Floats
 from rigid_lcp.friction.attempts import PROXIMAL
 from rigid_lcp.friction.auto import paths as along
 from rigid_lcp.friction.auto import sweeps as by
 from rigid_lcp.friction.auto.trial import ENDLESS, Trial
 from rigid_lcp.friction.problem import FrictionProblem, prove_forces_insufficient
-
-Floats = NDArray[np.float64]
 
 PROOF_CONTACTS = 3000
 """Up to so many contacts a linear programme looks for the proof that there is no solution."""

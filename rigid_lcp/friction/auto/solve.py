@@ -13,8 +13,9 @@ from importlib import import_module
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import UsageError
 from rigid_lcp.friction.attempts import frictionless
 from rigid_lcp.friction.auto.islands import islands, solve_islands
@@ -34,8 +35,6 @@ from rigid_lcp.friction.problem import (
     require_start,
 )
 from trackbed.choices import find_choices
-
-Floats = NDArray[np.float64]
 
 TINY = 1e-60
 """Problems with a smaller q are solved in other units."""

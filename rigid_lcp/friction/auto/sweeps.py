@@ -12,13 +12,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.friction.attempts import proximal_newton
 from rigid_lcp.friction.auto.trial import LIMITS, Trial
 from rigid_lcp.friction.problem import FrictionSolution
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.friction.attempts import (
     POINTS,
     PROXIMAL,
@@ -30,8 +30,6 @@ from rigid_lcp.friction.problem import (
     length,
 )
 from rigid_lcp.friction.sweeps import MANY_CONTACTS
-
-Floats = NDArray[np.float64]
 
 ENDLESS = 1e6
 """Forces over ``rho |q|`` [-] that look endless."""

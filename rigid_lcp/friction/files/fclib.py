@@ -27,12 +27,12 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import LibraryMissing, ProblemError
 from rigid_lcp.friction.files.damaged import DAMAGED, describe_damage, name_missing_part
 from rigid_lcp.friction.problem import BODY_SIZE, BodySpace, FrictionProblem, friction_problem
 from rigid_lcp.sparse import diagonal_blocks
 
-Floats = NDArray[np.float64]
 PARTS = {"fclib_local": (("W",), ("q", "mu")), "fclib_global": (("M", "H"), ("f", "w", "mu"))}
 """Matrices and vectors of a problem, by its group."""
 

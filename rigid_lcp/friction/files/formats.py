@@ -23,13 +23,13 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import ProblemError
 from rigid_lcp.friction.files.damaged import DAMAGED, describe_damage, name_missing_part
 from rigid_lcp.friction.files.fclib import read_fclib_forces, read_fclib_problem
 from rigid_lcp.friction.files.siconos import read_siconos_problem
 from rigid_lcp.friction.problem import BODY_SIZE, BodySpace, FrictionProblem, friction_problem
 
-Floats = NDArray[np.float64]
 SAME_MATRIX = 1e-8
 """W and its factors, both stored, differ by less than this share of the largest entry of W."""
 

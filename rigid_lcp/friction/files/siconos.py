@@ -20,13 +20,12 @@ from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.errors import ProblemError
 from rigid_lcp.friction.files.damaged import describe_damage
 from rigid_lcp.friction.problem import FrictionProblem, friction_problem
 
-Floats = NDArray[np.float64]
 DENSE, BLOCKS, SPARSE = 0, 1, 2
 """Kinds of storage of a ``NumericsMatrix``."""
 COLUMN = re.compile(r"col (\d+) : locations (-?\d+) to (-?\d+)")
@@ -50,7 +49,7 @@ class _Numbers:
         except ValueError as error:
             raise ValueError(f"{what}: {error}") from error
 
-    def whole(self, count: int, what: str) -> NDArray[np.int64]:
+    def whole(self, count: int, what: str) -> Ints:
         """The next ``count`` whole numbers, none of them negative."""
         numbers = self.take(count, what)
         found = numbers.astype(np.int64) if np.isfinite(numbers).all() else np.full(count, -1)

@@ -24,8 +24,8 @@ from typing import Protocol
 import numpy as np
 import scipy.linalg
 from numba import njit
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.friction.problem import FrictionProblem
 from rigid_lcp.sparse import (
     EliminationTree,
@@ -41,8 +41,6 @@ from rigid_lcp.sparse import (
     subtract_motion,
 )
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 Solve = Callable[[Floats], Floats]
 
 DENSE_SIZE = 100
@@ -104,7 +102,7 @@ class DenseFactorisation:
 class BlockSystem:
     """A sparse matrix of dense blocks at fixed places, filled and factored each time."""
 
-    def __init__(self, count: int, size: int, rows: Integers, columns: Integers) -> None:
+    def __init__(self, count: int, size: int, rows: Ints, columns: Ints) -> None:
         """``count`` block rows of ``size`` rows each; blocks at (rows, columns)."""
         tree = self.tree = elimination_tree(count, size, rows, columns)
         self.space = np.empty(tree.rest_most), np.empty(tree.stack_most)
@@ -200,7 +198,7 @@ class BodyFactorisation:
 
 @njit(cache=True)
 def factor_contacts(
-    tree: EliminationTree, mass: Floats, first: Integers, block: Floats, places: Integers,
+    tree: EliminationTree, mass: Floats, first: Ints, block: Floats, places: Ints,
     a: Floats, b: Floats, matrix: Floats, factors: Floats, rest: Floats, stack: Floats,
 ) -> tuple[Floats, Floats, bool]:  # fmt: skip
     """``A^-1``, ``A^-1 B`` and the ``factors`` of ``M + J^T A^-1 B J``, and whether there are any.
@@ -217,7 +215,7 @@ def factor_contacts(
 
 @njit(cache=True)
 def solve_contacts(
-    tree: EliminationTree, factors: Floats, first: Integers, body: Integers, block: Floats,
+    tree: EliminationTree, factors: Floats, first: Ints, body: Ints, block: Floats,
     bodies: int, inverse: Floats, stiffness: Floats, right: Floats,
 ) -> Floats:  # fmt: skip
     """``dr = A^-1 (b - B J v)`` of the right-hand side b (nc, dim)."""

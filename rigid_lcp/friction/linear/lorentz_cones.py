@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from rigid_lcp.arrays import Floats
 
 BOUNDARY = 1e-30
 """Least determinant over x_0^2: round-off may put a point onto the boundary."""

@@ -30,8 +30,9 @@ O(k^3).
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import ProblemError
 from rigid_lcp.friction.pivots import (
     DONE,
@@ -50,8 +51,6 @@ from rigid_lcp.friction.problem import (
     require_number,
     require_whole,
 )
-
-Floats = NDArray[np.float64]
 
 
 def dantzig(

@@ -20,8 +20,8 @@ where those do not.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.friction.problem import (
     FrictionProblem,
     FrictionSolution,
@@ -39,8 +39,6 @@ from rigid_lcp.friction.sweeps import (
     pack_contacts,
     sweep_until_small,
 )
-
-Floats = NDArray[np.float64]
 
 
 def gauss_seidel(

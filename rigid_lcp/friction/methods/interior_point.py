@@ -31,8 +31,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.friction.linear import (
     Factorisation,
     SingularSystem,
@@ -53,7 +53,6 @@ from rigid_lcp.friction.problem import (
 )
 from rigid_lcp.sparse import multiply_blocks
 
-Floats = NDArray[np.float64]
 POLISHED = True
 """Newton's method is called from its end."""
 

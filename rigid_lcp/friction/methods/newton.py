@@ -19,6 +19,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.friction.linear import Factorisation, SingularSystem, factorisation
 from rigid_lcp.friction.problem import (
     FrictionProblem,
@@ -30,7 +31,6 @@ from rigid_lcp.friction.problem import (
     require_whole,
 )
 
-Floats = NDArray[np.float64]
 Flags = NDArray[np.int8]
 
 

@@ -29,8 +29,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats
 from rigid_lcp.friction.methods.gauss_seidel import gauss_seidel
 from rigid_lcp.friction.pivots import (
     DONE,
@@ -49,8 +49,6 @@ from rigid_lcp.friction.problem import (
     require_number,
     require_whole,
 )
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.friction.pivots.drive import DONE, TOO_MANY
 from rigid_lcp.friction.pivots.shift import set_lists
 from rigid_lcp.friction.pivots.state import Pivots, drive_offset
@@ -16,15 +16,12 @@ from rigid_lcp.friction.pivots.updates import (
     SLIDING_UP,
     STATIC,
     Geometry,
-    Ints,
     multiply_geometry,
     refresh_reduced,
     slide_sign,
     solve_reduced,
 )
 from rigid_lcp.friction.problem import FrictionProblem
-
-Floats = NDArray[np.float64]
 
 
 def follow_from_nothing(problem: FrictionProblem, state: Pivots, limit: int) -> int:

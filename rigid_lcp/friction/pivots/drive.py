@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.friction.pivots.updates import (
     BREAKING,
     NEW,
@@ -30,9 +30,6 @@ from rigid_lcp.friction.pivots.updates import (
     slide_sign,
     solve_reduced,
 )
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 DONE, RAY, CYCLED, SINGULAR, TOO_MANY = range(5)
 """How a drive ends: consistent; without bound; lists repeat; singular; too long."""

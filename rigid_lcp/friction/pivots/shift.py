@@ -15,8 +15,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.friction.pivots.drive import DONE, settle_values
 from rigid_lcp.friction.pivots.state import (
     Pivots,
@@ -26,9 +26,6 @@ from rigid_lcp.friction.pivots.state import (
 )
 from rigid_lcp.friction.pivots.updates import BREAKING, STATIC, multiply_geometry, refresh_reduced
 from rigid_lcp.friction.problem import FrictionProblem
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

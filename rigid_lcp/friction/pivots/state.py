@@ -10,8 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.errors import ProblemError
 from rigid_lcp.friction.pivots.drive import (
     CYCLED,
@@ -32,9 +33,6 @@ from rigid_lcp.friction.problem import (
     prove_forces_insufficient,
     require_finite,
 )
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 DIVERGED = 1e-3
 """Approach that forces leave, over the greatest of q, which no residual turns into a solution:

@@ -16,10 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from rigid_lcp.arrays import Floats, Ints
 
 LISTS = 6
 NEW, BREAKING, STATIC, SLIDING_UP, SLIDING_DOWN, TURNING = range(LISTS)

@@ -7,12 +7,10 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.errors import ProblemError, UsageError
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 LEAST, MOST = 1e-100, 1e100
 """Range of the largest number of W, and of q: squares beyond it are no numbers any more."""
@@ -95,7 +93,7 @@ def require_start(start: ArrayLike, numbers: int, dim: int) -> Floats:
     return force
 
 
-def read_order(order: ArrayLike, count: int) -> Integers | None:
+def read_order(order: ArrayLike, count: int) -> Ints | None:
     """An order as the numbers 0 ... ``count`` - 1, or None where it has not each of them once."""
     given = np.asarray(order)
     if given.shape != (count,) or (count and given.dtype.kind not in "iu"):

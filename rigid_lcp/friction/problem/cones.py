@@ -13,9 +13,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from rigid_lcp.arrays import Floats
 
 
 @njit(cache=True)

@@ -12,8 +12,9 @@ from typing import Any, Literal
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.errors import ProblemError
 from rigid_lcp.friction.problem.checks import (
     check_factors,
@@ -31,8 +32,6 @@ from rigid_lcp.sparse import (
     split_jacobian,
 )
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 Status = Literal["solved", "not converged", "no solution", "cycled", "singular"]
 """What became of a problem: ``no solution`` is a proof (a ray), the others are not."""
 
@@ -88,7 +87,7 @@ class BodySpace:
         )  # fmt: skip
         return found
 
-    def of_contacts(self, taking: NDArray[np.int64]) -> BodySpace:
+    def of_contacts(self, taking: Ints) -> BodySpace:
         """The same bodies and these contacts alone, by their numbers."""
         dim = 2 if self.body_size == 3 else 3
         rows = (dim * taking[:, None] + np.arange(dim)).ravel()
@@ -138,12 +137,12 @@ class FrictionProblem:
         return sp.bsr_array(self.delassus, blocksize=(self.dim, self.dim))
 
     @cached_property
-    def body_jacobians(self) -> tuple[Integers, Integers, Floats]:
+    def body_jacobians(self) -> tuple[Ints, Ints, Floats]:
         """J of the bodies in blocks: ``first``, ``body``, ``block``
         (`rigid_lcp.sparse.body_matrix`)."""
         assert self.bodies is not None
         rows = self.bodies.jacobian
-        made: tuple[Integers, Integers, Floats] = split_jacobian(
+        made: tuple[Ints, Ints, Floats] = split_jacobian(
             rows.indptr, rows.indices, rows.data, self.dim, self.bodies.body_size
         )
         return made

@@ -14,13 +14,10 @@ from itertools import product
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.friction.problem.cones import natural_map
 from rigid_lcp.friction.problem.definition import FrictionProblem
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 DESCENT_STEPS = 3000
 """Of the descent: forces that balance each other are found in some dozens, rarely in a thousand."""

@@ -10,13 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.friction.problem import BodySpace, FrictionProblem
 from rigid_lcp.sparse import diagonal_blocks
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -29,7 +26,7 @@ class BodyBlocks:
     has the blocks on W's diagonal.
     """
 
-    body: Integers
+    body: Ints
     block: Floats
     local: Floats
     bodies: int
@@ -42,7 +39,7 @@ class BodyBlocks:
 
 
 @njit(cache=True)
-def add_impulses(body: Integers, block: Floats, force: Floats, velocity: Floats) -> None:
+def add_impulses(body: Ints, block: Floats, force: Floats, velocity: Floats) -> None:
     """``w += B^T r``: changes ``velocity`` (bodies + 1, size) by the forces (nc, dim)."""
     for c in range(len(body)):
         bears = False  # few contacts of a bed in motion do
@@ -58,7 +55,7 @@ def add_impulses(body: Integers, block: Floats, force: Floats, velocity: Floats)
 
 
 @njit(cache=True)
-def find_relative_velocities(body: Integers, block: Floats, velocity: Floats) -> Floats:
+def find_relative_velocities(body: Ints, block: Floats, velocity: Floats) -> Floats:
     """``B w`` of every contact, (nc, dim)."""
     relative = np.zeros((len(body), block.shape[2]))
     for c in range(len(body)):
@@ -90,8 +87,8 @@ def lay_out_bodies(problem: FrictionProblem) -> BodyBlocks | None:
 
 @njit(cache=True)
 def pair_blocks(
-    first: Integers, moved: Integers, part: Floats, root: Floats
-) -> tuple[Integers, Floats, Floats] | None:
+    first: Ints, moved: Ints, part: Floats, root: Floats
+) -> tuple[Ints, Floats, Floats] | None:
     """``body``, ``block`` and ``local`` of `BodyBlocks`; None if a contact moves three bodies.
 
     A block of zeros moves none.
@@ -165,7 +162,7 @@ def root_inverse_mass(space: BodySpace) -> Floats | None:
     return scale[:, :, None] * vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
 
 
-def lay_out_matrix(problem: FrictionProblem) -> tuple[Floats, Integers, Integers, Floats]:
+def lay_out_matrix(problem: FrictionProblem) -> tuple[Floats, Ints, Ints, Floats]:
     """Rows of W in blocks, ``block[start[c]:start[c + 1]]`` at contacts ``column``, and the blocks
     on the diagonal (nc, dim, dim), zeros if need be: ``local``, ``start``, ``column``, ``block``"""
     dim, contacts = problem.dim, problem.contacts

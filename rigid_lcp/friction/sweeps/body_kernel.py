@@ -16,12 +16,9 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.friction.sweeps.local_contact import NONE, solve_contact_2d, solve_contact_3d
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 REGULAR = 1e-8
 """Least determinant of a block that is inverted, over the product of its diagonal."""
@@ -88,8 +85,8 @@ def pack_contacts(block: Floats, local: Floats, offset: Floats, friction: Floats
 
 @njit(cache=True)
 def sweep_bodies_2d(
-    body: Integers, packed: Floats, local: Floats, force: Floats, last: Floats, velocity: Floats,
-    part: float, visit: Integers,
+    body: Ints, packed: Floats, local: Floats, force: Floats, last: Floats, velocity: Floats,
+    part: float, visit: Ints,
 ) -> tuple[int, float, float]:  # fmt: skip
     """A sweep in the plane from y; changes ``force`` and the bodies' ``velocity`` (in: of y).
 
@@ -139,8 +136,8 @@ def sweep_bodies_2d(
 
 @njit(cache=True)
 def sweep_bodies_3d(
-    body: Integers, packed: Floats, local: Floats, force: Floats, last: Floats, velocity: Floats,
-    part: float, visit: Integers,
+    body: Ints, packed: Floats, local: Floats, force: Floats, last: Floats, velocity: Floats,
+    part: float, visit: Ints,
 ) -> tuple[int, float, float]:  # fmt: skip
     """`sweep_bodies_2d` in space."""
     stuck, product, square = 0, 0.0, 0.0

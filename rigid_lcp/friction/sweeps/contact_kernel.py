@@ -13,15 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.friction.problem import natural_map
 from rigid_lcp.friction.sweeps.blocks import add_impulses, find_relative_velocities
 from rigid_lcp.friction.sweeps.body_kernel import sweep_bodies_2d, sweep_bodies_3d
 from rigid_lcp.friction.sweeps.local_contact import NONE, solve_contact_2d, solve_contact_3d
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -62,10 +59,10 @@ class SweepBlocks(NamedTuple):
     local: Floats
     packed: Floats
     """`rigid_lcp.friction.sweeps.pack_contacts` where ``body`` is not empty."""
-    body: Integers
+    body: Ints
     block: Floats
-    start: Integers
-    column: Integers
+    start: Ints
+    column: Ints
     entry: Floats
     bodies: int
     rho: float
@@ -87,7 +84,7 @@ class Momentum(NamedTuple):
 @njit(cache=True)
 def visit_all(
     blocks: SweepBlocks, force: Floats, last: Floats, velocity: Floats, part: float,
-    visit: Integers,
+    visit: Ints,
 ) -> tuple[int, float, float]:  # fmt: skip
     """One sweep from ``y = force + part (force - last)``, ``velocity`` being that of y.
 
@@ -114,7 +111,7 @@ def visit_all(
 
 @njit(cache=True)
 def sweep_once(
-    blocks: SweepBlocks, state: Momentum, force: Floats, visit: Integers, momentum: bool
+    blocks: SweepBlocks, state: Momentum, force: Floats, visit: Ints, momentum: bool
 ) -> int:  # fmt: skip
     """One sweep from ``y = r + beta (r - r before)``; changes ``force`` and ``state``.
 
@@ -188,7 +185,7 @@ def sweep_until_small(
 
 
 @njit(cache=True)
-def carrying(force: Floats, last: Floats, visit: Integers) -> Integers:
+def carrying(force: Floats, last: Floats, visit: Ints) -> Ints:
     """Those of the contacts ``visit`` that bear, or did before the last sweep, in their order."""
     found, count = np.empty_like(visit), 0
     for c in visit:
@@ -265,8 +262,8 @@ def measure_step(
 
 @njit(cache=True)
 def sweep_matrix(
-    start: Integers, column: Integers, block: Floats, local: Floats, offset: Floats,
-    friction: Floats, force: Floats, visit: Integers,
+    start: Ints, column: Ints, block: Floats, local: Floats, offset: Floats,
+    friction: Floats, force: Floats, visit: Ints,
 ) -> int:  # fmt: skip
     """A sweep with the rows of W, in blocks; changes ``force``; returns as `sweep_bodies_2d`."""
     stuck, dim = 0, force.shape[1]

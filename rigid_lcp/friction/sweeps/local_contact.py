@@ -19,16 +19,14 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.friction.sweeps.sliding_direction import (
     TIE_ROUND_OFF,
     find_all_directions,
     find_direction_near,
 )
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 OPEN, STICK, SLIDE, NONE = 0, 1, 2, 3
 
 SINGULAR = 1e-13
@@ -36,9 +34,7 @@ SINGULAR = 1e-13
 
 
 @njit(cache=True)
-def solve_contacts_apart(
-    local: Floats, offset: Floats, friction: Floats
-) -> tuple[Floats, Integers]:
+def solve_contacts_apart(local: Floats, offset: Floats, friction: Floats) -> tuple[Floats, Ints]:
     """Contacts that feel no other: forces (nc, dim) and statuses (nc,) of W's blocks ``local``."""
     force, status = np.zeros_like(offset), np.zeros(len(offset), dtype=np.int64)
     for c in range(len(offset)):

@@ -11,7 +11,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from rigid_lcp.arrays import Floats
+
 Indices = NDArray[np.int32]
 
 SYMMETRIC = 1e-13

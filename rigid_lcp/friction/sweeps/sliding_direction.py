@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from rigid_lcp.arrays import Floats
 
 TIE_ROUND_OFF = 1e-14
 """Relative size below which a difference of the data is rounding: ties on the edge of the cone."""
