@@ -13,7 +13,6 @@ from trackbed.cache_folders import provide_cache_folders
 if TYPE_CHECKING:
     from rigid_lcp.collision import collide
     from rigid_lcp.errors import RigidError
-    from rigid_lcp.friction.attempts import lcp
     from rigid_lcp.friction.auto import solve_friction
     from rigid_lcp.friction.problem import BodySpace, FrictionProblem, FrictionSolution
     from rigid_lcp.motion import Scene
@@ -26,7 +25,6 @@ provide_cache_folders(__path__[0])
 _ROOMS = {
     "collision": ("collide",),
     "errors": ("RigidError",),
-    "friction.attempts": ("lcp",),
     "friction.auto": ("solve_friction",),
     "friction.problem": ("BodySpace", "FrictionProblem", "FrictionSolution"),
     "motion": ("Scene",),
@@ -37,7 +35,7 @@ _ROOMS = {
 _HOMES = {name: room for room, names in _ROOMS.items() for name in names}
 __all__ = [
     "BodySpace", "Breakage", "Disc", "FrictionProblem", "FrictionSolution", "HalfSpace", "Polygon",
-    "Polyhedron", "RigidError", "Scene", "Simulation", "Sphere", "Wear", "box", "collide", "lcp",
+    "Polyhedron", "RigidError", "Scene", "Simulation", "Sphere", "Wear", "box", "collide",
     "solve_friction",
 ]  # fmt: skip
 

@@ -215,20 +215,6 @@ def sliding_prism_answer(seconds: float) -> Floats:
 # --- bodies that collide again and again ---
 
 
-def dense_gas() -> Scene:
-    """36 discs in a box without friction or loss, spaced by less than a step's way at 10 ms."""
-    scene = Scene(2, gravity=(0.0, 0.0))
-    for normal in ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)):
-        scene.add(HalfSpace(normal, -0.33), restitution=1.0)
-    speeds = np.random.default_rng(5).standard_normal((36, 2))
-    for k, speed in enumerate(speeds):
-        place = (0.11 * (k % 6) - 0.275, 0.11 * (k // 6) - 0.275)
-        scene.add(
-            Disc(0.05), density=1000.0, position=place, velocity=tuple(speed), restitution=1.0
-        )
-    return scene
-
-
 def grains_in_a_box(seed: int) -> Scene:
     """Five discs and boxes that fly about in a trough; restitution 0.7, friction 0.3."""
     generator = np.random.default_rng(seed)

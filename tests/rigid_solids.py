@@ -8,14 +8,20 @@ from typing import Any
 import numpy as np
 
 from rigid_lcp import HalfSpace, Polyhedron, box
+from rigid_lcp.contact import detect_3d, shapes_3d
 from rigid_lcp.contact.arrays import Contacts
-from rigid_lcp.contact.detection_space import detect_3d, shapes_3d
+from rigid_lcp.motion.gyroscopic import world_inertia
 from rigid_lcp.shapes.rotations import Floats, rotation_matrix, unit_quaternion
 
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 FLOOR = HalfSpace([0.0, 0.0, 1.0], 0.0)
 CUBE = box(1.0, 1.0, 1.0)
 Placed = tuple[Sequence[object], Floats, Floats]
+
+
+def angular_momentum(inertia: Floats, quaternion: Floats, spin: Floats) -> Floats:
+    """``I(q) w`` in the world frame."""
+    return np.einsum("...ij,...j->...i", world_inertia(inertia, quaternion), spin)
 
 
 def ballast_stone(generator: np.random.Generator, size: float, corners: int = 16) -> Polyhedron:

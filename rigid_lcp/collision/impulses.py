@@ -33,10 +33,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigid_lcp.arrays import Floats, Ints
-from rigid_lcp.collision.passing import SPEED_ROUND_OFF
-from rigid_lcp.collision.restitution_scale import Share
+from rigid_lcp.collision.passing import SPEED_ROUND_OFF, Share
 from rigid_lcp.errors import ProblemError, UsageError
 from rigid_lcp.friction.attempts import frictionless
+from rigid_lcp.friction.auto import solve_friction
+from rigid_lcp.friction.methods import pivoting
 from rigid_lcp.friction.problem import (
     FORCE_ROUND_OFF,
     MOST_FRICTION,
@@ -50,6 +51,7 @@ from rigid_lcp.friction.problem import (
     length,
     require_finite,
     require_number,
+    require_one_a_contact,
     require_whole,
 )
 
@@ -113,8 +115,8 @@ def collide(
     """
     dim, before = check_moving_bodies(bodies, velocity)
     nc = bodies.jacobian.shape[0] // dim
-    eps = check_one_a_contact("restitution", restitution, 1.0, nc)
-    mu = check_one_a_contact("friction", friction, MOST_FRICTION, nc)
+    eps = require_one_a_contact(restitution, "restitution", 1.0, nc)
+    mu = require_one_a_contact(friction, "friction", MOST_FRICTION, nc)
     if max_rounds is None:
         max_rounds = COLLISION_ROUNDS_ROUGH if mu.any() else COLLISION_ROUNDS
     if law not in get_args(Law):
@@ -243,17 +245,13 @@ def _find_impulses_at(problem: FrictionProblem, tolerance: float) -> FrictionSol
     if not problem.friction.any():
         return frictionless(problem, None, tolerance)
     if problem.dim == 2 and problem.contacts <= 300:
-        from rigid_lcp.friction.methods import pivoting
-
         found = pivoting(problem, None, tolerance)
         if found.solved:
             return found
-    from rigid_lcp.friction.auto import solve_friction
-
-    solution: FrictionSolution = solve_friction(
+    assert problem.bodies is not None
+    return solve_friction(
         problem.bodies, problem.offset, problem.friction, problem.dim, tolerance=tolerance
     )
-    return solution
 
 
 Law = Literal["newton", "moreau"]
@@ -286,22 +284,4 @@ def numbers_of(name: str, values: ArrayLike, count: int, remedy: str) -> Floats:
         raise ProblemError(
             f"{name} has {len(array)} numbers, not {count}", where=name, remedy=f"give {remedy}"
         )
-    return array
-
-
-def check_one_a_contact(name: str, values: ArrayLike, upper: float, nc: int) -> Floats:
-    """``values`` as (nc,), each from 0 to ``upper``; `ProblemError`, with ``name``, for others."""
-    array = require_finite(values, name)
-    if array.shape not in ((), (nc,)):
-        raise ProblemError(
-            f"{name} has shape {array.shape} for {nc} contacts", where=name,
-            remedy="give one number, or one a contact",
-        )  # fmt: skip
-    array = np.broadcast_to(array, (nc,)).copy()
-    bad = np.flatnonzero(~((array >= 0.0) & (array <= upper)))
-    if len(bad):
-        raise ProblemError(
-            f"{name} is {array[bad[0]]:g}", where=f"{name}, contact {bad[0]}",
-            remedy=f"give 0 to {upper:g}",
-        )  # fmt: skip
     return array

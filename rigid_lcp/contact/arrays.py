@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from typing import Self
 
 import numpy as np
@@ -38,15 +38,10 @@ class Contacts:
     """Coulomb's coefficients [-], (nc,)."""
     restitution: Floats
     """Coefficients of restitution [-], (nc,)."""
-    edge_a: Floats = field(default_factory=lambda: np.zeros(0))
+    edge_a: Floats
     """Unit directions of a's edge at the contact (nc, dim), zero where it is none; 3D only."""
-    edge_b: Floats = field(default_factory=lambda: np.zeros(0))
+    edge_b: Floats
     """Unit directions of b's edge, likewise; 3D only."""
-
-    def __post_init__(self) -> None:
-        for name in ("edge_a", "edge_b"):
-            if len(getattr(self, name)) != len(self.normal):
-                object.__setattr__(self, name, np.zeros_like(self.normal))
 
     def __len__(self) -> int:
         return len(self.gap)

@@ -19,6 +19,7 @@ from rigid_lcp.contact.near_pairs import (
     DISC,
     HALF_SPACE,
     POLYGON,
+    ZERO,
     bound_shapes,
     near_pairs,
     place_shapes,
@@ -106,10 +107,10 @@ def detect_2d(
     bodies, numbers, key = pair_contacts(
         pairs, shapes.kind, shapes.first, vertices, normals, shapes.radius, position, margins
     )
-    zero = np.zeros(len(key))
+    zero, edges = np.zeros((2, len(key))), np.zeros((2, len(key), 2))
     return Contacts(
         bodies[:, 0], bodies[:, 1], numbers[:, 0:2], numbers[:, 2:4], numbers[:, 4], key,
-        numbers[:, 5], numbers[:, 6], zero, zero.copy(),
+        numbers[:, 5], numbers[:, 6], zero[0], zero[1], edges[0], edges[1],
     )  # fmt: skip
 
 
@@ -156,7 +157,8 @@ def find_face_contacts(
     ends = (face, (face + 1) % len(face_own))
     t0, t1 = -n[1], n[0]
     length = t0 * (face_own[ends[1], 0] - corner[0]) + t1 * (face_own[ends[1], 1] - corner[1])
-    opposite, steepest = 0, np.inf
+    none = opposite = int(ZERO)
+    steepest = np.inf
     for k in range(len(own)):
         cosine = n[0] * normals[k, 0] + n[1] * normals[k, 1]
         if cosine < steepest:
@@ -165,7 +167,7 @@ def find_face_contacts(
     tips = (opposite, (opposite + 1) % len(own))
     span = -m[1] * (own[tips[1], 0] - base[0]) + m[0] * (own[tips[1], 1] - base[1])
     place, candidate = np.empty(4), np.empty((4, 4))
-    count, deepest, lowest = 0, 0, np.inf
+    count, deepest, lowest = none, none, np.inf
     for side in range(2):
         for end in range(2):
             if side == 0:
@@ -193,7 +195,7 @@ def find_face_contacts(
         found[0], found[1] = candidate[low], candidate[high]
         return 1 if low == high else 2
     if lowest < 0.0:  # corner over corner: the deepest vertex, wherever it is
-        _store_row(found, 0, 0, deepest, face, lowest)
+        _store_row(found, none, none, deepest, face, lowest)
         return 1
     return 0
 
@@ -213,7 +215,7 @@ def pair_contacts(
     bodies, numbers = np.empty((room, 2), np.int64), np.empty((room, 7))
     key = np.empty(room, np.int64)
     found = np.empty((2, 4))
-    c = 0
+    c = none = int(ZERO)
     for i, j in pairs:
         margin = margins[i] + margins[j]
         if kind[j] == HALF_SPACE:
@@ -222,7 +224,7 @@ def pair_contacts(
                 x, y = position[i]
                 gap = n[0] * x + n[1] * y - offset - radius[i]
                 if gap <= margin:
-                    bodies[c, 0], bodies[c, 1], key[c] = i, j, contact_key(i, j, 0, 0)
+                    bodies[c, 0], bodies[c, 1], key[c] = i, j, contact_key(i, j, none, none)
                     _store(numbers, c, x - radius[i] * n[0], y - radius[i] * n[1], n[0], n[1], gap,
                            radius[i], np.inf)  # fmt: skip
                     c += 1
@@ -231,7 +233,7 @@ def pair_contacts(
                 x, y = vertices[v]
                 gap = n[0] * x + n[1] * y - offset
                 if gap <= margin:
-                    bodies[c, 0], bodies[c, 1], key[c] = i, j, contact_key(i, j, v - first[i], 0)
+                    bodies[c, 0], bodies[c, 1], key[c] = i, j, contact_key(i, j, v - first[i], none)
                     _store(numbers, c, x, y, n[0], n[1], gap, 0.0, np.inf)
                     c += 1
         elif kind[i] == POLYGON and kind[j] == POLYGON:
@@ -259,7 +261,7 @@ def pair_contacts(
                 _store(numbers, c, x, y, n[0], n[1], found[k, 3], 0.0, np.inf)
                 c += 1
         elif kind[i] == DISC and kind[j] == DISC:
-            c += _find_round_contact(i, j, position[i], position[j], radius[i], radius[j], 0,
+            c += _find_round_contact(i, j, position[i], position[j], radius[i], radius[j], none,
                                 margin, c, bodies, numbers, key)  # fmt: skip
         else:
             disc, grain = (i, j) if kind[i] == DISC else (j, i)
@@ -278,7 +280,8 @@ def pair_contacts(
                                     0.0, corner, margin, c, bodies, numbers, key)  # fmt: skip
                 continue
             # A key with a vertex of one beyond the last: a face is no vertex.
-            bodies[c, 0], bodies[c, 1], key[c] = disc, grain, contact_key(disc, grain, 1, face)
+            bodies[c, 0], bodies[c, 1] = disc, grain
+            key[c] = contact_key(disc, grain, none + 1, face)
             _store(numbers, c, x - radius[disc] * n[0], y - radius[disc] * n[1], n[0], n[1],
                    distance - radius[disc], radius[disc], np.inf)  # fmt: skip
             c += 1
@@ -305,7 +308,7 @@ def _find_round_contact(
     if distance - radius_a - radius_b > margin:
         return 0
     n0, n1 = (x / distance, y / distance) if distance > 0.0 else (0.0, 1.0)
-    bodies[c, 0], bodies[c, 1], key[c] = a, b, contact_key(a, b, 0, corner)
+    bodies[c, 0], bodies[c, 1], key[c] = a, b, contact_key(a, b, int(ZERO), corner)
     _store(numbers, c, centre_a[0] - radius_a * n0, centre_a[1] - radius_a * n1, n0, n1,
            distance - radius_a - radius_b, radius_a, radius_b)  # fmt: skip
     return 1

@@ -1,8 +1,7 @@
 """Contacts in space: which pairs are near, and the point contacts of every pair (eq. 9).
 
 Polyhedra: corners on faces and crossing edges, else on edges and corners, of each pair the outer
-ones (`rigid_lcp.contact.solids`); spheres: the nearest point of the other body
-(`rigid_lcp.contact.spheres`).
+ones (`rigid_lcp.contact.solids`); spheres: the nearest point of the other body, in closed form.
 """
 
 from __future__ import annotations
@@ -22,8 +21,9 @@ from rigid_lcp.contact.manifold import (
     TIE_IN_SPACE,
     add_candidate,
     keep_outer,
+    within_face,
 )
-from rigid_lcp.contact.near_pairs import HALF_SPACE, bound_shapes, near_pairs
+from rigid_lcp.contact.near_pairs import HALF_SPACE, ZERO, bound_shapes, near_pairs
 from rigid_lcp.contact.placed_solids import (
     BODY_BITS,
     FEATURE_BITS,
@@ -32,13 +32,93 @@ from rigid_lcp.contact.placed_solids import (
     SPHERE,
     Shapes3D,
     place_solids,
-    shapes_3d,
 )
 from rigid_lcp.contact.separation import Solids, dot
 from rigid_lcp.contact.solids import CORNER_EDGE, CORNERS, EDGE_CORNER, find_solid_contacts
-from rigid_lcp.contact.spheres import touch_sphere_plane, touch_sphere_solid, touch_sphere_sphere
 
-__all__ = ["detect_3d", "shapes_3d"]
+
+@njit(cache=True)
+def touch_sphere_sphere(x: Floats, radius: float, y: Floats, other: float, row: Floats) -> int:
+    """Eq. 8 for centres x (sphere a) and y (b); concentric ones are parted along z.
+
+    Fills ``row`` as `touch_sphere_solid` does; returns 0, the only feature a sphere has.
+    """
+    _fill_round(row, x, radius, y[0], y[1], y[2], other)
+    return 0
+
+
+@njit(cache=True)
+def touch_sphere_plane(solids: Solids, plane: int, x: Floats, radius: float, row: Floats) -> int:
+    """Gap of a sphere over a half-space; fills ``row``, returns the feature 0."""
+    face = solids.first_face[plane]
+    n = solids.normal[face]
+    _fill(row, x, radius, n, dot(n, x) - solids.offset[face] - radius, np.inf)
+    return 0
+
+
+@njit(cache=True)
+def touch_sphere_solid(solids: Solids, body: int, x: Floats, radius: float, row: Floats) -> int:
+    """Contact of a sphere (body a) with the nearest point of a polyhedron (body b).
+
+    ``row`` is filled with point (3), normal (3), gap, radii of curvature of a and b, b's zero for
+    a corner or an edge.  A centre inside the polyhedron leaves through the nearest face.  Returns
+    the number of the feature: faces first, then edges, then corners.
+    """
+    first_face, first_edge = solids.first_face[body], solids.first_edge[body]
+    faces = solids.first_face[body + 1] - first_face
+    edges = solids.first_edge[body + 1] - first_edge
+    best, separation = first_face, -np.inf
+    for f in range(first_face, first_face + faces):
+        distance = dot(solids.normal[f], x) - solids.offset[f]
+        if distance > separation:
+            best, separation = f, distance
+    if separation <= 0.0 or within_face(solids, body, best, x, 0.0):
+        _fill(row, x, radius, solids.normal[best], separation - radius, np.inf)
+        return best - first_face
+    feature, nearest = 0, np.inf
+    base = solids.first_vertex[body]
+    f0, f1, f2 = 0.0, 0.0, 0.0
+    for e in range(first_edge, first_edge + edges):
+        p, q = solids.vertex[base + solids.edge[e, 0]], solids.vertex[base + solids.edge[e, 1]]
+        u0, u1, u2 = q[0] - p[0], q[1] - p[1], q[2] - p[2]
+        along = u0 * (x[0] - p[0]) + u1 * (x[1] - p[1]) + u2 * (x[2] - p[2])
+        place = min(max(along / (u0 * u0 + u1 * u1 + u2 * u2), 0.0), 1.0)
+        y0, y1, y2 = p[0] + place * u0, p[1] + place * u1, p[2] + place * u2
+        squares = (x[0] - y0) ** 2 + (x[1] - y1) ** 2 + (x[2] - y2) ** 2
+        if squares < nearest:
+            nearest, f0, f1, f2 = squares, y0, y1, y2
+            feature = faces + e - first_edge
+            if place == 0.0 or place == 1.0:
+                feature = faces + edges + solids.edge[e, int(place)]
+    _fill_round(row, x, radius, f0, f1, f2, 0.0)
+    return feature
+
+
+@njit(cache=True)
+def _fill_round(
+    row: Floats, x: Floats, radius: float, y0: float, y1: float, y2: float, other: float
+) -> None:
+    """Store the contact with a sphere, or a point of radius 0, about y; parted along z if at x."""
+    away = np.empty(3)
+    away[0], away[1], away[2] = x[0] - y0, x[1] - y1, x[2] - y2
+    distance = np.sqrt(dot(away, away))
+    if distance > 0.0:
+        for axis in range(3):
+            away[axis] /= distance
+    else:
+        away[2] = 1.0
+    _fill(row, x, radius, away, distance - radius - other, other)
+
+
+@njit(cache=True)
+def _fill(
+    row: Floats, x: Floats, radius: float, normal: Floats, gap: float, curvature: float
+) -> None:
+    """Store point on the sphere, normal, gap and radii of curvature."""
+    for axis in range(3):
+        row[axis] = x[axis] - radius * normal[axis]
+        row[3 + axis] = normal[axis]
+    row[6], row[7], row[8] = gap, radius, curvature
 
 
 def detect_3d(
@@ -110,13 +190,10 @@ def pair_contacts(
     A row of numbers: point (3), normal (3), gap, radii of curvature of a and b.
     """
     room = MOST * len(pairs)
-    bodies, numbers, key = (
-        np.empty((room, 2), np.int64),
-        np.empty((room, 9)),
-        np.empty(room, np.int64),
-    )
+    bodies, numbers = np.empty((room, 2), np.int64), np.empty((room, 9))
+    key = np.empty(room, np.int64)
     found = np.empty((ROOM, CANDIDATE_COLUMNS))
-    c = 0
+    c = none = int(ZERO)
     for i, j in pairs:
         margin = margins[i] + margins[j]
         if kind[i] == SPHERE or kind[j] == SPHERE:
@@ -130,7 +207,7 @@ def pair_contacts(
                 feature = touch_sphere_solid(solids, other, x, radius, row)
             if row[6] <= margin:
                 bodies[c, 0], bodies[c, 1] = sphere, other
-                key[c] = contact_key(sphere, other, 0, 0) + feature
+                key[c] = contact_key(sphere, other, none, none) + feature
                 c += 1
             continue
         if kind[j] == HALF_SPACE:
@@ -165,7 +242,7 @@ def find_corners_on_plane(
     solids: Solids, body: int, plane: int, margin: float, size: float, found: Floats
 ) -> int:
     """Corners of a polyhedron near a half-space, the outer ones; returns how many."""
-    count = 0
+    count, kind = int(ZERO), int(CORNER_FACE)
     face = solids.first_face[plane]
     n, level, first = solids.normal[face], solids.offset[face], solids.first_vertex[body]
     for v in range(first, solids.first_vertex[body + 1]):
@@ -173,6 +250,6 @@ def find_corners_on_plane(
         gap = dot(n, x) - level
         if gap <= margin:
             count = add_candidate(
-                found, count, CORNER_FACE, v - first, 0, gap, n, 1.0, x, TIE_IN_SPACE * size
+                found, count, kind, v - first, int(ZERO), gap, n, 1.0, x, TIE_IN_SPACE * size
             )
     return keep_outer(found, count, size)

@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 
 from rigid_lcp.arrays import Floats, Ints
+from rigid_lcp.contact.near_pairs import ZERO
 from rigid_lcp.contact.separation import NEARLY_OPPOSITE, Solids, cross, cross_edges, dot
 
 TIE_IN_SPACE = 1e-9
@@ -83,7 +84,7 @@ def find_face_candidates(
     margin: float, size: float, found: Floats,
 ) -> int:  # fmt: skip
     """All point contacts of ``other`` with one face of ``own``; returns how many."""
-    count = 0
+    count = int(ZERO)
     n = solids.normal[face]
     level = solids.offset[face]
     first_own, first_other = solids.first_vertex[own], solids.first_vertex[other]
@@ -93,9 +94,9 @@ def find_face_candidates(
         gap = dot(n, x) - level
         if gap <= margin and within_face(solids, own, face, x, TIE_IN_SPACE * size):
             here, there = v - first_other, face - solids.first_face[own]
-            kind, first, second = CORNER_FACE, here, there
+            kind, first, second = int(CORNER_FACE), here, there
             if not own_is_b:
-                kind, first, second = FACE_CORNER, there, here
+                kind, first, second = int(FACE_CORNER), there, here
             count = add_candidate(
                 found, count, kind, first, second, gap, n, sign, x, SAME_CONTACT * size
             )
@@ -110,9 +111,9 @@ def find_face_candidates(
             gap = dot(m, x) - solids.offset[g]
             if gap <= margin and within_face(solids, other, g, x, TIE_IN_SPACE * size):
                 here, there = g - solids.first_face[other], solids.loop[k]
-                kind, first, second = FACE_CORNER, here, there
+                kind, first, second = int(FACE_CORNER), here, there
                 if not own_is_b:
-                    kind, first, second = CORNER_FACE, there, here
+                    kind, first, second = int(CORNER_FACE), there, here
                 count = add_candidate(
                     found, count, kind, first, second, gap, m, -sign, x, SAME_CONTACT * size
                 )
@@ -134,8 +135,9 @@ def find_face_candidates(
             if -sign * dot(normal, solids.bisector[e]) < solids.seen_about[e]:
                 continue
             count = add_candidate(
-                found, count, EDGES, edge_a - solids.first_edge[a], edge_b - solids.first_edge[b],
-                crossing[2], normal, 1.0, crossing[6:9], SAME_CONTACT * size,
+                found, count, int(EDGES), edge_a - solids.first_edge[a],
+                edge_b - solids.first_edge[b], crossing[2], normal, 1.0, crossing[6:9],
+                SAME_CONTACT * size,
             )  # fmt: skip
     return count
 

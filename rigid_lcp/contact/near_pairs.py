@@ -12,6 +12,8 @@ from rigid_lcp.arrays import Bools, Floats, Ints
 
 POLYGON, DISC, HALF_SPACE = 0, 1, 2
 """Kinds of shapes as the kernels know them."""
+ZERO = 0
+"""As ``int(ZERO)`` it is a number: numba compiles what is called with constants once more."""
 
 
 @njit(cache=True)

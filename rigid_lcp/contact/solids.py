@@ -26,6 +26,7 @@ from rigid_lcp.contact.manifold import (
     keep_outer,
     least_gap,
 )
+from rigid_lcp.contact.near_pairs import ZERO
 from rigid_lcp.contact.separation import (
     NEARLY_OPPOSITE,
     Solids,
@@ -109,7 +110,7 @@ def find_corner_candidates(
     """
     tie = TIE_IN_SPACE * size
     pairs = np.empty((PAIRS, PAIR_COLUMNS))
-    many = list_corner_edge_pairs(solids, a, b, near_b, 1.0, within, tie, pairs, 0)
+    many = list_corner_edge_pairs(solids, a, b, near_b, 1.0, within, tie, pairs, int(ZERO))
     many = list_corner_edge_pairs(solids, b, a, near_a, -1.0, within, tie, pairs, many)
     nearest, normal, point = touching, np.empty(3), np.empty(3)
     for row in range(many):
@@ -154,10 +155,8 @@ def find_solid_contacts(
     face_b, gap_b = separate_faces(solids, b, a, margin)
     if gap_b > margin:
         return 0
-    near_a, near_b = (
-        find_near_edges(solids, a, box_b, margin),
-        find_near_edges(solids, b, box_a, margin),
-    )
+    near_a = find_near_edges(solids, a, box_b, margin)
+    near_b = find_near_edges(solids, b, box_a, margin)
     edge_a, edge_b, gap_edges = separate_edges(solids, a, b, near_a, near_b, margin)
     if gap_edges > margin:
         return 0
@@ -179,7 +178,7 @@ def find_solid_contacts(
         and gap_edges > faces + TIE_IN_SPACE * size
         and dot(crossing[3:6], towards) < np.cos(NEARLY_OPPOSITE)
     )
-    count = 0
+    count = int(ZERO)
     if not alone:
         near = near_a if own_is_b else near_b
         count = find_face_candidates(solids, face, own, other, own_is_b, near, margin, size, found)
@@ -188,8 +187,9 @@ def find_solid_contacts(
     deep = count == 0 and apart < -TIE_IN_SPACE * size
     if alone or (crosses and missing and (gap_edges == apart or deep)):
         count = add_candidate(
-            found, count, EDGES, edge_a - solids.first_edge[a], edge_b - solids.first_edge[b],
-            crossing[2], crossing[3:6], 1.0, crossing[6:9], SAME_CONTACT * size,
+            found, count, int(EDGES), edge_a - solids.first_edge[a],
+            edge_b - solids.first_edge[b], crossing[2], crossing[3:6], 1.0, crossing[6:9],
+            SAME_CONTACT * size,
         )  # fmt: skip
         least = least_gap(found, count)
     if apart > -TIE_IN_SPACE * size and least > apart + TIE_IN_SPACE * size:

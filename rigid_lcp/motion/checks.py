@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from math import inf, nan
 from numbers import Integral, Real
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,10 +13,7 @@ from numpy.typing import ArrayLike
 from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import SceneError, UsageError
 from rigid_lcp.motion.state import Motion
-from rigid_lcp.shapes import real_numbers, require_vector
-
-if TYPE_CHECKING:
-    from rigid_lcp.shapes import HalfSpace
+from rigid_lcp.shapes import HalfSpace, real_numbers, require_vector
 
 Loads = Callable[[float, Motion], ArrayLike | None]
 """Forces and torques (n, 3) in 2D, (n, 6) in 3D [N, N m] at a time [s] and state."""

@@ -35,11 +35,6 @@ def world_inertia(inertia: Floats, quaternion: Floats) -> Floats:
     return np.einsum("...ij,...jk,...lk->...il", turn, inertia, turn)
 
 
-def angular_momentum(inertia: Floats, quaternion: Floats, spin: Floats) -> Floats:
-    """``I(q) w`` in the world frame [kg m^2/s], (..., 3)."""
-    return np.einsum("...ij,...j->...i", world_inertia(inertia, quaternion), spin)
-
-
 def gyroscopic_acceleration(inertia: Floats, quaternion: Floats, spin: Floats) -> Floats:
     """``-I^-1 (w x I w)`` [rad/s^2], (..., 3): how the spin of a free body changes (eq. 17)."""
     placed = world_inertia(inertia, quaternion)

@@ -8,8 +8,7 @@ one.  Four things are added to the paper:
 * Halving alone takes some twenty halvings to come down to a gap of 5e-10 of a body, and as many
   doublings to get away from it.  So the step that is tried for the one taken back ends where the
   gap closes, by the cubic through gap and approach at its two ends; the half is tried where these
-  are not known (`find_share_until_touch`).  A dozen grains that bounce in a box, 230 collisions: 5
-  steps each, by halving alone 72, and an eighth of the time.
+  are not known (`find_share_until_touch`).
 * Bounces that get shorter without end (Zeno) are cut off: an approach slower than 1e-4 of
   the free-fall speed over a body's size (``REST_SPEED``) is a collision without restitution.
   Collisions are those of `rigid_lcp.collision.collide`.
@@ -84,7 +83,7 @@ class Pace:
     a stage had no forces."""
     collisions: int = 0
     scaled: int = 0
-    """Collisions whose restitution was scaled down (`rigid_lcp.collision.restitution_scale`)."""
+    """Collisions whose restitution was scaled down (`rigid_lcp.collision.passing`)."""
     cut_off: int = 0
     """Collisions that ran out of rounds (`rigid_lcp.collision.impulses`)."""
     worst_residual: float = 0.0

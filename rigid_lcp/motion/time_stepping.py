@@ -12,10 +12,10 @@ by ``g = g_m - h^2/8 J' v``: it may close within the step, not more (Moreau, Eur
 93; Jean, CMAME 177 (1999) 235).  Without friction no step adds energy: the mean of ``J v`` and
 ``J v+`` is never positive where p_N is not zero (to the second order in h where J turns).  With
 restitution 1 a bounce keeps it to round-off, and so do chains of collisions within the step
-(`rigid_lcp.collision.passing`, `rigid_lcp.motion.struck_bodies`).  An approach no faster than what
-gravity gives in a step, ``g h``, does not bounce.  With friction a body that comes to rest within a
+(`rigid_lcp.collision.passing`).  An approach no faster than what gravity gives in a step, ``g h``,
+does not bounce.  With friction a body that comes to rest within a
 step may gain up to ``m (h |f/m|)^2 / 8``, and restitution is scaled down where it would make more
-(`rigid_lcp.collision.restitution_scale`).  Overlaps that are left are taken out by moving the
+(`rigid_lcp.collision.passing`).  Overlaps that are left are taken out by moving the
 bodies apart (`rigid_lcp.motion.overlap_removal`).
 
 Use it where forces do not exist (Painleve) or where events are too many to be met one by one; it
@@ -36,7 +36,6 @@ from rigid_lcp.collision import (
     Closing,
     Impulses,
     Share,
-    StepVelocities,
     find_bouncing,
     find_contact_shift,
     find_hit_by_others,
@@ -53,13 +52,15 @@ from rigid_lcp.motion.equations import (
     inertial_acceleration,
     relative_velocity,
 )
-from rigid_lcp.motion.overlap_removal import OVERLAP_ALLOWED, Restitution, part_bodies
-from rigid_lcp.motion.state import Motion, replace_rates
-from rigid_lcp.motion.struck_bodies import (
+from rigid_lcp.motion.overlap_removal import (
+    OVERLAP_ALLOWED,
+    Restitution,
     find_contacts_of_struck,
     find_missed_collisions,
     moreau_margin,
+    part_bodies,
 )
+from rigid_lcp.motion.state import Motion, replace_rates
 from rigid_lcp.motion.world import World
 
 SolveFrom = Callable[..., tuple[FrictionSolution, float]]
@@ -87,7 +88,7 @@ class Step:
     message: str = ""
     """What the solver has to say of impulses that it did not find."""
     scaled: bool = False
-    """Whether restitution was scaled down (`rigid_lcp.collision.restitution_scale`)."""
+    """Whether restitution was scaled down (`rigid_lcp.collision.passing`)."""
     cut_off: bool = False
     """Whether collisions were closed without restitution (`rigid_lcp.collision.passing`)."""
 
@@ -116,8 +117,10 @@ def step_moreau(
     slow = float(np.linalg.norm(world.scene.gravity)) * h
     solve = partial(judge_impulses, slow=slow, tolerance=tolerance, accept=accept)
     for turn in range(WIDENINGS + 1):
-        made = detect_step_contacts(world, contacts, middle, free, h, solve, known)
-        end = world.drifted(made.after, 0.5 * h)
+        found, after, scaled, restitution = detect_step_contacts(
+            world, contacts, middle, free, h, solve, known
+        )
+        end = world.drifted(after, 0.5 * h)
         touching = world.contacts(end, 0.0)
         struck = find_missed_collisions(world, contacts, end, touching, slow)
         if turn == WIDENINGS or not struck.any():
@@ -126,43 +129,29 @@ def step_moreau(
         if len(wider) == len(contacts):
             break
         contacts = wider
-    end = part_bodies(world, motion, end, pull, h, touching, made.restitution)
-    found = made.impulses
+    end = part_bodies(world, motion, end, pull, h, touching, restitution)
     forces = contact_forces(contacts, found.impulse, found.velocity, h)
-    return Step(end, forces, found.error, found.message, made.scaled, found.cut_off)
-
-
-@dataclass(frozen=True)
-class Made:
-    """What contacts did in a step."""
-
-    impulses: Impulses
-    after: Motion
-    """The bodies at the midpoint, with their rates at the end."""
-    scaled: bool
-    """Whether restitution was scaled down."""
-    restitution: Restitution | None
-    """What restitution did; None where nothing bounced."""
+    return Step(end, forces, found.error, found.message, scaled, found.cut_off)
 
 
 def detect_step_contacts(
     world: World, contacts: Contacts, middle: Motion, free: Motion, h: float, solve: SolveFrom,
     known: ContactForces | None,
-) -> Made:  # fmt: skip
+) -> tuple[Impulses, Motion, bool, Restitution | None]:  # fmt: skip
     """Impulses of the contacts of a step, with as much restitution as makes no energy, and the
-    rates they leave; ``middle`` and ``free`` as `find_closing_contacts` has them."""
+    bodies at the midpoint with the rates they leave; whether restitution was scaled down; what it
+    did, None where nothing bounced.  ``middle`` and ``free`` as `find_closing_contacts` has them.
+    """
     bodies = body_space(contacts, middle.position, world.columns, world.inverse_mass(middle))
     closing = find_closing_contacts(world, contacts, middle, free, h)
     found = find_step_impulses(bodies, closing, solve, keep_known_impulses(contacts, known, h))
-    velocities = StepVelocities(
-        relative_velocity(contacts, middle), relative_velocity(contacts, free),
-        (free.rates - middle.rates)[world.movable],
-    )  # fmt: skip
+    velocities = relative_velocity(contacts, middle), relative_velocity(contacts, free)
+    gained = (free.rates - middle.rates)[world.movable]
     share, full = Share(len(contacts)), closing.restitution
     while (bounce := find_bouncing(closing)).any():
         if found.error > START_AGAIN:  # wedged bodies may have no impulses to bounce with
             share.leave_out()
-        elif not share.next(gains_energy(bodies, closing, velocities, found, bounce)):
+        elif not share.next(gains_energy(bodies, closing, *velocities, gained, found, bounce)):
             break
         closing = replace(closing, restitution=share.now * full)
         found = find_step_impulses(bodies, closing, solve, None)
@@ -175,7 +164,7 @@ def detect_step_contacts(
     rates = free.rates
     rates[world.movable] += find_response(bodies, found.impulse)
     after = replace_rates(middle, rates)
-    return Made(found, after, bool((share.now < 1.0).any()), restitution)
+    return found, after, bool((share.now < 1.0).any()), restitution
 
 
 def _take_out_restitution(

@@ -1,7 +1,6 @@
 """Scenes: their file, grains poured, the run; `Simulation` is here."""
 
 from rigid_lcp.scene.file import SceneFile, scene_read
-from rigid_lcp.scene.frame_bodies import rebuild_frame_scene
 from rigid_lcp.scene.run import (
     history_of,
     left_out,
@@ -12,7 +11,7 @@ from rigid_lcp.scene.run import (
     unknowns_a_contact,
     write_history,
 )
-from rigid_lcp.scene.run_folder import RESULT, RunFolder, read_frame
+from rigid_lcp.scene.run_folder import RESULT, RunFolder, read_frame, rebuild_frame_scene
 from rigid_lcp.scene.simulation import Simulation
 
 __all__ = [

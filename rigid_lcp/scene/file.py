@@ -14,6 +14,16 @@ from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import ShapeError
 from rigid_lcp.motion import Loads, Motion, Scene
 from rigid_lcp.scene.types import BodyTable, Grains, Load, SceneTables, find_faults
+from rigid_lcp.shapes import (
+    Disc,
+    HalfSpace,
+    Polygon,
+    Polyhedron,
+    Sphere,
+    box,
+    get_shape,
+    rotation_matrix,
+)
 from trackbed.scene_files import Guide, read_scene
 
 GUIDE = Guide("pile", "run.duration=0.1")
@@ -51,8 +61,6 @@ def scene_build(file: SceneFile) -> Scene:
 
     Raises `ShapeError` and `SceneError` with the name of the body.
     """
-    from rigid_lcp.shapes import HalfSpace
-
     tables = file.tables
     scene = Scene(tables.dimensions, tables.gravity)
 
@@ -82,8 +90,6 @@ def place_grains(grains: Grains, dim: int) -> Iterator[tuple[Any, Floats, Any]]:
     The grid fills ``region`` row by row from below, and goes on above it.  The same seed gives the
     same grains.
     """
-    from rigid_lcp.shapes import get_shape, rotation_matrix
-
     random, draw = np.random.default_rng(grains.seed), get_shape(grains.shape)
     low, high = np.array(grains.region_low), np.array(grains.region_high)
     cell = GRID_SPACING * grains.size[1]
@@ -114,8 +120,6 @@ def name_shape(where: str) -> Iterator[None]:
 
 def shape_of(body: BodyTable, dim: int) -> Any:
     """The shape that a body's table names.  Raises `ShapeError` with the body's name."""
-    from rigid_lcp.shapes import Disc, Polygon, Polyhedron, Sphere, box
-
     with name_shape(f"body {body.name}"):
         if body.radius is not None:
             return Disc(body.radius) if dim == 2 else Sphere(body.radius)

@@ -175,12 +175,12 @@ class Simulation:
         return part
 
     def unique_forces(self) -> ContactForces:
-        """Forces that elastic contacts would choose now (section 8), worn corners softer.
+        """Forces that elastic contacts would choose now (section 8).
 
         For grains at rest or in slow motion.  Raises `NotConverged` where they are not found.
         """
         loads = None if self.loads is None else self.loads(self.time, self.motion)
-        return unique_forces(self.world, self.motion, loads, self.wear, self.worn)
+        return unique_forces(self.world, self.motion, loads)
 
     @property
     def positions(self) -> Floats:

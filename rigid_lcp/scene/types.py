@@ -164,8 +164,6 @@ class WearTable(Table):
     """Volume per work of friction [m^3/J]."""
     every: Annotated[int, Field(ge=1)] = 20
     """Steps between cuts."""
-    volume_scale: Positive | None = None
-    """Wear that changes the stiffness of a corner [m^3], in 2D [m^2]; without it none does."""
 
 
 class StrengthTable(Table):

@@ -14,23 +14,24 @@ What the limit is:
   convex, so f is unique, whatever the order of contacts and bodies and whatever the start.
 - Where contacts slide or open while others hold by friction (friction mobilised inside a jammed
   pile): equilibrium of springs and sliders loaded in one go from nothing.  Coulomb's law has no
-  potential, and there is more than one such state: relaxed from another one (``begin``), the
-  forces of a box of 46 discs with friction 1 or 5 differ by up to 36 %.  All obey eqs 26 and 27.
-  The unique forces are by definition those reached from no displacements.
+  potential, and there is more than one such state (``begin``), all of eqs 26 and 27.  The unique
+  forces are by definition those reached from no displacements.
 - Where bodies accelerate: displacements drift along the motion for ever, which opens what opens
   and slides what slides, friction against the velocity, and the forces of the contacts that hold
   are as above.
 
 Without friction the energy is convex.  With it, it is first asked whether all contacts hold
-(`find_held_displacement`): then this is the answer, from one factorisation.  Else the
-relaxation is done from nothing.  Between states that are near round-off may decide, so all is done
-in the problem's own order (`put_in_own_order`), and the way to the state with the load
-rounded to 1e-9: the same numbers, whatever the order of contacts and bodies.  From there the last
-digits are found.
+(`find_held_forces`), from one factorisation.  Else the relaxation is done from nothing.  Between
+states that are near round-off may decide, so all is done in the problem's own order
+(`put_in_own_order`), and the way to the state with the load rounded to 1e-9: the same numbers,
+whatever the order of contacts and bodies.  From there the last digits are found.
 
 On large piles that slide the tangent of springs and sliders along the way has eigenvalues with
 negative real parts, and the relaxation does not settle (`docs/rigid-indeterminacy.md`, with costs);
 the answer then says so.
+
+A time step has any of the impulses that fit.  What hangs on single forces (force chains, grains
+that break) wants those that elastic contacts would choose at that moment (`unique_forces`).
 """
 
 from __future__ import annotations
@@ -43,8 +44,17 @@ from numpy.typing import ArrayLike
 from scipy.sparse.linalg import splu
 
 from rigid_lcp.arrays import Floats, Ints
-from rigid_lcp.errors import ProblemError
+from rigid_lcp.contact import ContactForces
+from rigid_lcp.errors import NotConverged, ProblemError
 from rigid_lcp.friction.problem import BodySpace, FrictionProblem, friction_problem
+from rigid_lcp.motion import (
+    Motion,
+    World,
+    body_space,
+    contact_forces,
+    find_contact_offset,
+    replace_rates,
+)
 from rigid_lcp.unique.elastic_network import ElasticNetwork, coulomb_spring, slider_forces
 from rigid_lcp.unique.micro_displacements import (
     ElasticForces,
@@ -266,3 +276,33 @@ def turned(deformation: Floats, growth: Floats) -> Floats:
     new = deformation.copy()
     new[slides, 1:] = growth[slides, 1:] * (length[slides] / speed[slides])[:, None]
     return new
+
+
+CLOSED = 1e-6
+"""Contacts are closed up to this share of the smallest body's size: time steps leave gaps of their
+accuracy."""
+
+
+def unique_forces(world: World, motion: Motion, loads: ArrayLike | None = None) -> ContactForces:
+    """Forces of elastic contacts at the state ``motion``, the same for any order and solver.
+
+    ``loads`` (n, 3) or (n, 6) [N, N m].  All contacts are equally stiff.  For grains at rest or in
+    slow motion: impacts are not in it.  Raises `NotConverged` where the limit is not found (many
+    sliding contacts).
+    """
+    contacts = world.contacts(motion, 0.5 * CLOSED * world.length)
+    none = np.zeros((len(contacts), motion.dim))
+    if len(contacts) == 0:
+        return contact_forces(contacts, none, None, 1.0)
+    space = body_space(contacts, motion.position, world.columns, world.inverse_mass(motion))
+    free = replace_rates(motion, world.accelerations(motion, loads))
+    problem = friction_problem(
+        space, find_contact_offset(contacts, motion, free), contacts.friction, motion.dim
+    )
+    found = elastic_limit(problem, tolerance=1e-10)
+    if not found.solved:
+        raise NotConverged(
+            f"the forces of elastic contacts were not found (residual {found.residual:.2g})",
+            where="unique_forces", remedy=found.message,
+        )  # fmt: skip
+    return contact_forces(contacts, found.r.reshape(none.shape), None, 1.0)

@@ -3,18 +3,16 @@
 from rigid_lcp.wear.abrasion import (
     Wear,
     WearState,
-    contact_stiffness_worn,
     replace_worn,
     start_wear,
     step_wear,
     wear_on_after_break,
 )
 from rigid_lcp.wear.breakage import Breakage, Broken, break_scene, breaks, refuse_dust
-from rigid_lcp.wear.cuts import WornShape
-from rigid_lcp.wear.fragmentation import split_body
+from rigid_lcp.wear.cuts import WornShape, split_body
 
 __all__ = [
     "Breakage", "Broken", "Wear", "WearState", "WornShape", "break_scene", "breaks",
-    "contact_stiffness_worn", "refuse_dust", "replace_worn", "split_body", "start_wear",
+    "refuse_dust", "replace_worn", "split_body", "start_wear",
     "step_wear", "wear_on_after_break",
 ]  # fmt: skip

@@ -15,24 +15,29 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from sys import float_info
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.contact import FEATURE_BITS, MOST_EDGES, ContactForces, Contacts, contact_frames
 from rigid_lcp.errors import ShapeError
-from rigid_lcp.motion import Motion, relative_velocity, require_number_in, require_whole_in
+from rigid_lcp.motion import (
+    Body,
+    Motion,
+    Scene,
+    relative_velocity,
+    require_number_in,
+    require_whole_in,
+)
 from rigid_lcp.shapes import Polygon, Polyhedron, rotate_back
-from rigid_lcp.wear.cuts import WornShape, place_plane, rub_corners, unworn, wear_shape
-from rigid_lcp.wear.fragmentation import scene_at, take_on_motion
-
-if TYPE_CHECKING:
-    from rigid_lcp.motion import Body, Scene
-
-
-STIFFNESS_LEFT = 0.1
-"""Share of the stiffness that stays at a worn corner [-]."""
+from rigid_lcp.wear.cuts import (
+    WornShape,
+    rub_corners,
+    scene_at,
+    take_on_motion,
+    unworn,
+    wear_shape,
+)
 
 
 @dataclass(frozen=True)
@@ -43,8 +48,6 @@ class Wear:
     """k of ``V = k W`` [m^3/J], in 2D [m^2 per J/m], the same number (Reye 1860, Archard 1953)."""
     every: int = 20
     """Steps between cuts."""
-    volume_scale: float | None = None
-    """V_0 of `contact_stiffness_worn` [m^3, m^2 in 2D]; None: stiffness does not change."""
 
     def __post_init__(self) -> None:
         require_number_in(
@@ -52,11 +55,6 @@ class Wear:
             "give zero or more, in m^3/J (1e-15 to 1e-12 for rock)",
         )  # fmt: skip
         require_whole_in(self.every, 1, "every", "wear", "give 1 or more steps between cuts")
-        if self.volume_scale is not None:
-            remedy = "give a volume above zero, or None"
-            require_number_in(
-                self.volume_scale, 0.0, np.inf, "volume_scale", "wear", remedy, above=True
-            )
 
 
 @dataclass
@@ -167,27 +165,6 @@ def rub_grains(state: WearState, contacts: Contacts, volume: Floats) -> None:
                 share = float(volume[row]) / len(features)
                 state.grains[body] = rub_corners(grain, corners, share)
                 state.volume += share
-
-
-def contact_stiffness_worn(state: WearState, wear: Wear, contacts: Contacts) -> Floats:
-    """Stiffness of contacts at worn features over that of others, (nc,) [-], for
-    `rigid_lcp.unique.elastic_limit`.
-
-    Section 8 proposes "gradually changing the force law (38), which describes changing edge
-    properties", and gives no law; this is the simplest, as crushed and rounded edges yield more:
-    ``k / k_0 = left + (1 - left) exp(-V / V_0)``, V the most that a feature of the contact has
-    lost.  Without ``wear.volume_scale`` V_0 all stay as they are.
-    """
-    lost = np.zeros(len(contacts))
-    if wear.volume_scale is None:
-        return np.ones(len(contacts))
-    for row in range(len(contacts)):
-        for body, corners in find_features(state, contacts, row):
-            grain = state.grains[body]
-            plane = None if grain is None else place_plane(grain, corners)
-            if grain is not None and plane is not None:
-                lost[row] = max(lost[row], grain.lost[plane] + grain.pending[plane])
-    return np.asarray(STIFFNESS_LEFT + (1 - STIFFNESS_LEFT) * np.exp(-lost / wear.volume_scale))
 
 
 def replace_worn(scene: Scene, motion: Motion, state: WearState) -> tuple[Scene, WearState] | None:

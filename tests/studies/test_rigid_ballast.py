@@ -111,9 +111,7 @@ def law_twin(
     gap=st.floats(-1e-3, 0), normal=st.floats(-1, 1), slip=st.floats(-1, 1),
     spring=st.floats(-1e4, 1e4), mass=st.floats(0.1, 10),
 )  # fmt: skip
-def test_law_is_that_of_its_twin_and_never_pulls(
-    gap: float, normal: float, slip: float, spring: float, mass: float
-) -> None:
+def test_law_is_that_of_its_twin_and_never_pulls(gap, normal, slip, spring, mass):
     law = np.array([K, md.TANGENTIAL * K, md.DAMPING, MU])
     found = md.contact_law(law, gap, normal, slip, spring, mass, 0.5 * mass, 1e-5)
     twin = law_twin(gap, normal, slip, spring, (mass, 0.5 * mass), 1e-5)

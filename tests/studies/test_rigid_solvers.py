@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from rigid_lcp.friction.auto.solve import solve_friction
 from rigid_lcp.friction.problem.definition import FrictionProblem, friction_problem
@@ -17,7 +16,6 @@ from validation.studies.rigid_solvers import peers, reading, run
 from validation.studies.rigid_solvers.newton import _natural_map, newton_polish
 
 pytestmark = pytest.mark.studies
-Floats = NDArray[np.float64]
 needs_clarabel = pytest.mark.skipif(not peers.is_installed("clarabel"), reason="needs clarabel")
 needs_osqp = pytest.mark.skipif(not peers.is_installed("osqp"), reason="needs osqp")
 needs_siconos = pytest.mark.skipif(not peers.siconos_is_installed(), reason="needs Siconos")

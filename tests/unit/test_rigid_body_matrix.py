@@ -8,14 +8,18 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from rigid_lcp.arrays import Floats
 from rigid_lcp.sparse.body_matrix import (
     add_contacts,
     body_pairs,
     contact_stiffness,
+    csr_arrays,
     dense_delassus,
     diagonal_blocks,
+    find_row_forms,
     multiply_blocks,
+    multiply_csr,
+    multiply_factors,
+    multiply_transposed,
     push_bodies,
     split_jacobian,
     subtract_motion,
@@ -28,19 +32,9 @@ from rigid_lcp.sparse.elimination_order import (
     minimum_degree,
     symmetric_pattern,
 )
-from rigid_lcp.sparse.products import (
-    find_row_forms,
-    multiply_csr,
-    multiply_factors,
-    multiply_transposed,
-)
 from tests.rigid_networks import random_bodies, random_pairs
 
 BODIES, CONTACTS = 7, 12
-
-
-def arrays(matrix: sp.csr_array) -> tuple[Floats, ...]:
-    return matrix.indptr, matrix.indices, matrix.data
 
 
 def some_bodies(dim: int) -> tuple[sp.csr_array, sp.csr_array]:
@@ -56,10 +50,10 @@ def test_products_are_those_of_the_matrices(dim):
     g = np.random.default_rng(1)
     r, v = g.standard_normal(jacobian.shape[0]), g.standard_normal(jacobian.shape[1])
     w = (jacobian @ inverse @ jacobian.T).toarray()
-    np.testing.assert_allclose(multiply_csr(*arrays(jacobian), v), jacobian @ v, atol=1e-13)
-    found = multiply_transposed(*arrays(jacobian), len(v), r)
+    np.testing.assert_allclose(multiply_csr(*csr_arrays(jacobian), v), jacobian @ v, atol=1e-13)
+    found = multiply_transposed(*csr_arrays(jacobian), len(v), r)
     np.testing.assert_allclose(found, jacobian.T @ r, atol=1e-13)
-    both = (*arrays(jacobian), *arrays(inverse))
+    both = (*csr_arrays(jacobian), *csr_arrays(inverse))
     np.testing.assert_allclose(multiply_factors(*both, r), w @ r, atol=1e-11)
     np.testing.assert_allclose(find_row_forms(*both, len(v)), np.diag(w), atol=1e-12)
     np.testing.assert_allclose(dense_delassus(*both), w, atol=1e-12)
@@ -69,11 +63,11 @@ def test_diagonals_of_w_with_masses_alone_and_columns_given_twice():
     """``J_i M^-1 J_i^T`` where M^-1 is diagonal, and of a row that names a column two times."""
     jacobian, _ = some_bodies(2)
     inverse = sp.csr_array(sp.diags_array(np.random.default_rng(5).uniform(1, 3, 3 * BODIES)))
-    both = (*arrays(jacobian), *arrays(inverse))
+    both = (*csr_arrays(jacobian), *csr_arrays(inverse))
     expected = np.diag((jacobian @ inverse @ jacobian.T).toarray())
     np.testing.assert_allclose(find_row_forms(*both, 3 * BODIES), expected, rtol=1e-13)
     value, index, start = np.array([1.0, 2.0, -4.0]), np.array([1, 1, 0]), np.array([0, 3])
-    twice = find_row_forms(start, index, value, *arrays(inverse), 3 * BODIES)
+    twice = find_row_forms(start, index, value, *csr_arrays(inverse), 3 * BODIES)
     first, second = inverse.diagonal()[:2]
     np.testing.assert_allclose(twice, [9.0 * second + 16.0 * first], rtol=1e-14)
 
@@ -83,7 +77,7 @@ def test_blocks_of_the_jacobian_assemble_the_matrix_of_bodies(dim):
     """``J^T K J`` block by block, and the way there and back, ``J^T r`` and ``r - K J v``."""
     jacobian, inverse = some_bodies(dim)
     size, g = 3 * dim - 3, np.random.default_rng(2)
-    first, body, block = split_jacobian(*arrays(jacobian), dim, size)
+    first, body, block = split_jacobian(*csr_arrays(jacobian), dim, size)
     again = np.zeros(jacobian.shape)
     for c in range(CONTACTS):
         for k in range(first[c], first[c + 1]):
@@ -105,7 +99,7 @@ def test_blocks_of_the_jacobian_assemble_the_matrix_of_bodies(dim):
     left = subtract_motion(first, body, block, stiffness, r, v)
     np.testing.assert_allclose(left, r.ravel() - full @ (jacobian @ v), atol=1e-12)
     np.testing.assert_array_equal(
-        diagonal_blocks(*arrays(inverse), size)[3],
+        diagonal_blocks(*csr_arrays(inverse), size)[3],
         inverse.toarray()[3 * size : 4 * size, 3 * size : 4 * size],
     )
 

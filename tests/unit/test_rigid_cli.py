@@ -20,9 +20,7 @@ def scene(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_run_ends_where_friction_stops_the_block(
-    scene: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_run_ends_where_friction_stops_the_block(scene, capsys):
     """``s = v^2 / (2 mu g)``; a step of h stops it within ``v h`` of that."""
     assert command.main(["rigid", str(scene), "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
@@ -93,9 +91,7 @@ def test_resume_and_force_exclude_each_other(scene: Path) -> None:
         ["slide.toml", "--run-folder"], ["slide.toml", "--res"],
     ],
 )  # fmt: skip
-def test_flags_that_are_none_are_named(
-    words: list[str], scene: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_flags_that_are_none_are_named(words, scene, capsys):
     with pytest.raises(SystemExit) as ended:
         command.main(["rigid", *(str(scene) if word == scene.name else word for word in words)])
     assert ended.value.code == 2
@@ -103,9 +99,7 @@ def test_flags_that_are_none_are_named(
     assert not scene.with_name("slide-run").exists()
 
 
-def test_report_and_summary_say_what_was_left_out_and_what_was_not_reached(
-    scene: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_report_and_summary_say_what_was_left_out_and_what_was_not_reached(scene, capsys):
     """Without friction one unknown a contact; steps above the tolerance are counted."""
     words = ["rigid", str(scene), "--no-pictures", "--json", "--set", "surface.friction=0"]
     assert command.main([*words, "--set", "run.tolerance=1e-14"]) == 0

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_lcp import Disc, HalfSpace, Polygon, Scene, Simulation
+from rigid_lcp import Disc, HalfSpace, Polygon
 from rigid_lcp.contact.arrays import Contacts, contact_rows
 from rigid_lcp.contact.detection_plane import detect_2d, shapes_2d
 from rigid_lcp.contact.near_pairs import bound_shapes, near_pairs, place_shapes
-from rigid_lcp.errors import Overlapping, SceneError
+from rigid_lcp.errors import SceneError
 
 BOX = Polygon.rectangle(1.0, 1.0)
 
@@ -80,17 +80,6 @@ def test_fixed_bodies_do_not_touch_each_other() -> None:
 def test_shape_of_space_refused() -> None:
     with pytest.raises(SceneError, match="plane"):
         shapes_2d([HalfSpace((0, 0, 1))], np.array([False]))
-    with pytest.raises(SceneError, match="vertices"):
-        shapes_2d([Polygon.regular(1500, 1.0)], np.array([True]))
-
-
-def test_overlapping_start_refused() -> None:
-    scene = Scene(2)
-    scene.add(BOX, density=1.0)
-    scene.add(BOX, density=1.0, position=(0.2, 0.9))
-    with pytest.raises(Overlapping, match=r"overlap by 0\.1 m") as error:
-        Simulation(scene)
-    assert error.value.where == "body 0 and body 1 at the start"
 
 
 def heap(seed: int, count: int = 40) -> tuple[list[object], np.ndarray, np.ndarray]:

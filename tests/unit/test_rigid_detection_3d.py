@@ -8,9 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigid_lcp import Disc, HalfSpace, Polyhedron, Sphere, box
-from rigid_lcp.contact.detection_space import place_solids, shapes_3d
 from rigid_lcp.contact.near_pairs import bound_shapes, near_pairs
-from rigid_lcp.contact.placed_solids import MOST_EDGES
+from rigid_lcp.contact.placed_solids import place_solids, shapes_3d
 from rigid_lcp.errors import SceneError
 from rigid_lcp.shapes.rotations import (
     quaternion_of_rotation,
@@ -260,10 +259,3 @@ def test_shapes_of_the_plane_are_refused() -> None:
     for shape in (Disc(1.0), HalfSpace([0.0, 1.0])):
         with pytest.raises(SceneError, match="shape in space"):
             shapes_3d([shape], np.array([True]))
-
-
-def test_a_grain_with_too_many_edges_is_refused() -> None:
-    points = np.random.default_rng(0).normal(size=(MOST_EDGES // 3 + 10, 3))
-    ball = Polyhedron(points / np.linalg.norm(points, axis=1)[:, None])
-    with pytest.raises(SceneError, match="edges"):
-        shapes_3d([ball], np.array([True]))

@@ -8,9 +8,8 @@ import pytest
 from rigid_lcp.errors import SceneError
 from rigid_lcp.report.page import draw_movie
 from rigid_lcp.scene.file import scene_read
-from rigid_lcp.scene.frame_bodies import pack_bodies
 from rigid_lcp.scene.run import left_out, scene_run, simulation_of, summary_of
-from rigid_lcp.scene.run_folder import RunFolder
+from rigid_lcp.scene.run_folder import RunFolder, pack_bodies
 from tests.rigid_runs import WORN_AND_BROKEN, WORN_IN_SPACE
 
 

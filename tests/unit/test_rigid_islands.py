@@ -7,15 +7,12 @@ import pytest
 import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from rigid_lcp.friction.auto.islands import cut_out_island, islands, solve_islands
 from rigid_lcp.friction.methods.gauss_seidel import gauss_seidel
 from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, friction_problem
 from tests.rigid_networks import random_bodies
-
-Floats = NDArray[np.float64]
 
 
 def three_islands(dim: int) -> FrictionProblem:
@@ -77,9 +74,7 @@ def test_island_problem_has_the_rows_of_the_whole(dim: int, factors: bool) -> No
     st.integers(0, 10**6),
     st.sampled_from([2, 3]),
 )
-def test_same_answer_apart_and_however_numbered(
-    pairs: list[tuple[int, int]], seed: int, dim: int
-) -> None:
+def test_same_answer_apart_and_however_numbered(pairs, seed, dim):
     """Solved apart every contact obeys Coulomb's law, and the forces follow a renumbering.
 
     Islands keep the order of contacts: with the islands moved among each other, and the bodies
@@ -142,9 +137,7 @@ def test_islands_without_a_solution_are_named() -> None:
     seed=st.integers(0, 10_000), bodies=st.integers(1, 12), contacts=st.integers(1, 14),
     factors=st.booleans(),
 )  # fmt: skip
-def test_islands_are_the_connected_parts_of_w(
-    seed: int, bodies: int, contacts: int, factors: bool
-) -> None:
+def test_islands_are_the_connected_parts_of_w(seed, bodies, contacts, factors):
     """Beside scipy's connected components of the pattern of W, by blocks."""
     random = np.random.default_rng(seed)
     pairs = [(int(a), int(b)) for a, b in random.integers(-1, bodies, (contacts, 2))]

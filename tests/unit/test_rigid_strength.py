@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigid_lcp.wear.strength import (
+from rigid_lcp.wear.breakage import (
     brazilian_tension,
     find_opposite_pair,
     find_splitting_line,

@@ -134,9 +134,7 @@ WINDOWS: dict[str, tuple[Damage, int, str]] = STATES | {
 
 
 @pytest.mark.parametrize("fault", RAIN)
-def test_fault_in_the_rain(
-    scene: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], fault: str
-) -> None:
+def test_fault_in_the_rain(scene, monkeypatch, capsys, fault):
     """A fault in what the rain left ends the run with its name; mended, the run goes on."""
     damage, code, words = RAIN[fault]
     with monkeypatch.context() as patch:
@@ -150,13 +148,7 @@ def test_fault_in_the_rain(
 
 @pytest.mark.parametrize("fault", WINDOWS)
 @pytest.mark.long
-def test_fault_in_a_window(
-    scene: Path,
-    whole: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    fault: str,
-) -> None:
+def test_fault_in_a_window(scene, whole, monkeypatch, capsys, fault):
     """A fault in a window is named, the window before it kept; mended, the table is the same."""
     damage, code, words = WINDOWS[fault]
     run = scene.parent / "run"
@@ -199,9 +191,7 @@ def failing(count: int, error: Exception) -> Callable[..., EngineRun]:
     ],
 )
 @pytest.mark.long
-def test_failed_jump_is_retried(
-    scene: Path, monkeypatch: pytest.MonkeyPatch, count: int, error: Exception
-) -> None:
+def test_failed_jump_is_retried(scene, monkeypatch, count, error):
     """Jumps of 8, 4, 2 cycles fail, the next is half as long, succeeds, and all is recorded."""
     run = scene.parent / "run"
     monkeypatch.setattr(FakeEngine, "run", failing(count, error))
@@ -219,9 +209,7 @@ def test_failed_jump_is_retried(
     assert cycles[-1] == 24
 
 
-def test_jump_that_fails_for_good(
-    scene: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_jump_that_fails_for_good(scene, monkeypatch, capsys):
     """After jumps of 8, 4, 2 and 1: exit code 6, all stages and reasons kept, again on resume."""
     run = scene.parent / "run"
     monkeypatch.setattr(FakeEngine, "run", failing(4, NotCredible("made to fail")))
@@ -239,9 +227,7 @@ def test_jump_that_fails_for_good(
     assert events.count("jump failed") == 4
 
 
-def test_cycles_in_place_of_jumps_that_fail_for_good(
-    scene: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_cycles_in_place_of_jumps_that_fail_for_good(scene, monkeypatch):
     """With --cycle-by-cycle, of a refused run on too: every cycle is there, computed, and places
     where jumps are tried get rarer: one window of 4 behind the first, two behind the next."""
     run = scene.parent / "run"
@@ -287,13 +273,7 @@ def test_resume_amid_retries(scene: Path, tmp_path: Path, monkeypatch: pytest.Mo
 
 
 @pytest.mark.parametrize("status", [-signal.SIGKILL, -signal.SIGTERM, 128 + signal.SIGKILL])
-def test_killed_engine_is_not_a_failed_jump(
-    scene: Path,
-    whole: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    status: int,
-) -> None:
+def test_killed_engine_is_not_a_failed_jump(scene, whole, monkeypatch, capsys, status):
     """An engine killed from outside stops the run: a shorter jump would not help."""
     run = scene.parent / "run"
     error = explain_engine_failure(status, scene.parent)
@@ -322,9 +302,7 @@ def test_killed_engine_is_not_a_failed_jump(
     ],
 )
 @pytest.mark.long
-def test_damage_is_noticed_on_resume(
-    tmp_path: Path, whole: Path, capsys: pytest.CaptureFixture[str], stage: str, damage: Damage
-) -> None:
+def test_damage_is_noticed_on_resume(tmp_path, whole, capsys, stage, damage):
     """The stage and all behind it are moved to discarded/, computed again, to the same table."""
     run = tmp_path / "run"
     shutil.copytree(whole, run)
@@ -356,9 +334,7 @@ def test_lost_table_is_written_again(tmp_path: Path, whole: Path) -> None:
         assert table(run) == table(whole)
 
 
-def test_changed_scene_is_refused(
-    tmp_path: Path, whole: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_changed_scene_is_refused(tmp_path, whole, capsys):
     """run --set, or an edited scene.toml, names the parameter with both values and stops with 3."""
     run = tmp_path / "run"
     shutil.copytree(whole, run)
@@ -391,10 +367,7 @@ FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         ("adapters.engines.fake.write_dump", "states.dump", []),
     ],
 )
-def test_full_disk(
-    scene: Path, whole: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
-    where: str, name: str, stages_left: list[str],
-) -> None:  # fmt: skip
+def test_full_disk(scene, whole, monkeypatch, capsys, where, name, stages_left):
     """No space left, at any writer: exit code 5 and said so, earlier stages whole, and no jump is
     given up for it."""
     run = scene.parent / "run"
@@ -418,9 +391,7 @@ def test_full_disk(
     assert table(run) == table(whole)
 
 
-def test_full_disk_that_the_engine_did_not_notice(
-    scene: Path, whole: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_full_disk_that_the_engine_did_not_notice(scene, whole, monkeypatch, capsys):
     """A dump cut short on a disk without space is the disk's fault, not the jump's."""
     run = scene.parent / "run"
     usage = shutil.disk_usage(scene.parent)
@@ -434,9 +405,7 @@ def test_full_disk_that_the_engine_did_not_notice(
     assert table(run) == table(whole)
 
 
-def test_full_disk_at_the_lock(
-    tmp_path: Path, whole: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_full_disk_at_the_lock(tmp_path, whole, monkeypatch, capsys):
     """A disk that is full from the first byte on is named as well."""
     run = tmp_path / "run"
     shutil.copytree(whole, run)
@@ -483,9 +452,7 @@ def run_on(scene: Path, engine: str = "liggghts") -> int:
 
 
 @pytest.mark.parametrize("engine", list_real_engines())
-def test_engine_missing(
-    scene: Path, programs: Path, capsys: pytest.CaptureFixture[str], engine: str
-) -> None:
+def test_engine_missing(scene, programs, capsys, engine):
     """No program of that name: exit code 4 and how to install it."""
     assert run_on(scene, engine) == 4
     said = capsys.readouterr().err
@@ -507,10 +474,7 @@ def test_engine_missing(
         ("yade", 'echo "something else"', "something else"),
     ],
 )
-def test_wrong_version(
-    scene: Path, programs: Path, capsys: pytest.CaptureFixture[str],
-    engine: str, banner: str, its_words: str,
-) -> None:  # fmt: skip
+def test_wrong_version(scene, programs, capsys, engine, banner, its_words):
     """A program of that name that is another, too old or mute: exit code 4 with its own words."""
     install(programs, banner, name=engine)
     assert run_on(scene, engine) == 4
@@ -542,14 +506,7 @@ def test_launcher_missing(scene: Path, programs: Path, capsys: pytest.CaptureFix
         ("printf '\\377\\376'; exit 3", 5, "exit code 3"),
     ],
 )
-def test_engine_that_fails(
-    scene: Path,
-    programs: Path,
-    capsys: pytest.CaptureFixture[str],
-    work: str,
-    code: int,
-    words: str,
-) -> None:
+def test_engine_that_fails(scene, programs, capsys, work, code, words):
     """An engine that exits badly, is killed, or ends early without saying so, is named."""
     install(programs, GOOD, work)
     assert run_on(scene) == code

@@ -14,10 +14,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigid_lcp.arrays import Floats
-from rigid_lcp.friction.methods.gauss_seidel import sweep_blocks
+from rigid_lcp.friction.methods.gauss_seidel import begin_sweeps, lay_out_sweeps
 from rigid_lcp.friction.problem.definition import FrictionProblem, friction_problem
-from rigid_lcp.friction.sweeps.blocks import find_relative_velocities, lay_out_bodies
-from rigid_lcp.friction.sweeps.body_kernel import inverses, pack_contacts
+from rigid_lcp.friction.sweeps.blocks import find_relative_velocities
+from rigid_lcp.friction.sweeps.body_kernel import inverses
 from rigid_lcp.friction.sweeps.contact_kernel import visit_all
 from tests.rigid_local import solve_contact
 from tests.rigid_networks import random_bodies, random_pairs
@@ -54,25 +54,23 @@ def twin_sweep(
     seed=st.integers(0, 10_000), dim=st.sampled_from([2, 3]), contacts=st.integers(1, 8),
     mu=st.sampled_from([0.0, 0.05, 0.5, 1.2, 30.0]), part=st.sampled_from([0.0, 0.7]),
 )  # fmt: skip
-def test_a_sweep_is_that_of_the_exact_local_solutions(
-    seed: int, dim: int, contacts: int, mu: float, part: float
-) -> None:
+def test_a_sweep_is_that_of_the_exact_local_solutions(seed, dim, contacts, mu, part):
     problem = some_problem(seed, dim, contacts, mu)
-    bodies = lay_out_bodies(problem)
-    assert bodies is not None
+    blocks = lay_out_sweeps(problem)
+    assert blocks.bodies > 0
     random = np.random.default_rng(seed + 1)
     force, last = random.normal(size=(2, contacts, dim))
     expected, product, square = twin_sweep(problem, force, last, part)
     before = force.copy()
-    velocity = bodies.body_velocity(force + part * (force - last))
+    velocity = begin_sweeps(blocks, force + part * (force - last)).velocity
     _, made_product, made_square = visit_all(
-        sweep_blocks(problem, bodies), force, last, velocity, part, np.arange(contacts)
+        blocks, force, last, velocity, part, np.arange(contacts)
     )
     scale = max(1.0, float(np.abs(expected).max()))
     # the direction of sliding in 3D is a root of a quartic, found to some 1e-12
     np.testing.assert_allclose(force, expected, atol=1e-9 * scale)
     np.testing.assert_array_equal(last, before)
-    np.testing.assert_allclose(velocity, bodies.body_velocity(force), atol=1e-9 * scale)
+    np.testing.assert_allclose(velocity, begin_sweeps(blocks, force).velocity, atol=1e-9 * scale)
     bulk = float((np.abs(problem.diagonal)).max()) * contacts * dim * (scale + 10.0) ** 2
     assert made_product == pytest.approx(product, abs=1e-8 * bulk)
     assert made_square == pytest.approx(square, abs=1e-8 * bulk)
@@ -85,14 +83,14 @@ def test_blocks_of_the_bodies_make_w(dim: int, full: bool) -> None:
     random = np.random.default_rng(7)
     space = random_bodies([(0, -1), (0, 1), (1, 2), (2, 0)], 3, dim, random, full)
     problem = friction_problem(space, random.normal(size=4 * dim), 0.4, dim)
-    bodies = lay_out_bodies(problem)
-    assert bodies is not None
+    blocks = lay_out_sweeps(problem)
+    assert blocks.bodies > 0
     r = random.normal(size=(4, dim))
-    u = find_relative_velocities(bodies.body, bodies.block, bodies.body_velocity(r))
+    u = find_relative_velocities(blocks.body, blocks.block, begin_sweeps(blocks, r).velocity)
     w = space.matrix.toarray()
     np.testing.assert_allclose(u.ravel(), w @ r.ravel(), rtol=1e-10, atol=1e-10)
     own = [w[k * dim : (k + 1) * dim, k * dim : (k + 1) * dim] for k in range(4)]
-    np.testing.assert_allclose(bodies.local, own, rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(blocks.local, own, rtol=1e-10, atol=1e-10)
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -117,13 +115,11 @@ def test_inverses_invert_or_are_zero(dim: int) -> None:
 
 def test_packed_rows_hold_what_a_visit_reads() -> None:
     problem = some_problem(5, 2, 3, 0.4)
-    bodies = lay_out_bodies(problem)
-    assert bodies is not None
-    rows = pack_contacts(
-        bodies.block, bodies.local, problem.offset.reshape(-1, 2), problem.friction
-    )
+    blocks = lay_out_sweeps(problem)
+    assert blocks.bodies > 0
+    rows = blocks.packed
     assert rows.shape == (3, 21)
-    np.testing.assert_array_equal(rows[:, :3], bodies.block[:, 0, 0])
-    np.testing.assert_array_equal(rows[:, 9:12], bodies.block[:, 1, 1])
-    np.testing.assert_array_equal(rows[:, 15], bodies.local[:, 0, 1])
+    np.testing.assert_array_equal(rows[:, :3], blocks.block[:, 0, 0])
+    np.testing.assert_array_equal(rows[:, 9:12], blocks.block[:, 1, 1])
+    np.testing.assert_array_equal(rows[:, 15], blocks.local[:, 0, 1])
     np.testing.assert_array_equal(rows[:, 20], 0.4)

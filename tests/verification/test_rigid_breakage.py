@@ -10,8 +10,7 @@ import pytest
 
 from rigid_lcp import Breakage, HalfSpace, Polygon, Scene, Simulation, Wear
 from rigid_lcp.errors import SceneError, ShapeError
-from rigid_lcp.wear.breakage import breaks
-from rigid_lcp.wear.strength import brazilian_tension
+from rigid_lcp.wear.breakage import brazilian_tension, breaks
 
 GRAVITY = 9.81
 

@@ -280,9 +280,7 @@ def test_rounds_that_do_not_end_are_cut() -> None:
         (0.5, 0.0, [np.inf] * 9, "velocity"),
     ],
 )
-def test_malformed_input(
-    eps: float | list[float], mu: float, velocity: list[float], where: str
-) -> None:
+def test_malformed_input(eps, mu, velocity, where):
     """What is wrong is named."""
     with pytest.raises(ProblemError, match=where):
         collide(cradle(3), velocity, eps, mu)

@@ -45,9 +45,7 @@ def test_a_contact_that_parts_needs_no_force(mu: float) -> None:
 
 @settings(deadline=None)
 @given(st.floats(0.01, 10), st.floats(0, 2), st.floats(0.01, 5), st.floats(0, 6.28), NUMBER)
-def test_coulombs_three_cases_have_no_residual(
-    push: float, mu: float, speed: float, angle: float, share: float
-) -> None:
+def test_coulombs_three_cases_have_no_residual(push, mu, speed, angle, share):
     """Open, stick and slide as eq. 27 has them are zeros of the map; the wrong sign is none."""
     along = np.array([np.cos(angle), np.sin(angle)])
     share = abs(share) / 1e3

@@ -67,9 +67,7 @@ def nearest_corners(name: str, seed: int, form: str, gap: float) -> tuple[Pair, 
 )  # fmt: skip
 @example("needles", 3, "corner on edge", 1e-6)
 @pytest.mark.long
-def test_gap_and_normal_are_those_of_the_nearest_points(
-    name: str, seed: int, form: str, share: float
-) -> None:
+def test_gap_and_normal_are_those_of_the_nearest_points(name, seed, form, share):
     """Gap = |x_a - x_b|, n along it (eq. 8 with radii zero), and no contact is nearer."""
     gap = share * min(shape.reach for shape in family(name, np.random.default_rng(seed)))
     (shapes, position, turns, _), normal = nearest_corners(name, seed, form, gap)

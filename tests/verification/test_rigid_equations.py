@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from rigid_lcp import Disc, HalfSpace, Polygon, Scene
 from rigid_lcp.contact.arrays import Contacts, contact_rows
@@ -20,7 +19,6 @@ from rigid_lcp.motion.equations import (
 from rigid_lcp.motion.state import Motion, displace_motion, replace_rates
 from rigid_lcp.motion.world import World, make_world
 
-Floats = NDArray[np.float64]
 PAIRS = {
     "vertex on face": (Polygon.regular(3, 0.6), Polygon.rectangle(4, 1)),
     "disc on face": (Disc(0.4), Polygon.rectangle(4, 1)),

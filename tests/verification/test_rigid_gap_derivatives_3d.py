@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from rigid_lcp import HalfSpace, Sphere
 from rigid_lcp.arrays import Floats
+from rigid_lcp.contact import detect_3d, shapes_3d
 from rigid_lcp.contact.arrays import Contacts, contact_frames
-from rigid_lcp.contact.detection_space import detect_3d, shapes_3d
 from rigid_lcp.motion.equations import inertial_acceleration, relative_velocity
 from rigid_lcp.motion.state import Motion, displace_motion
 from rigid_lcp.shapes.rotations import quaternion_of_rotation, quaternion_product, rotate

@@ -8,14 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from rigid_lcp import HalfSpace, Polygon, Scene, Simulation
 from rigid_lcp.errors import NotConverged
 from tests.rigid_motions import rocking_block, rocking_block_answer
 from validation.bench.rigid.scenes import FLOOR, G, gravity_on
-
-Floats = NDArray[np.float64]
 
 
 @pytest.mark.parametrize("share", [0.5, 0.9])

@@ -76,10 +76,9 @@ def test_sweeps_that_creep_end_early() -> None:
     assert (found.method, found.work["sweeps"]) == ("sticking", 15)
 
 
-@pytest.mark.parametrize("layers", [6])
-def test_a_warm_start_ends_at_the_last_digit(layers: int) -> None:
+def test_a_warm_start_ends_at_the_last_digit() -> None:
     """From forces that are wrong by a thousandth, to a residual of 1e-12."""
-    problem = crystal(layers)
+    problem = crystal(6)
     cold = solve_friction(problem.bodies, problem.offset, problem.friction, 3)
     noise = 1.0 + 1e-3 * np.random.default_rng(4).standard_normal(len(cold.r))
     warm = solve_friction(

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from rigid_lcp.arrays import Floats
 from rigid_lcp.friction.problem.cones import natural_map
-from rigid_lcp.friction.sweeps.sliding_direction import (
+from rigid_lcp.friction.sweeps.local_contact import (
     find_all_directions,
     find_direction_near,
     find_real_roots,
@@ -39,9 +39,7 @@ def block_of(seed: int, dim: int, rank: int) -> Floats:
     st.sampled_from([0.0, 1e-3, 0.3, 0.8, 1.5, 30.0]),
 )
 @example(seed=1, dim=3, lost=2, friction=0.8)
-def test_every_symmetric_contact_obeys_the_law(
-    seed: int, dim: int, lost: int, friction: float
-) -> None:
+def test_every_symmetric_contact_obeys_the_law(seed, dim, lost, friction):
     """W = A A^T, of full rank or singular, and q = A v: a solution exists (Klarbring), is found.
 
     The error grows with the condition of W as a stick force does, ``W^-1 q``; 100 roundings are
@@ -78,9 +76,7 @@ def test_non_symmetric_blocks(seed: int, dim: int, friction: float) -> None:
 
 @settings(max_examples=60, deadline=None)
 @given(st.integers(0, 10**9), st.floats(1e-6, 1e6), st.floats(1e-6, 1e6), st.floats(0, 6.3))
-def test_units_and_axes_change_nothing(
-    seed: int, masses: float, speeds: float, angle: float
-) -> None:
+def test_units_and_axes_change_nothing(seed, masses, speeds, angle):
     """With kg -> g, m -> mm, or the tangents turned, r scales and turns along, exactly."""
     a = block_of(seed, 3, 4)
     block, offset = a @ a.T, np.random.default_rng(seed + 1).normal(size=3)

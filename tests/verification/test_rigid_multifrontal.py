@@ -10,8 +10,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.linalg
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from rigid_lcp.friction.linear.factorisation import BlockSystem, SingularSystem
 from rigid_lcp.sparse.dense_tiles import TERMS_AT_ONCE
@@ -56,21 +54,6 @@ def backward_error(matrix: np.ndarray, x: np.ndarray, right: np.ndarray) -> floa
     return float(lack / (np.linalg.norm(matrix, np.inf) * np.linalg.norm(x, np.inf)))
 
 
-@settings(max_examples=40, deadline=None)
-@given(
-    st.integers(0, 2**32 - 1), st.integers(1, 60), st.integers(0, 150), st.sampled_from([1, 3, 6])
-)  # fmt: skip
-def test_solves_any_pattern_to_round_off(seed, blocks, links, size):
-    """Patterns at random, also of several parts, with empty symmetric places, or a full matrix."""
-    g = np.random.default_rng(seed)
-    rows, columns = random_pattern(g, blocks, links)
-    values = dominant(g, blocks, size, rows, columns)
-    right = g.standard_normal(blocks * size)
-    x = BlockSystem(blocks, size, rows, columns).factor(values)(right)
-    matrix = full(blocks, rows, columns, values)
-    assert backward_error(matrix, x, right) < 10 * blocks * size * ROUND_OFF
-
-
 def test_fronts_wider_than_a_panel_and_split_ones():
     """A full matrix of 80 blocks of 6: one clique, split into fronts, each of several panels."""
     g = np.random.default_rng(0)
@@ -94,10 +77,10 @@ def test_fronts_wider_than_a_panel_and_split_ones():
     np.testing.assert_allclose(x, np.linalg.solve(matrix, right), rtol=1e-10)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(40))
 def test_memory_of_any_content_is_filled_and_no_other_is_touched(seed):
-    """Factors and space are used again: whatever they held does not matter (not a number here), all
-    of the factors is written, and nothing beside them."""
+    """Any pattern is solved to round-off.  Factors and space are used again: whatever they held
+    does not matter (not a number here), all of the factors is written, and nothing beside them."""
     g = np.random.default_rng(seed)
     blocks, size, guard = int(g.integers(1, 90)), int(g.choice([1, 2, 3, 6])), 64
     rows, columns = random_pattern(g, blocks, int(g.integers(0, 400)))

@@ -174,23 +174,6 @@ def test_newton_converges_quadratically_from_near(dim):
         assert again.work["iterations"] <= 4
 
 
-@pytest.mark.parametrize(("force", "velocity"), [(1e6, 1.0), (1e-3, 1e3), (1e9, 1e-9)])
-def test_newton_does_not_depend_on_units(force, velocity):
-    """W in velocity per force: three steps in other units end at the same forces; so the shift is
-    one over mean(diag W), not a number."""
-    problem = chain(12, 3, 1)
-    assert problem.bodies is not None
-    near = 1.01 * interior_point(problem, None, 1e-6, Path()).r
-    share = velocity / force
-    space = BodySpace(
-        problem.bodies.jacobian, sp.csr_array(problem.bodies.inverse_mass * share), 6
-    )  # fmt: skip
-    other = friction_problem(space, problem.offset * velocity, problem.friction, 3)
-    steps = newton(problem, near, 1e-300, iterations=3)
-    turned = newton(other, near * force, 1e-300, iterations=3)
-    np.testing.assert_allclose(turned.r / force, steps.r, rtol=1e-7, atol=1e-9)
-
-
 def test_the_shift_falls_where_only_it_holds_the_steps_up():
     """A tower whose contacts all stick: W's least eigenvalue falls as height^-2 and less, and
     proximal steps with a shift kept at 1e-5 would take off but a part of the error each."""

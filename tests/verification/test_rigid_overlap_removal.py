@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 import rigid_lcp as r
 from rigid_lcp.motion.overlap_removal import pay_lift, remove_overlap
@@ -16,7 +15,6 @@ from rigid_lcp.motion.state import Motion
 from rigid_lcp.motion.world import World, make_world
 from validation.bench.rigid.scenes import poured
 
-Floats = NDArray[np.float64]
 G = 9.81
 
 
@@ -74,9 +72,7 @@ def test_spinning_boxes_in_space_keep_their_energy() -> None:
 
 @settings(max_examples=25, deadline=None)
 @given(angle=st.floats(0, 3), aside=st.floats(-0.5, 0.5), depth=st.floats(0.01, 0.3))
-def test_a_small_grain_squeezed_between_large_ones(
-    angle: float, aside: float, depth: float
-) -> None:
+def test_a_small_grain_squeezed_between_large_ones(angle, aside, depth):
     """Overlaps of up to a third of the small one, which has to turn to get out: all gone."""
     scene = r.Scene(2)
     small = r.Polygon.regular(5, 0.1)
@@ -156,9 +152,7 @@ def test_loads_may_lift() -> None:
 @pytest.mark.parametrize("step", [1e-3, 1e-4])
 @pytest.mark.parametrize("speed", [0.02, 0.1, 1.0])
 @pytest.mark.parametrize("gap", [0.0, 1e-6])
-def test_who_got_the_velocity_pays_for_the_lift(
-    dim: int, step: float, speed: float, gap: float
-) -> None:
+def test_who_got_the_velocity_pays_for_the_lift(dim, step, speed, gap):
     """A ball lands on a floor under a ball at rest that it touches, e = 1: it bounces and hands its
     velocity on.  Energy after the step is that before it, to round-off (before, ``m g v h / 2``
     more, half of it at 2 cm/s).  Where they touch, the upper ball leaves with what its climb of at

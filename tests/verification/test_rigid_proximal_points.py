@@ -11,7 +11,6 @@ import pytest
 import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from rigid_lcp import solve_friction
 from rigid_lcp.friction.attempts.proximal_points import (
@@ -28,8 +27,6 @@ from rigid_lcp.friction.methods.gauss_seidel import gauss_seidel
 from rigid_lcp.friction.problem.definition import FrictionProblem, friction_problem
 from validation.bench.rigid.examination import family_named
 from validation.bench.rigid.packings import packing, tower
-
-Floats = NDArray[np.float64]
 
 FRICTION, APPROACH = 0.5, 1e-9
 
@@ -84,19 +81,6 @@ def test_a_proximal_point_is_the_answer_of_the_shifted_problem() -> None:
     )  # fmt: skip
     assert shifted.residual(force) < 1e-12
     assert problem.residual(force) > 1e-9  # one point is not yet the limit
-
-
-def test_units_change_nothing() -> None:
-    """W in other units (metres to millimetres, kg to g): the same points."""
-    problem = jammed(5, 10, 6, 3)
-    start = gauss_seidel(problem, tolerance=1e-10, sweeps=30).r
-    here = proximal_newton(problem, start, 1e-12, factorisations=15)
-    scaled = friction_problem(
-        problem.delassus * 2.0**-10, problem.offset * 2.0**10, problem.friction, 3
-    )
-    there = proximal_newton(scaled, start * 2.0**20, 1e-12, factorisations=15)
-    np.testing.assert_allclose(there.r, here.r * 2.0**20, rtol=1e-6, atol=1e-6 * abs(there.r).max())
-    assert there.work == here.work
 
 
 def test_a_point_that_goes_in_a_circle_is_given_up() -> None:
@@ -200,20 +184,6 @@ def test_the_end_of_a_path_is_a_start_too() -> None:
     assert turn_from_paths(trial)
     assert trial.best.method.startswith("gauss-seidel + extrapolated points")
     assert trial.best.residual <= 1e-12
-
-
-@pytest.mark.parametrize("units", [(1e3, 1.0), (1.0, 1e-6), (1e3, 1e3)])
-def test_units_change_no_squeeze(units: tuple[float, float]) -> None:
-    """Lengths and masses in other units (powers of ten): the same squeeze, to round-off."""
-    length, mass = units
-    problem = squeezed_row()
-    other = friction_problem(
-        problem.delassus.toarray() / mass, problem.offset * length, problem.friction, 2
-    )
-    found = extrapolated_points(other, np.zeros(6), 1e-13)
-    assert found.solved, found.message
-    force = found.r / (mass * length)
-    np.testing.assert_allclose(force[[0, 2]], [FRICTION, FRICTION], atol=1e-8)
 
 
 @pytest.mark.parametrize("method", [proximal_newton, extrapolated_points])

@@ -90,9 +90,7 @@ class RefusingDisk:
 
 
 @pytest.mark.long
-def test_full_disk_at_every_write(
-    scene: Path, whole: list[dict[str, Any]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_full_disk_at_every_write(scene, whole, tmp_path, capsys):
     """Exit code 5 and a sentence, no part of a file; with room again it goes on."""
     for refused in range(1, 1000):
         folder = tmp_path / str(refused)
@@ -115,9 +113,7 @@ def test_full_disk_at_every_write(
 
 @pytest.mark.parametrize("name", ["picture-000002.png", "movie.gif", "picture-end.png"])
 @pytest.mark.long
-def test_full_disk_at_a_picture(
-    scene: Path, tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_full_disk_at_a_picture(scene, tmp_path, name, capsys):
     run = ["rigid", str(scene), "--run-folder", str(tmp_path / "run"), "--set", "run.frames=2"]
     with pytest.MonkeyPatch.context() as patch:
         disk = RefusingDisk(tmp_path / "run" / f".{name}", patch, 1)
@@ -132,9 +128,7 @@ def test_full_disk_at_a_picture(
 
 
 @pytest.mark.long
-def test_killed_at_every_file_operation(
-    commands: Commands, scene: Path, whole: list[dict[str, Any]], tmp_path: Path
-) -> None:
+def test_killed_at_every_file_operation(commands, scene, whole, tmp_path):
     """A kill in place of any one change: what is there is whole, and the run goes on."""
     assert commands.run(*run_words(scene, tmp_path / "0"), root=str(tmp_path)) == 0
     count = commands.operations
@@ -150,13 +144,7 @@ def test_killed_at_every_file_operation(
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_stopped_by_a_signal(
-    scene: Path,
-    whole: list[dict[str, Any]],
-    tmp_path: Path,
-    number: signal.Signals,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_stopped_by_a_signal(scene, whole, tmp_path, number, capsys):
     """Exit code 130, and what to do next."""
     advance, before = Simulation.advance, signal.getsignal(number)
 
@@ -204,9 +192,7 @@ def test_damage_to_a_frame(scene: Path, whole: list[dict[str, Any]], tmp_path: P
         goes_on(scene, folder, whole)
 
 
-def test_a_damaged_result_is_made_again(
-    scene: Path, whole: list[dict[str, Any]], tmp_path: Path
-) -> None:
+def test_a_damaged_result_is_made_again(scene, whole, tmp_path):
     folder = tmp_path / "run"
     shutil.copytree(scene.parent / "whole", folder)
     result = folder / "result.json"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +21,6 @@ from rigid_lcp.friction.linear.factorisation import factorisation
 from rigid_lcp.friction.methods.interior_point import Path, interior_point
 from rigid_lcp.friction.problem.definition import (
     FrictionProblem,
-    FrictionSolution,
     friction_problem,
 )
 from validation.bench.rigid.packings import packing, tower
@@ -81,9 +79,7 @@ def hostile(dim: int, seed: int) -> tuple[Floats, Floats, Floats, Floats]:
 
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("sigma", [1.0, 1e-6])
-def test_the_map_is_its_numpy_twin_and_its_derivatives_are_differences(
-    dim: int, sigma: float
-) -> None:
+def test_the_map_is_its_numpy_twin_and_its_derivatives_are_differences(dim, sigma):
     force, velocity, mu, rho = hostile(dim, 3)
     law = mu, rho, sigma, 0.3
     found, by_force, by_velocity = smoothed_map(force, velocity, *law)
@@ -112,9 +108,7 @@ def kicked() -> FrictionProblem:
     return made
 
 
-def test_a_point_lies_inside_the_cones_and_has_sigma_for_its_product(
-    kicked: FrictionProblem, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_point_lies_inside_the_cones_and_has_sigma_for_its_product(kicked, monkeypatch):
     """``x o s = sigma e``: the product is sigma, and what is beside the axis nothing."""
     module = sys.modules[smoothed_path.__module__]
     monkeypatch.setattr(module, "SMOOTHED", replace(SMOOTHED, found=1e-9))
@@ -141,25 +135,6 @@ def test_it_solves_a_bed_on_which_the_interior_point_stops(kicked: FrictionProbl
     assert kicked.residual(found.r) <= 1e-12
     jammed = interior_point(kicked, None, 1e-10, Path(compliance=1e-4))
     assert jammed.residual > 1e-9
-
-
-def units_change_nothing(
-    solve: Callable[[FrictionProblem], FrictionSolution], problem: FrictionProblem
-) -> bool:
-    """Velocities in mm/s and masses in tonnes: the same steps, and forces in other units."""
-    assert problem.bodies is not None
-    w = problem.bodies.matrix
-    found = [
-        solve(friction_problem(a * w, b * problem.offset, problem.friction, problem.dim))
-        for a, b in ((1.0, 1.0), (1024.0, 2.0**-20))  # powers of two: no round-off
-    ]
-    assert found[0].solved
-    assert found[1].r == pytest.approx(2.0**-30 * found[0].r, rel=1e-9)
-    return bool(found[0].work == found[1].work)
-
-
-def test_units_change_nothing(kicked: FrictionProblem) -> None:
-    assert units_change_nothing(smoothed_path, kicked)
 
 
 def test_a_tower_and_contacts_without_friction_are_solved() -> None:

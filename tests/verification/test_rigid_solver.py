@@ -134,24 +134,6 @@ def test_random_problems_with_a_solution_are_solved(seed, dim, contacts, rank, s
     assert found.solved, found.message
 
 
-@pytest.mark.parametrize("dim", [2, 3])
-def test_units_do_not_matter(dim):
-    """Metres to millimetres, kilograms to grams: solved alike, and a solution stays one."""
-    bodies, q = tower(12, 5.0, dim)
-    push = bodies.jacobian @ np.random.default_rng(3).standard_normal(bodies.jacobian.shape[1])
-    w, q = bodies.matrix, q + push
-    here = solve_friction(w, q, 0.4, dim)
-    assert here.solved
-    # u in mm/s^2, r in g mm/s^2: W falls by 1e3, r grows by 1e6
-    there = solve_friction(w * 1e-3, q * 1e3, 0.4, dim)
-    assert there.solved
-    assert problem_residual(w, q, 0.4, dim, there.r * 1e-6) < 1e-11
-
-
-def problem_residual(w, q, mu, dim, r) -> float:
-    return friction_problem(w, q, mu, dim).residual(r)
-
-
 def test_a_warm_start_costs_less_and_a_wrong_one_does_no_harm():
     bodies, q = tower(60, 1.0, 3)
     kick = np.zeros(360)

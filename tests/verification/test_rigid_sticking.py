@@ -58,16 +58,6 @@ def test_where_one_contact_slides_the_guess_says_so_and_the_default_goes_on():
     assert solution.u[5] == pytest.approx(0.3, abs=1e-12)
 
 
-def test_the_guess_has_no_units():
-    """Forces in mN, velocities in km/s: the same residual and the same forces to round-off."""
-    problem = tower(10, 0.5)
-    scaled = friction_problem(problem.matrix * 1e-9, problem.offset * 1e-3, 0.5, 2)
-    plain, other = sticking(problem, 1e-15), sticking(scaled, 1e-15)
-    normal, again = (each.r.reshape(-1, 2, 2)[:, :, 0].sum(axis=1) for each in (plain, other))
-    assert again / 1e6 == pytest.approx(normal, rel=1e-12)
-    assert other.residual < 1e-15
-
-
 @pytest.mark.parametrize("dim", [2, 3])
 def test_a_stack_of_any_masses_sticks_on_a_slope_that_it_can_not_leave(dim):
     """Three unit boxes topple at tan = 1/3 and slide at .5: at .1 the floor bears their weight.

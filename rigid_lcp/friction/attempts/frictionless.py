@@ -16,13 +16,12 @@ regular, and proximal steps with the same factor take it out.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 from scipy.sparse.linalg import splu
 
@@ -31,19 +30,10 @@ from rigid_lcp.errors import ProblemError
 from rigid_lcp.friction.problem import (
     FrictionProblem,
     FrictionSolution,
-    friction_problem,
     judge_forces,
-    prove_forces_insufficient,
-    require_finite,
-    require_matrix,
-    require_number,
 )
-from rigid_lcp.friction.sweeps import (
-    face_band,
-    face_bandwidth,
-    normal_products,
-    normal_sweeps,
-)
+from rigid_lcp.friction.sweeps import face_band, face_bandwidth, normal_products, normal_sweeps
+from rigid_lcp.sparse import csr_arrays
 
 Indices = NDArray[np.int32]
 Solve = Callable[[Floats], Floats]
@@ -85,46 +75,6 @@ class FrictionlessNumbers:
 NUMBERS = FrictionlessNumbers()
 
 
-def lcp(
-    matrix: Any, offset: ArrayLike, start: Floats | None = None, tolerance: float = 1e-12
-) -> FrictionSolution:
-    """Solve ``a = b + A f >= 0``, ``f >= 0``, ``a f = 0`` (eq. 19) for symmetric semidefinite A.
-
-    ``matrix`` A (nc, nc), scipy sparse or dense; ``offset`` b (nc,); ``start`` f (nc,).
-    The solution has one number a contact in ``r`` (f) and ``u`` (a).
-    Raises `ProblemError` if A or b are malformed.
-    """
-    b = require_finite(offset, "b").ravel()
-    a = require_matrix(matrix, "A")
-    if a.shape != (len(b), len(b)):
-        raise ProblemError(
-            f"A is {a.shape[0]} x {a.shape[1]} and b has {len(b)} numbers", where="A",
-            remedy="give a square A with a row for every number of b",
-        )  # fmt: skip
-    zeros = np.zeros(len(b))
-    place = 2 * np.arange(len(b))
-    wide = sp.csr_array(sp.kron(a, sp.csr_array([[1.0, 0.0], [0.0, 0.0]])))
-    problem = friction_problem(wide, np.column_stack([b, zeros]).ravel(), 0.0, 2)
-    first = None if start is None else require_finite(start, "start").ravel()
-    if first is not None and first.shape != b.shape:
-        raise ProblemError(
-            f"it has {len(first)} numbers and b has {len(b)}", where="start",
-            remedy="give f of all contacts, in the order of b",
-        )  # fmt: skip
-    started = None if first is None else np.column_stack([first, zeros]).ravel()
-    found = frictionless(problem, started, require_number(tolerance, "tolerance"))
-    if not found.solved and prove_forces_insufficient(problem):
-        found = replace(
-            found, status="no solution",
-            message="no f >= 0 makes a = b + A f >= 0 (proved by a linear programme)\n  -> look for"
-            " rows of A that nothing can lift, or an entry of the wrong sign",
-        )  # fmt: skip
-    return FrictionSolution(
-        found.r[place], found.u[place], found.residual, found.status, found.method, found.work,
-        found.message,
-    )  # fmt: skip
-
-
 def frictionless(
     problem: FrictionProblem,
     start: Floats | None = None,
@@ -147,8 +97,7 @@ def frictionless(
         return judge_forces(problem, np.zeros(0), tolerance, "frictionless")
     a, b = build_normal_matrix(problem), np.ascontiguousarray(problem.offset[::dim])
     first = np.zeros(nc) if start is None else np.maximum(start[::dim], 0.0)
-    rows = a.indptr, a.indices, a.data
-    sweeps = normal_sweeps(*rows, b, first, NUMBERS.sweeps, *NUMBERS.settled)
+    sweeps = normal_sweeps(*csr_arrays(a), b, first, NUMBERS.sweeps, *NUMBERS.settled)
     work = {"sweeps": float(sweeps), "exchanges": 0.0, "proximal": 0.0}
     order = reverse_cuthill_mckee(a, symmetric_mode=True)
     best, least = np.zeros(nc), np.inf
@@ -221,8 +170,8 @@ def pivot_principally(
         if smoothed:
             smoothings -= 1
             f = np.maximum(f, 0.0)
-            rows = a_matrix.indptr, a_matrix.indices, a_matrix.data
-            normal_sweeps(*rows, b, f, NUMBERS.sweeps_between, NUMBERS.sweeps_between, 0)
+            between = NUMBERS.sweeps_between
+            normal_sweeps(*csr_arrays(a_matrix), b, f, between, between, 0)
             carries[:] = f > 0.0
         else:
             if patience < 0:
@@ -243,7 +192,7 @@ def build_normal_matrix(problem: FrictionProblem) -> sp.csr_array:
     if problem.matrix is None and bodies is not None:
         normal = bodies.jacobian[::dim]
         start, index, value = normal_products(
-            *_arrays(normal), *_arrays(bodies.inverse_mass), normal.shape[1]
+            *csr_arrays(normal), *csr_arrays(bodies.inverse_mass), normal.shape[1]
         )
         return sp.csr_array((value, index, start), (nc, nc))
     return sp.csr_array(problem.delassus[::dim][:, ::dim])
@@ -265,7 +214,7 @@ def build_face_solver(a_matrix: sp.csr_array, inside: Indices, shift: float) -> 
     """
     if len(inside) == 0:
         return lambda right: right
-    rows = _arrays(a_matrix)
+    rows = csr_arrays(a_matrix)
     width = face_bandwidth(rows[0], rows[1], inside)
     if len(inside) * (width + NUMBERS.band_overhead) ** 2 <= NUMBERS.band_most:
         band, symmetric = face_band(*rows, inside, shift, width)
@@ -279,7 +228,3 @@ def build_face_solver(a_matrix: sp.csr_array, inside: Indices, shift: float) -> 
         options={"SymmetricMode": True},
     )  # fmt: skip
     return lambda right: factor.solve(right, "T")  # its rows were taken for columns
-
-
-def _arrays(rows: sp.csr_array) -> tuple[Indices, Indices, Floats]:
-    return rows.indptr, rows.indices, rows.data

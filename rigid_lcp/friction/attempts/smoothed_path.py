@@ -14,9 +14,8 @@ Optim. 12 (2002) 436, after Chen, Harker, Kanzow and Smale)
 that is smooth for sigma > 0.  So Newton's method with a line search on |F| finds the point of each
 sigma from that of the last, a few times as large, from wherever it stands.  An interior point,
 whose steps are cut where the first contact leaves its cone, jams there once some contacts have come
-near the boundary before others: on settled beds of little friction at a residual of 1e-6, which
-looked as if the path folded back.  The smoothed path goes on to 1e-9 and below, where Newton's
-method on the law itself (`rigid_lcp.friction.methods.newton`) ends it.
+near the boundary before others.  The smoothed path goes on to 1e-9 and below, where Newton's method
+on the law itself (`rigid_lcp.friction.methods.newton`) ends it.
 
 |u_T| is rounded to ``u_T^2 / sqrt(u_T^2 + eps^2)``, eps far below the velocities of sticking
 contacts on the path.  Where redundant contacts stick, the matrix of a step has an eigenvalue near

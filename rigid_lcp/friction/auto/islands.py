@@ -20,7 +20,7 @@ from scipy.sparse.csgraph import connected_components
 from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.friction.problem import BodySpace, FrictionProblem, FrictionSolution, judge_forces
 from rigid_lcp.friction.sweeps import NONE, solve_contacts_apart
-from rigid_lcp.sparse import diagonal_blocks
+from rigid_lcp.sparse import csr_arrays, diagonal_blocks
 
 Method = Callable[..., FrictionSolution]
 
@@ -35,8 +35,7 @@ def islands(problem: FrictionProblem) -> list[Ints]:
         return []
     if problem.bodies is not None:
         first, body, block = problem.body_jacobians
-        rows = problem.bodies.inverse_mass
-        mass = diagonal_blocks(rows.indptr, rows.indices, rows.data, problem.bodies.body_size)
+        mass = diagonal_blocks(*csr_arrays(problem.bodies.inverse_mass), problem.bodies.body_size)
         joins = np.asarray(mass.any(axis=(1, 2)))[body] & block.any(axis=(1, 2))
         one = np.repeat(np.arange(contacts), np.diff(first))[joins]
         other, count = contacts + body[joins], contacts + len(mass)
@@ -149,11 +148,7 @@ def solve_singles(problem: FrictionProblem, contacts: Ints, tolerance: float) ->
     dim = problem.dim
     apart = cut_out_island(problem, contacts)
     offset = apart.offset.reshape(-1, dim)
-    whole = apart.delassus
-    local = np.zeros((len(contacts), dim, dim))
-    for i in range(dim):
-        for j in range(dim):
-            local[:, i, j] = np.asarray(whole[i::dim][:, j::dim].diagonal())
+    local = diagonal_blocks(*csr_arrays(apart.delassus), dim)
     force, status = solve_contacts_apart(local, offset, apart.friction)
     lost = contacts[status == NONE]
     if len(lost) == 0:

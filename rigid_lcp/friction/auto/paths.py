@@ -28,7 +28,6 @@ SHARP_ROUNDING = Path(rounding=1e-4, compliance=1e-3)
 class ConvexPath:
     """The convex path, all of it where nothing moves, and from a part of it on Coulomb's."""
 
-    path: Path = CONVEX_PATH
     steps: int = 7
     until: float = 1e-4
     """Residual [-] at which it is left."""
@@ -43,26 +42,19 @@ class ConvexPath:
     rest_until: float = 1e-8
     """Residual [-] at that end."""
     rest_steps: int = 15
-    bent: Path = BENT_PATH
-    """Followed from where the convex one was left: coming from there it folds back seldom."""
     bent_steps: int = 25
+    """Along the bent path from where the convex one was left: from there it folds back seldom."""
     bent_useful: float = 3e-6
     """Residual [-] at which Newton is tried, and again at `Limits.hand_over`."""
     bent_newton: int = 8
     """Steps of Newton."""
+    heavy_steps: int = 20
+    """Along the convex path where light bodies bear heavy ones, as it has to go further."""
+    heavy_newton: int = 10
+    """Steps of Newton from its end."""
     wider: float = 10.0
     """sigma with which the smoothed path goes on from there, over that of the point [-]: where the
     interior point has jammed, some contacts are far from its own."""
-
-
-@dataclass(frozen=True)
-class HeavyPath:
-    """Where light bodies bear heavy ones."""
-
-    steps: int = 20
-    """Along the convex path, which has to go further."""
-    end_newton: int = 10
-    """Steps of Newton from its end."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +62,6 @@ class SharpPath:
     """Coulomb's path of the interior point with hardly any rounding: it can jam, and where it does
     not its end is near."""
 
-    path: Path = SHARP_ROUNDING
     steps: int = 40
     until: float = 3e-8
     """Residual [-] at its end."""
@@ -95,8 +86,7 @@ class SmoothedFurther:
     """Their effort."""
 
 
-CONVEX, HEAVY, SHARP = ConvexPath(), HeavyPath(), SharpPath()
-FURTHER = SmoothedFurther()
+CONVEX, SHARP, FURTHER = ConvexPath(), SharpPath(), SmoothedFurther()
 TURN_PATHS = (
     Path(rounding=0.3, compliance=1e-4),
     Path(rounding=1e-3, compliance=1e-4, lagged=True),
@@ -133,7 +123,7 @@ def follow_convex_path(trial: Trial) -> bool:
     if not trial.affordable:
         return False
     try:
-        path = PathStep(trial.problem, CONVEX.path, trial.factors)
+        path = PathStep(trial.problem, CONVEX_PATH, trial.factors)
     except SingularSystem:
         return False
     found = follow(trial, path, CONVEX.until, CONVEX.steps)
@@ -144,7 +134,7 @@ def follow_convex_path(trial: Trial) -> bool:
         rest = follow(trial, path, CONVEX.rest_until, CONVEX.rest_steps)
         trial.newton(rest.r, CONVEX.newton, rest.method, PATH_END_PATIENCE)
         path.x, path.s = part
-    path.path = CONVEX.bent
+    path.path = BENT_PATH
     steps = CONVEX.bent_steps
     for until in (CONVEX.bent_useful, LIMITS.hand_over):
         if trial.best.solved or steps == 0:
@@ -164,16 +154,16 @@ def follow_heavy_path(trial: Trial) -> bool:
         return False
     assert trial.stuck is not None
     size = float(np.sqrt(np.mean(trial.stuck.r**2)))
-    path = PathStep(trial.problem, CONVEX.path, trial.factors, size)
+    path = PathStep(trial.problem, CONVEX_PATH, trial.factors, size)
     for path.path, until, steps in (
-        (CONVEX.path, CONVEX.until, HEAVY.steps),
-        (CONVEX.bent, CONVEX.bent_useful, CONVEX.bent_steps),
-        (CONVEX.bent, LIMITS.hand_over, CONVEX.bent_steps),
+        (CONVEX_PATH, CONVEX.until, CONVEX.heavy_steps),
+        (BENT_PATH, CONVEX.bent_useful, CONVEX.bent_steps),
+        (BENT_PATH, LIMITS.hand_over, CONVEX.bent_steps),
     ):
         found = follow(trial, path, until / trial.heaviness, steps)
         if found.residual > CONVEX.useful or not trial.affordable:
             break
-        trial.newton(found.r, HEAVY.end_newton, found.method)
+        trial.newton(found.r, CONVEX.heavy_newton, found.method)
         if trial.best.solved:
             break
     return end_path(trial, path, found)
@@ -205,7 +195,7 @@ def follow_sharp_path(trial: Trial) -> bool:
     """`SHARP` and Newton from its end, and turns from where that is near."""
     trial.sharp = True
     steps = min(SHARP.steps, trial.affordable)
-    found = follow(trial, SHARP.path, max(SHARP.until, trial.tolerance), steps)
+    found = follow(trial, SHARP_ROUNDING, max(SHARP.until, trial.tolerance), steps)
     if found.residual <= SHARP.useful:
         found = trial.newton(found.r, LIMITS.newton, found.method)
     if not trial.best.solved and found.residual <= SHARP.near:

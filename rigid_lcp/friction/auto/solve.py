@@ -83,10 +83,8 @@ def solve_friction(
             f"there is no method {method!r}", where="method",
             remedy="one of " + ", ".join(["auto", *find_methods()]),
         )  # fmt: skip
-    tolerance, accept = (
-        require_number(tolerance, "tolerance"),
-        require_number(accept, "accept", zero=True),
-    )
+    tolerance = require_number(tolerance, "tolerance")
+    accept = require_number(accept, "accept", zero=True)
     begin = None
     if start is not None:
         begin = require_start(start, len(problem.offset), problem.dim)
@@ -126,7 +124,10 @@ def solve_auto(
         trial = attempts(problem, start, tolerance, accept)
     finer = tolerance
     while trial.best.residual <= finer and not trial.best.solved and finer > FORCE_ROUND_OFF:
-        finer = refine_tolerance(problem, trial.best.r, finer)
+        # what leaves little of the error without forces: light bodies that still fall may leave
+        # much beside the forces of heavy ones
+        enough = SHARE_LEFT * problem.error_without_forces / (length(trial.best.r) or 1.0)
+        finer = 0.5 * min(enough, finer)
         trial.keep(attempts(problem, trial.best.r, finer, accept, FIRST).solution())
     if trial.best.solved or (
         trial.best.residual <= accept and problem.contacts > LIMITS.few_contacts
@@ -152,14 +153,6 @@ def solve_auto(
     if not trial.best.solved and trial.gives_energy:
         return trial.solution(message=ENERGY_GIVEN.format(trial.best.residual))
     return trial.solution()
-
-
-def refine_tolerance(problem: FrictionProblem, force: Floats, tolerance: float) -> float:
-    """Half of the residual at which forces of this size leave little of the error without forces,
-    as light bodies that still fall may leave much beside the forces of heavy ones; half of the
-    tolerance so far at most."""
-    enough = SHARE_LEFT * problem.error_without_forces / (length(force) or 1.0)
-    return 0.5 * min(enough, tolerance)
 
 
 def _error(found: FrictionSolution) -> float:

@@ -19,7 +19,7 @@ from rigid_lcp.friction.attempts import (
     sticking,
 )
 from rigid_lcp.friction.linear import Factorisation, factorisation
-from rigid_lcp.friction.methods import NEWTON, Sweeper, gauss_seidel, newton
+from rigid_lcp.friction.methods import NEWTON, gauss_seidel, lay_out_sweeps, newton
 from rigid_lcp.friction.problem import (
     FORCE_ROUND_OFF,
     FrictionProblem,
@@ -29,7 +29,7 @@ from rigid_lcp.friction.problem import (
     judge_forces,
     length,
 )
-from rigid_lcp.friction.sweeps import MANY_CONTACTS
+from rigid_lcp.friction.sweeps import MANY_CONTACTS, SweepBlocks
 
 ENDLESS = 1e6
 """Forces over ``rho |q|`` [-] that look endless."""
@@ -66,9 +66,7 @@ class Limits:
     few_points: int = 50
     """Fewer factorisations than that extrapolated points are not begun with."""
     most_flops: float = 4e11
-    """An effort (some 20 s) beyond which no factorisation is begun.  Only large problems come
-    there: one of 10,400 contacts between spheres takes 1.5e10 flops, most of a second, and one of
-    10,000 between discs 20 ms."""
+    """An effort (some 20 s) beyond which no factorisation is begun."""
     most_factored: float = 2e7
     """Factorisations times contacts, of the same use."""
     misled: float = 2.0
@@ -102,6 +100,18 @@ class Trial:
         """Forces at which all contacts stick, where there is no start."""
         self.loose, self.heaviness = False, 1.0
         """Of these forces: whether much seems loose, and what heavy bodies ask for (`sticking`)."""
+        self.small = problem.contacts <= LIMITS.few_contacts
+        """Whether it costs less to factor than to sweep."""
+        self.very_large = problem.contacts >= MANY_CONTACTS
+        """Whether the next step of a bed in motion is due before dear methods are tried."""
+        self.rough = not self.small and tolerance >= LIMITS.hand_over
+        """Whether a rough answer is asked for of a large problem, which needs few factorisations or
+        none."""
+        self.coarse = tolerance if tolerance > LIMITS.last_word else LIMITS.hand_over
+        """Residual that sweeps go down to first."""
+        few = problem.contacts <= LIMITS.convex_contacts
+        self.convex_useful = few and tolerance < LIMITS.hand_over
+        """Whether the convex path is worth its factorisations."""
         self.start: Floats | None = None
         """The forces given to start from; None where they mislead."""
         if start is not None:
@@ -109,43 +119,10 @@ class Trial:
             if begun.residual * length(start) < LIMITS.misled * problem.error_without_forces:
                 self.start = start
                 self.keep(begun)
-
-    @property
-    def small(self) -> bool:
-        """Whether it costs less to factor than to sweep."""
-        return self.problem.contacts <= LIMITS.few_contacts
-
-    @property
-    def moving(self) -> bool:
+        self.moving = not self.small and self.start is not None
         """Whether a large problem has a start: a step of a bed in motion."""
-        return not self.small and self.start is not None
-
-    @property
-    def very_large(self) -> bool:
-        """Whether the next step of a bed in motion is due before dear methods are tried."""
-        return self.problem.contacts >= MANY_CONTACTS
-
-    @property
-    def rough(self) -> bool:
-        """Whether a rough answer is asked for of a large problem, which needs few factorisations or
-        none."""
-        return not self.small and self.tolerance >= LIMITS.hand_over
-
-    @property
-    def coarse(self) -> float:
-        """Residual that sweeps go down to first."""
-        return self.tolerance if self.tolerance > LIMITS.last_word else LIMITS.hand_over
-
-    @property
-    def convex_useful(self) -> bool:
-        """Whether the convex path is worth its factorisations."""
-        few = self.problem.contacts <= LIMITS.convex_contacts
-        return few and self.tolerance < LIMITS.hand_over
-
-    @property
-    def cold(self) -> bool:
+        self.cold = self.start is None and self.convex_useful
         """Whether there is no start, and the convex path is worth it."""
-        return self.start is None and self.convex_useful
 
     @property
     def heavy(self) -> bool:
@@ -157,9 +134,9 @@ class Trial:
         return self.best.residual <= self.accept
 
     @cached_property
-    def sweeper(self) -> Sweeper:
-        """The sweeps of this problem."""
-        return Sweeper(self.problem)
+    def blocks(self) -> SweepBlocks:
+        """This problem as its sweeps read it."""
+        return lay_out_sweeps(self.problem)
 
     @property
     def factors(self) -> Factorisation:
@@ -220,7 +197,7 @@ class Trial:
     ) -> FrictionSolution:
         """What so many sweeps of Gauss-Seidel find, to a residual of ``until``."""
         return self.keep(
-            gauss_seidel(self.problem, start, until, sweeps, sweeper=self.sweeper, **options)
+            gauss_seidel(self.problem, start, until, sweeps, blocks=self.blocks, **options)
         )
 
     def sweep(

@@ -4,15 +4,11 @@ Acary et al., FCLIB: a collection of discrete 3D frictional contact problems, In
 ``fclib_local`` has spacedim, vectors/q, vectors/mu and W by its parts m, n, nz, p, i, x; nz = -1
 are compressed columns, -2 compressed rows, and nz >= 0 that many triplets, i their rows and p their
 columns, as CSparse has them and the library's own files (its header says the other way round: H,
-which is not square, fits only so).  ``fclib_global`` has M, H, vectors/f, vectors/w instead
-(`rigid_lcp.friction.files.fclib`).  Order of contacts and signs are ours.  Rolling friction
-(spacedim 5) and equality constraints (V, R; G) are refused.
-
-Friction problems of FCLIB by masses (``fclib_global``): ``M v = H r + f``, ``u = H^T v + w``.
-
-Acary et al., FCLIB, Inria RT-0444 (2014).  With ``W = H^T M^-1 H`` and ``q = w + H^T M^-1 f`` it is
-the problem of `rigid_lcp.friction.problem.definition`, and where M is made of one block a body, the
-bodies are known.  ``J = H^T``.
+which is not square, fits only so).  ``fclib_global`` has M, H, vectors/f, vectors/w instead:
+``M v = H r + f``, ``u = H^T v + w``, the same problem by ``W = H^T M^-1 H`` and
+``q = w + H^T M^-1 f``; where M is made of one block a body, the bodies are known, ``J = H^T``.
+Order of contacts and signs are ours.  Rolling friction (spacedim 5) and equality constraints
+(V, R; G) are refused.
 """
 
 from __future__ import annotations
@@ -31,7 +27,7 @@ from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import LibraryMissing, ProblemError
 from rigid_lcp.friction.files.damaged import DAMAGED, describe_damage, name_missing_part
 from rigid_lcp.friction.problem import BODY_SIZE, BodySpace, FrictionProblem, friction_problem
-from rigid_lcp.sparse import diagonal_blocks
+from rigid_lcp.sparse import csr_arrays, diagonal_blocks
 
 PARTS = {"fclib_local": (("W",), ("q", "mu")), "fclib_global": (("M", "H"), ("f", "w", "mu"))}
 """Matrices and vectors of a problem, by its group."""
@@ -187,8 +183,7 @@ def build_global_problem(
             f"M can not be inverted: {error}", where="M",
             remedy="look for a body without mass or moment of inertia",
         ) from error  # fmt: skip
-    made: FrictionProblem = friction_problem(matrix, velocity + jacobian @ moved, mu, dim)
-    return made
+    return friction_problem(matrix, velocity + jacobian @ moved, mu, dim)
 
 
 def in_blocks(mass: sp.csr_array, size: int) -> bool:
@@ -200,7 +195,7 @@ def in_blocks(mass: sp.csr_array, size: int) -> bool:
 
 def invert_masses(mass: sp.csr_array, size: int) -> sp.csr_array:
     """M^-1 block by block.  Raises LinAlgError where one is singular."""
-    blocks = diagonal_blocks(mass.indptr, mass.indices, mass.data, size)
+    blocks = diagonal_blocks(*csr_arrays(mass), size)
     number = np.arange(len(blocks))
     rows = (np.linalg.inv(blocks), number, np.arange(len(blocks) + 1))
     inverse = sp.csr_array(sp.bsr_array(rows, shape=mass.shape))

@@ -32,6 +32,7 @@ from rigid_lcp.sparse import (
     add_contacts,
     body_pairs,
     contact_stiffness,
+    csr_arrays,
     dense_delassus,
     elimination_tree,
     factor_fronts,
@@ -79,9 +80,9 @@ class DenseFactorisation:
     def __init__(self, problem: FrictionProblem) -> None:
         self.contacts, self.dim = problem.contacts, problem.dim
         if problem.matrix is None and problem.bodies is not None:
-            rows, mass = problem.bodies.jacobian, problem.bodies.inverse_mass
+            bodies = problem.bodies
             self.matrix: Floats = dense_delassus(
-                rows.indptr, rows.indices, rows.data, mass.indptr, mass.indices, mass.data
+                *csr_arrays(bodies.jacobian), *csr_arrays(bodies.inverse_mass)
             )
         else:
             self.matrix = problem.delassus.toarray()

@@ -12,9 +12,7 @@ made, ``(y - r) . (r - r before) > 0`` with the weights diag W, it starts again 
 (O'Donoghue and Candes, Found. Comput. Math. 15 (2015) 715), and too where steps grow.  Nothing
 proves that this converges with friction, as nothing proves it of plain sweeps; so the residual is
 watched and the best point kept.  Where a bed yields slowly the sweeps drift at some 1e-6 for
-thousands: Newton's method (`rigid_lcp.friction.methods.newton`) goes on from there.  On six real
-problems of 286 to 1,251 contacts momentum takes a fifth to two fifths of the plain sweeps, or ends
-where those do not.
+thousands: Newton's method (`rigid_lcp.friction.methods.newton`) goes on from there.
 """
 
 from __future__ import annotations
@@ -31,9 +29,9 @@ from rigid_lcp.friction.problem import (
     require_whole,
 )
 from rigid_lcp.friction.sweeps import (
-    BodyBlocks,
     Momentum,
     SweepBlocks,
+    add_impulses,
     lay_out_bodies,
     lay_out_matrix,
     pack_contacts,
@@ -47,17 +45,16 @@ def gauss_seidel(
     tolerance: float = 1e-6,
     sweeps: int = 1000,
     *,
-    momentum: bool = True,
-    sweeper: Sweeper | None = None,
+    blocks: SweepBlocks | None = None,
     last: bool = False,
     slow: tuple[int, float] = (0, np.inf),
 ) -> FrictionSolution:
     """Sweep until the residual is at or below ``tolerance``, or ``sweeps`` are done.
 
-    ``start``: forces r (nc * dim,), zero if None.  ``momentum``: see above; without it the sweeps
-    are plain.  ``sweeper``: the same problem laid out earlier.  The best point of those looked at
-    is returned, or with ``last`` the one where the sweeps end: a self-stress that has to grow does
-    so without a better residual, and sweeps that go on from the best point lose the way made.
+    ``start``: forces r (nc * dim,), zero if None.  ``blocks``: the same problem laid out earlier.
+    The best point of those looked at is returned, or with ``last`` the one where the sweeps end: a
+    self-stress that has to grow does so without a better residual, and sweeps that go on from the
+    best point lose the way made.
     ``slow``: sweeps after which to give up if more than this residual is left, looked at as often
     as the residual is.
 
@@ -66,13 +63,11 @@ def gauss_seidel(
     tolerance = require_number(tolerance, "tolerance", zero=True)
     sweeps = require_whole(sweeps, "sweeps")
     contacts, dim = problem.contacts, problem.dim
-    sweeper = sweeper or Sweeper(problem)
+    blocks = blocks or lay_out_sweeps(problem)
     force = np.zeros(contacts * dim) if start is None else require_start(start, contacts * dim, dim)
     rows = force.reshape(contacts, dim)
-    state = sweeper.at_rest(rows)
-    best, _, stuck = sweep_until_small(
-        sweeper.blocks, state, rows, momentum, tolerance, sweeps, *slow
-    )
+    state = begin_sweeps(blocks, rows)
+    best, stuck = sweep_until_small(blocks, state, rows, tolerance, sweeps, *slow)
     done = float(state.tally[0])
     message = (
         f"{stuck} contacts have no solution while the others are held (Painleve, or no mass)"
@@ -84,37 +79,30 @@ def gauss_seidel(
     )  # fmt: skip
 
 
-class Sweeper:
+def lay_out_sweeps(problem: FrictionProblem) -> SweepBlocks:
     """One problem laid out for sweeps, by its bodies or by the rows of W."""
-
-    def __init__(self, problem: FrictionProblem) -> None:
-        self.bodies = lay_out_bodies(problem)
-        self.blocks = sweep_blocks(problem, self.bodies)
-
-    def at_rest(self, force: Floats) -> Momentum:
-        """No sweep done yet, from forces (nc, dim)."""
-        velocity = np.zeros((0, 0)) if self.bodies is None else self.bodies.body_velocity(force)
-        return Momentum(
-            force.copy(), velocity, velocity.copy(), np.array([0.0, 1.0, np.inf, np.inf])
-        )
-
-
-def sweep_blocks(problem: FrictionProblem, bodies: BodyBlocks | None) -> SweepBlocks:
-    """The problem laid out for the kernels, by its bodies or by the rows of W."""
-    dim, none = problem.dim, np.zeros(0, dtype=np.int64)
+    dim, size = problem.dim, 3 * problem.dim - 3
     offset = np.ascontiguousarray(problem.offset.reshape(-1, dim))
-    if bodies is not None:
+    laid_out = lay_out_bodies(problem)
+    if laid_out is not None and problem.bodies is not None:
+        (body, block, local), none = laid_out, np.zeros(0, dtype=np.int64)
         return SweepBlocks(
-            offset, problem.friction, bodies.local,
-            pack_contacts(bodies.block, bodies.local, offset, problem.friction),
-            bodies.body, bodies.block, none, none, np.zeros((0, dim, dim)), bodies.bodies,
-            problem.rho,
+            offset, problem.friction, local, pack_contacts(block, local, offset, problem.friction),
+            body, block, none, none, np.zeros((0, dim, dim)),
+            problem.bodies.jacobian.shape[1] // size, problem.rho,
         )  # fmt: skip
     local, start, column, entry = lay_out_matrix(problem)
     return SweepBlocks(
         offset, problem.friction, local, np.zeros((0, 0)), np.zeros((0, 2), dtype=np.int64),
-        np.zeros((0, 2, dim, 3 * dim - 3)), start, column, entry, 0, problem.rho,
+        np.zeros((0, 2, dim, size)), start, column, entry, 0, problem.rho,
     )  # fmt: skip
+
+
+def begin_sweeps(blocks: SweepBlocks, force: Floats) -> Momentum:
+    """No sweep done yet, from forces (nc, dim)."""
+    velocity = np.zeros((blocks.bodies + 1, blocks.block.shape[3]))
+    add_impulses(blocks.body, blocks.block, force, velocity)
+    return Momentum(force.copy(), velocity, velocity.copy(), np.array([0.0, 1.0, np.inf, np.inf]))
 
 
 METHOD = gauss_seidel

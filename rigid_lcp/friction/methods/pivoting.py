@@ -81,8 +81,6 @@ def pivoting(
     *,
     sweeps: int = PIVOTING.sweeps,
     tangential_velocity: Floats | None = None,
-    shift: float = PIVOTING.shift,
-    max_pivots: int | None = None,
 ) -> FrictionSolution:
     """Solve a 2D friction problem, or a frictionless one, exactly by following a path of pivots.
 
@@ -90,9 +88,7 @@ def pivoting(
     ``sweeps`` of Gauss-Seidel make one; ``sweeps=0`` begins with no forces, as Lemke does.  A path
     that takes too many pivots is given up: Gauss-Seidel betters its start, or Lemke's is taken.
     ``tangential_velocity`` u_T (nc,) [m/s]: where not zero the contact slides already and friction
-    opposes u_T; only then can there be no solution (Painleve); begins with no forces.  ``shift``:
-    added to the diagonal of W, relative to its mean, at first; removed in the end.
-    ``max_pivots``: of all paths together, default 60 a contact.
+    opposes u_T; only then can there be no solution (Painleve); begins with no forces.
 
     ``work``: ``pivots``, changes of lists; ``paths``, how many were begun; ``sweeps``.
     Status ``no solution`` is proved by a linear programme.  Raises `ProblemError` in 3D with
@@ -101,19 +97,12 @@ def pivoting(
     some 2,000 contacts.
     """
     tolerance, sweeps = require_number(tolerance, "tolerance"), require_whole(sweeps, "sweeps")
-    shift = require_number(shift, "shift", zero=True)
-    most = PIVOTING.pivots * problem.contacts + 100
-    if max_pivots is not None:
-        most = require_whole(max_pivots, "max_pivots")
+    most, shift = PIVOTING.pivots * problem.contacts + 100, PIVOTING.shift
     few, spent, swept = problem.contacts + 50, 0, 0
     attempts: list[tuple[float, bool, int]] = [(shift, False, 4 * few), (shift, False, most)]
     if (start is not None or sweeps > 0) and tangential_velocity is None:
-        attempts = [
-            (shift, True, few),
-            (shift, True, few),
-            (PIVOTING.wider * shift, True, few),
-            *attempts,
-        ]
+        warm_ones = [(shift, True, few), (shift, True, few), (PIVOTING.wider * shift, True, few)]
+        attempts = warm_ones + attempts
     near = start
     for paths, (amount, warm, limit) in enumerate(attempts, 1):
         state = start_pivots(problem, amount, 0.0, tangential_velocity)

@@ -8,8 +8,7 @@ from numba import njit
 
 from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.friction.pivots.drive import DONE, TOO_MANY
-from rigid_lcp.friction.pivots.shift import set_lists
-from rigid_lcp.friction.pivots.state import Pivots, drive_offset
+from rigid_lcp.friction.pivots.state import Pivots, drive_offset, set_lists
 from rigid_lcp.friction.pivots.updates import (
     BREAKING,
     SLIDING_DOWN,
@@ -42,7 +41,7 @@ def follow_from_nothing(problem: FrictionProblem, state: Pivots, limit: int) -> 
     state.reduced.kind[:] = BREAKING
     b += covering
     state.a[:] = b
-    return drive_offset(state, exact - b, 1.0, True, limit)
+    return drive_offset(state, exact - b, True, limit)
 
 
 def follow_from_forces(problem: FrictionProblem, state: Pivots, start: Floats, limit: int) -> int:
@@ -64,7 +63,7 @@ def follow_from_forces(problem: FrictionProblem, state: Pivots, start: Floats, l
     product = np.zeros_like(exact)
     multiply_geometry(geometry, state.f, product)
     state.b[:] = state.a - product
-    return drive_offset(state, exact - state.b, 1.0, True, limit)
+    return drive_offset(state, exact - state.b, True, limit)
 
 
 @njit(cache=True)
@@ -92,12 +91,8 @@ def make_consistent(
 ) -> None:  # fmt: skip
     """Move f and a, as little as need be, to where every contact obeys the rules of its list."""
     for c in range(len(kinds)):
-        n, t, mu, sign = (
-            geometry.normal[c],
-            geometry.tangent[c],
-            geometry.mu[c],
-            slide_sign(kinds[c]),
-        )
+        n, t, mu = geometry.normal[c], geometry.tangent[c], geometry.mu[c]
+        sign = slide_sign(kinds[c])
         if kinds[c] == BREAKING:
             f[n] = 0.0
         else:

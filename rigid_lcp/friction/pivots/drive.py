@@ -35,8 +35,8 @@ DONE, RAY, CYCLED, SINGULAR, TOO_MANY = range(5)
 """How a drive ends: consistent; without bound; lists repeat; singular; too long."""
 NO_EVENT, TOUCHES, PARTS, STICKS, SLIDES = range(5)
 """Events of step 3: none, (a), (b), (c), (d)."""
-NORMAL, TANGENTIAL, OFFSET = range(3)
-"""What is driven."""
+NORMAL, TANGENTIAL, OFFSET, PATH = range(4)
+"""What is driven; along a path the share of an offset may fall as well."""
 REFRESH = 200
 """Updates of an inverse before it is computed afresh."""
 
@@ -225,28 +225,28 @@ def lists_repeat(seen: Ints, repeats: int, signature: int) -> bool:
 @njit(cache=True)
 def drive(
     geometry: Geometry, reduced: Reduced, b: Floats, f: Floats, a: Floats, rate: Floats,
-    what: int, contact: int, goal: float, reversal: bool, limit: int, codes: Ints, count: Ints,
+    what: int, contact: int, limit: int, codes: Ints, count: Ints,
 ) -> tuple[int, int]:  # fmt: skip
     """Steps 2 to 4 for one driven quantity; returns how it ended and the contact where.
 
     ``what``: NORMAL or TANGENTIAL force of ``contact``, until it is consistent, or OFFSET, until
-    s is ``goal`` (b then holds its new value).  ``reversal``, of an offset: after an event go on in
-    the sense in which the contact that moved stays consistent, even if s falls.  ``codes`` (nc, 6)
-    random numbers, one for a contact in a list; ``count`` (1,) counts events.
+    s is 1 (b then holds its new value); PATH: after an event go on in the sense in which the
+    contact that moved stays consistent, even if s falls.  ``codes`` (nc, 6) random numbers, one for
+    a contact in a list; ``count`` (1,) counts events.
     """
     df, da = np.zeros(len(f)), np.zeros(len(f))
     seen = np.zeros(256, dtype=np.int64)
     signature, repeats, travelled, ahead, scale = 0, 0, 0.0, 1.0, 0.0
-    who, event, to, sign = -1, NO_EVENT, NEW, 0.0
+    who, event, to, sign = contact, int(NO_EVENT), NEW, 0.0
     sense = 1.0 if what != TANGENTIAL or a[geometry.tangent[contact]] < 0.0 else -1.0
     for turn in range(1, limit + 1):
         find_force_change(geometry, reduced, rate, df, da)
         find_driven_change(geometry, contact, what, sense, df)
-        if reversal and event != NO_EVENT:
+        if what == PATH and event != NO_EVENT:
             ahead = 1.0 if find_entering_rate(geometry, df, da, who, event, sign) >= 0.0 else -1.0
         step, who, event, to = first_event(geometry, reduced, f, a, df, da, ahead)
         done, end = find_driven_end(
-            geometry, contact, what, sense, ahead, goal - travelled, f, a, df, da
+            geometry, contact, what, sense, ahead, 1.0 - travelled, f, a, df, da
         )  # fmt: skip
         if done == np.inf and step == np.inf:
             return RAY, contact
@@ -256,7 +256,7 @@ def drive(
         travelled += ahead * step
         f += (ahead * step) * df
         a += (ahead * step) * da
-        if what == OFFSET:
+        if what >= OFFSET:
             b += (ahead * step) * rate
         if last:
             if what == NORMAL:
@@ -303,6 +303,8 @@ def consider_contacts(
 ) -> tuple[int, int]:  # fmt: skip
     """Section 6, steps 1 to 4 for one contact after the other; how it ended, and where."""
     rate, nothing = np.zeros(len(b)), np.zeros(len(b))
+    # as numbers: numba compiles what is called with constants once more for each of them
+    normal, tangential = int(NORMAL), int(TANGENTIAL)
     for c in order:
         settle_values(geometry, reduced, b, nothing, f, a)
         n, t, slip = geometry.normal[c], geometry.tangent[c], geometry.slip[c]
@@ -314,9 +316,8 @@ def consider_contacts(
         if slip != 0:
             scatter_column(geometry, t, slip * geometry.mu[c], rate)
         ended, where = drive(
-            geometry, reduced, b, f, a, rate, NORMAL, c, np.inf, False, limit - count[0],
-            codes, count,
-        )  # fmt: skip
+            geometry, reduced, b, f, a, rate, normal, c, limit - count[0], codes, count
+        )
         if ended != DONE:
             return ended, where
         if slip != 0 or t < 0:
@@ -324,14 +325,13 @@ def consider_contacts(
             if not move_contact(geometry, reduced, c, to):
                 return SINGULAR, c
             continue
-        if not move_contact(geometry, reduced, c, TURNING):
+        if not move_contact(geometry, reduced, c, int(TURNING)):
             return SINGULAR, c
         rate[:] = 0.0
         scatter_column(geometry, t, 1.0 if a[t] < 0.0 else -1.0, rate)
         ended, where = drive(
-            geometry, reduced, b, f, a, rate, TANGENTIAL, c, np.inf, False, limit - count[0],
-            codes, count,
-        )  # fmt: skip
+            geometry, reduced, b, f, a, rate, tangential, c, limit - count[0], codes, count
+        )
         if ended != DONE:
             return ended, where
     settle_values(geometry, reduced, b, nothing, f, a)

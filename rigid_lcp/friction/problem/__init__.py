@@ -3,10 +3,10 @@
 from rigid_lcp.friction.problem.checks import (
     check_factors,
     in_range,
-    read_order,
     require_finite,
     require_matrix,
     require_number,
+    require_one_a_contact,
     require_start,
     require_whole,
 )
@@ -29,6 +29,6 @@ __all__ = [
     "BODY_SIZE", "FORCE_ROUND_OFF", "MOST_FRICTION", "SHARE_LEFT", "BodySpace",
     "FrictionProblem", "FrictionSolution", "Status", "check_factors", "friction_problem",
     "gives_energy", "in_range", "judge_forces", "length", "natural_map", "natural_residual",
-    "prove_forces_insufficient", "read_order", "require_finite", "require_matrix",
-    "require_number", "require_start", "require_whole",
+    "prove_forces_insufficient", "require_finite", "require_matrix", "require_number",
+    "require_one_a_contact", "require_start", "require_whole",
 ]  # fmt: skip

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import ArrayLike
 
-from rigid_lcp.arrays import Floats, Ints
+from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import ProblemError, UsageError
 
 LEAST, MOST = 1e-100, 1e100
@@ -61,6 +61,24 @@ def require_by_contact(values: ArrayLike, name: str, dim: int) -> Floats:
     return array.ravel()
 
 
+def require_one_a_contact(values: ArrayLike, name: str, upper: float, contacts: int) -> Floats:
+    """``values`` as (nc,), each from 0 to ``upper``; `ProblemError`, with ``name``, for others."""
+    array = require_finite(values, name, f"give 0 to {upper:g}")
+    if array.shape not in ((), (contacts,)):
+        raise ProblemError(
+            f"{name} has shape {array.shape} for {contacts} contacts", where=name,
+            remedy="give one number, or one a contact",
+        )  # fmt: skip
+    array = np.broadcast_to(array, (contacts,)).copy()
+    bad = np.flatnonzero((array < 0.0) | (array > upper))
+    if len(bad):
+        raise ProblemError(
+            f"{name} is {array[bad[0]]:g}", where=f"{name}, contact {bad[0]}",
+            remedy=f"give 0 to {upper:g}",
+        )  # fmt: skip
+    return array
+
+
 def require_number(value: Any, name: str, *, zero: bool = False) -> float:
     """A number above zero, or also zero, as a float; `UsageError`, with ``name``, for all else."""
     try:
@@ -91,15 +109,6 @@ def require_start(start: ArrayLike, numbers: int, dim: int) -> Floats:
             remedy="give the forces of all contacts, in the order of q",
         )  # fmt: skip
     return force
-
-
-def read_order(order: ArrayLike, count: int) -> Ints | None:
-    """An order as the numbers 0 ... ``count`` - 1, or None where it has not each of them once."""
-    given = np.asarray(order)
-    if given.shape != (count,) or (count and given.dtype.kind not in "iu"):
-        return None
-    numbers = given.astype(np.int64)
-    return numbers if np.array_equal(np.sort(numbers), np.arange(count)) else None
 
 
 def in_range(values: Floats, name: str, least: float = LEAST) -> None:

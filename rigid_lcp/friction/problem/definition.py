@@ -20,11 +20,12 @@ from rigid_lcp.friction.problem.checks import (
     check_factors,
     in_range,
     require_by_contact,
-    require_finite,
     require_matrix,
+    require_one_a_contact,
 )
 from rigid_lcp.friction.problem.cones import length, natural_map, natural_residual
 from rigid_lcp.sparse import (
+    csr_arrays,
     diagonal_blocks,
     find_row_forms,
     multiply_csr,
@@ -63,8 +64,7 @@ class BodySpace:
     @cached_property
     def mass_blocks(self) -> Floats:
         """M by its blocks, (bodies, size, size) [kg, kg m^2]."""
-        rows = self.inverse_mass
-        blocks = diagonal_blocks(rows.indptr, rows.indices, rows.data, self.body_size)
+        blocks = diagonal_blocks(*csr_arrays(self.inverse_mass), self.body_size)
         return np.asarray(np.linalg.inv(blocks), dtype=float)
 
     @cached_property
@@ -80,11 +80,9 @@ class BodySpace:
     @cached_property
     def diagonal(self) -> Floats:
         """The diagonal of W, without W."""
-        rows, mass = self.jacobian, self.inverse_mass
         found: Floats = find_row_forms(
-            rows.indptr, rows.indices, rows.data, mass.indptr, mass.indices, mass.data,
-            rows.shape[1],
-        )  # fmt: skip
+            *csr_arrays(self.jacobian), *csr_arrays(self.inverse_mass), self.jacobian.shape[1]
+        )
         return found
 
     def of_contacts(self, taking: Ints) -> BodySpace:
@@ -95,11 +93,10 @@ class BodySpace:
 
     def product(self, force: Floats) -> Floats:
         """``W r``."""
-        rows, mass = self.jacobian, self.inverse_mass
+        given = np.ascontiguousarray(force, dtype=float)
         made: Floats = multiply_factors(
-            rows.indptr, rows.indices, rows.data, mass.indptr, mass.indices, mass.data,
-            np.ascontiguousarray(force, dtype=float),
-        )  # fmt: skip
+            *csr_arrays(self.jacobian), *csr_arrays(self.inverse_mass), given
+        )
         return made
 
 
@@ -141,9 +138,8 @@ class FrictionProblem:
         """J of the bodies in blocks: ``first``, ``body``, ``block``
         (`rigid_lcp.sparse.body_matrix`)."""
         assert self.bodies is not None
-        rows = self.bodies.jacobian
         made: tuple[Ints, Ints, Floats] = split_jacobian(
-            rows.indptr, rows.indices, rows.data, self.dim, self.bodies.body_size
+            *csr_arrays(self.bodies.jacobian), self.dim, self.bodies.body_size
         )
         return made
 
@@ -177,9 +173,8 @@ class FrictionProblem:
         """``u = W r + q``, (nc * dim,)."""
         if self.matrix is None and self.bodies is not None:
             return self.bodies.product(force) + self.offset
-        rows = self.delassus
         force = np.ascontiguousarray(force, dtype=float)
-        made: Floats = multiply_csr(rows.indptr, rows.indices, rows.data, force)
+        made: Floats = multiply_csr(*csr_arrays(self.delassus), force)
         return made + self.offset
 
     def residual(self, force: Floats, velocity: Floats | None = None) -> float:
@@ -299,26 +294,7 @@ def friction_problem(
             remedy="order it contact after contact: n, t" + ", t2" * (dim - 2),
         )  # fmt: skip
     contacts = len(q) // dim
-    mu = require_finite(friction, "mu", f"give 0 to {MOST_FRICTION:g}")
-    if mu.ndim == 0:
-        mu = np.full(contacts, float(mu))
-    if mu.shape != (contacts,):
-        raise ProblemError(
-            f"mu has shape {mu.shape} for {contacts} contacts", where="mu",
-            remedy="give one number, or one a contact",
-        )  # fmt: skip
-    if (mu < 0).any():
-        worst = int(np.argmin(mu))
-        raise ProblemError(
-            f"friction is negative ({mu[worst]:g})", where=f"mu, contact {worst}",
-            remedy="give a coefficient of friction of zero or more",
-        )  # fmt: skip
-    if (mu > MOST_FRICTION).any():
-        worst = int(np.argmax(mu))
-        raise ProblemError(
-            f"friction is {mu[worst]:g}", where=f"mu, contact {worst}",
-            remedy=f"give {MOST_FRICTION:g} at most: above it round-off decides what sticks",
-        )  # fmt: skip
+    mu = require_one_a_contact(friction, "mu", MOST_FRICTION, contacts)
     bodies = matrix if isinstance(matrix, BodySpace) else None
     if bodies is not None:
         check_factors(bodies.jacobian, bodies.inverse_mass, bodies.body_size)

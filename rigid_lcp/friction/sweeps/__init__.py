@@ -1,6 +1,6 @@
 """Sweeps through contacts: blocks, local solves, kernels."""
 
-from rigid_lcp.friction.sweeps.blocks import BodyBlocks, lay_out_bodies, lay_out_matrix
+from rigid_lcp.friction.sweeps.blocks import add_impulses, lay_out_bodies, lay_out_matrix
 from rigid_lcp.friction.sweeps.body_kernel import pack_contacts
 from rigid_lcp.friction.sweeps.contact_kernel import (
     MANY_CONTACTS,
@@ -17,8 +17,7 @@ from rigid_lcp.friction.sweeps.normal_matrices import (
 )
 
 __all__ = [
-    "MANY_CONTACTS", "NONE", "BodyBlocks", "Momentum", "SweepBlocks", "face_band", "face_bandwidth",
-    "lay_out_bodies", "lay_out_matrix", "normal_products", "normal_sweeps",
-    "pack_contacts", "solve_contacts_apart",
-    "sweep_until_small",
+    "MANY_CONTACTS", "NONE", "Momentum", "SweepBlocks", "add_impulses", "face_band",
+    "face_bandwidth", "lay_out_bodies", "lay_out_matrix", "normal_products", "normal_sweeps",
+    "pack_contacts", "solve_contacts_apart", "sweep_until_small",
 ]  # fmt: skip

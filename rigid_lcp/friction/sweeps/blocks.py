@@ -1,41 +1,19 @@
 """A friction problem laid out contact after contact for kernels that visit one at a time.
 
-`BodyBlocks`: each contact knows its two bodies and two small Jacobians, so that a visit costs the
-same however many neighbours there are.  Where only W is known its rows in dim x dim blocks do.
+By its bodies, ``W = B B^T`` with ``B = J L`` and ``M^-1 = L L^T``: each contact knows its two
+bodies and two small blocks of B, so that a visit costs the same however many neighbours there are.
+Scaled so, a body's velocities ``w = L^-1 v`` take up an impulse r as ``w += B^T r``: no mass is
+left to multiply with.  Where only W is known its rows in dim x dim blocks do.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
 
 from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.friction.problem import BodySpace, FrictionProblem
-from rigid_lcp.sparse import diagonal_blocks
-
-
-@dataclass(frozen=True)
-class BodyBlocks:
-    """``W = B B^T`` with ``B = J L`` and ``M^-1 = L L^T``, two blocks of B a contact.
-
-    Scaled so, a body's velocities ``w = L^-1 v`` take up an impulse r as ``w += B^T r``: no mass
-    is left to multiply with.  The two bodies of contact c are ``body[c]`` (nc, 2),
-    the number ``bodies`` for none; ``block`` (nc, 2, dim, body_size); ``local`` (nc, dim, dim)
-    has the blocks on W's diagonal.
-    """
-
-    body: Ints
-    block: Floats
-    local: Floats
-    bodies: int
-
-    def body_velocity(self, force: Floats) -> Floats:
-        """``w = B^T r``, (bodies + 1, body_size); the last row stands for no body. r: (nc, dim)."""
-        velocity = np.zeros((self.bodies + 1, self.block.shape[3]))
-        add_impulses(self.body, self.block, force, velocity)
-        return velocity
+from rigid_lcp.sparse import csr_arrays, diagonal_blocks
 
 
 @njit(cache=True)
@@ -67,11 +45,10 @@ def find_relative_velocities(body: Ints, block: Floats, velocity: Floats) -> Flo
     return relative
 
 
-def lay_out_bodies(problem: FrictionProblem) -> BodyBlocks | None:
-    """Blocks in body space; None if the factors of W are unknown or not those of pairs of bodies.
-
-    None too if M^-1 is not positive semi-definite.
-    """
+def lay_out_bodies(problem: FrictionProblem) -> tuple[Ints, Floats, Floats] | None:
+    """``body`` (nc, 2), the number of bodies for none, ``block`` (nc, 2, dim, body_size), and the
+    blocks on W's diagonal (nc, dim, dim); None if the factors of W are unknown or not those of
+    pairs of bodies, or M^-1 is not positive semi-definite."""
     space = problem.bodies
     size, contacts = 3 * problem.dim - 3, problem.contacts
     if space is None or space.body_size != size or space.jacobian.shape[1] % size or not contacts:
@@ -79,20 +56,15 @@ def lay_out_bodies(problem: FrictionProblem) -> BodyBlocks | None:
     root = root_inverse_mass(space)
     if root is None:
         return None
-    laid_out = pair_blocks(*problem.body_jacobians, root)
-    if laid_out is None:
-        return None
-    return BodyBlocks(*laid_out, len(root))
+    made: tuple[Ints, Floats, Floats] | None = pair_blocks(*problem.body_jacobians, root)
+    return made
 
 
 @njit(cache=True)
 def pair_blocks(
     first: Ints, moved: Ints, part: Floats, root: Floats
 ) -> tuple[Ints, Floats, Floats] | None:
-    """``body``, ``block`` and ``local`` of `BodyBlocks`; None if a contact moves three bodies.
-
-    A block of zeros moves none.
-    """
+    """`lay_out_bodies`, or None if a contact moves three bodies; a block of zeros moves none."""
     contacts, (dim, size) = len(first) - 1, part.shape[1:]
     body = np.full((contacts, 2), len(root))
     block, local = np.zeros((contacts, 2, dim, size)), np.zeros((contacts, dim, dim))
@@ -144,9 +116,8 @@ def root_inverse_mass(space: BodySpace) -> Floats | None:
 
     By eigenvectors, as a body that is held has zeros there.
     """
-    rows = space.inverse_mass
-    mass = diagonal_blocks(rows.indptr, rows.indices, rows.data, space.body_size)
-    if np.count_nonzero(mass) != np.count_nonzero(rows.data):
+    mass = diagonal_blocks(*csr_arrays(space.inverse_mass), space.body_size)
+    if np.count_nonzero(mass) != np.count_nonzero(space.inverse_mass.data):
         return None
     diagonal = np.einsum("bii->bi", mass)
     if np.count_nonzero(mass) == np.count_nonzero(diagonal):

@@ -8,7 +8,6 @@ over a hundred contacts costs a few microseconds.
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -20,39 +19,30 @@ from rigid_lcp.friction.sweeps.blocks import add_impulses, find_relative_velocit
 from rigid_lcp.friction.sweeps.body_kernel import sweep_bodies_2d, sweep_bodies_3d
 from rigid_lcp.friction.sweeps.local_contact import NONE, solve_contact_2d, solve_contact_3d
 
-
-@dataclass(frozen=True)
-class SweepNumbers:
-    """Momentum, order and looks at the residual."""
-
-    change_growth: float = 1.5
-    """Momentum starts again when a sweep changes the forces by so many times the least change [-]
-    since it last did: without this large beds (10,000 contacts) swing on at 1e-4, as nothing turns
-    back."""
-    check_every: float = 0.1
-    """The residual costs about a sweep: it is taken when the sweeps have grown by this part [-],"""
-    check_after: float = 5.0
-    """and by so many at least, and when the change a sweep makes has fallen as far as the residual
-    should."""
-    many_contacts: int = 2000
-    """From so many contacts on only some sweeps go over all of them, and the others over those that
-    bear: beds in motion have two open contacts for one that does."""
-    all_every: int = 10
-    """One sweep of so many goes over all."""
-    stalled: float = 100.0
-    """Where the sweeps since the last look, so many at least and as many as all before,"""
-    stalls: float = 0.7
-    """leave more than this part of the residual [-], the order is turned round: in one order sweeps
-    may go round in circles, at a few contacts that slide, which in the other they leave at once."""
-
-
-CHANGE_GROWTH, CHECK_EVERY, CHECK_AFTER, MANY_CONTACTS, ALL_EVERY, STALLED, STALLS = astuple(
-    SweepNumbers()
-)
+CHANGE_GROWTH = 1.5
+"""Momentum starts again when a sweep changes the forces by so many times the least change [-]
+since it last did: without this large beds (10,000 contacts) swing on at 1e-4, as nothing turns
+back."""
+CHECK_EVERY = 0.1
+"""The residual costs about a sweep: it is taken when the sweeps have grown by this part [-],"""
+CHECK_AFTER = 5.0
+"""and by so many at least, and when the change a sweep makes has fallen as far as the residual
+should."""
+MANY_CONTACTS = 2000
+"""From so many contacts on only some sweeps go over all of them, and the others over those that
+bear: beds in motion have two open contacts for one that does."""
+ALL_EVERY = 10
+"""One sweep of so many goes over all."""
+STALLED = 100.0
+"""Where the sweeps since the last look, so many at least and as many as all before,"""
+STALLS = 0.7
+"""leave more than this part of the residual [-], the order is turned round: in one order sweeps
+may go round in circles, at a few contacts that slide, which in the other they leave at once."""
 
 
 class SweepBlocks(NamedTuple):
-    """A problem as the kernels read it: `BodyBlocks`, or the rows of W where ``body`` is empty."""
+    """A problem as the kernels read it, by its bodies (`rigid_lcp.friction.sweeps.blocks`) or,
+    where ``body`` is empty, by the rows of W."""
 
     offset: Floats
     friction: Floats
@@ -74,7 +64,7 @@ class Momentum(NamedTuple):
     last: Floats
     """Forces before the last sweep, (nc, dim)."""
     velocity: Floats
-    """``w = B^T r`` of the bodies (`BodyBlocks`)."""
+    """``w = B^T r`` of the bodies, (bodies + 1, body_size); the last row stands for no body."""
     last_velocity: Floats
     tally: Floats
     """Sweeps done (a sweep over some counts as their share of all contacts), Nesterov's time t_k,
@@ -110,63 +100,58 @@ def visit_all(
 
 
 @njit(cache=True)
-def sweep_once(
-    blocks: SweepBlocks, state: Momentum, force: Floats, visit: Ints, momentum: bool
-) -> int:  # fmt: skip
+def sweep_once(blocks: SweepBlocks, state: Momentum, force: Floats, visit: Ints) -> int:
     """One sweep from ``y = r + beta (r - r before)``; changes ``force`` and ``state``.
 
     Called with the forces it left; returns as `visit_all`.
     """
-    tally, part = state.tally, 0.0
-    if momentum:
-        later = 0.5 * (1.0 + np.sqrt(1.0 + 4.0 * tally[1] ** 2))
-        part = (tally[1] - 1.0) / later
-        extrapolate(state.velocity, state.last_velocity, part)
-        tally[1] = later
+    tally = state.tally
+    later = 0.5 * (1.0 + np.sqrt(1.0 + 4.0 * tally[1] ** 2))
+    part = (tally[1] - 1.0) / later
+    extrapolate(state.velocity, state.last_velocity, part)
     stuck, product, square = visit_all(blocks, force, state.last, state.velocity, part, visit)
     tally[0] += len(visit) / len(force)
-    if momentum:
-        tally[3] = np.sqrt(square)
-        tally[2] = min(tally[2], tally[3])
-        if product > 0.0 or tally[3] > CHANGE_GROWTH * tally[2]:
-            # Begin again, and rid the velocities of rounding, which momentum would throw forward.
-            tally[1], tally[2] = 1.0, np.inf
-            state.velocity[:] = 0.0
-            add_impulses(blocks.body, blocks.block, force, state.velocity)
+    tally[1], tally[3] = later, np.sqrt(square)
+    tally[2] = min(tally[2], tally[3])
+    if product > 0.0 or tally[3] > CHANGE_GROWTH * tally[2]:
+        # Begin again, and rid the velocities of rounding, which momentum would throw forward.
+        tally[1], tally[2] = 1.0, np.inf
+        state.velocity[:] = 0.0
+        add_impulses(blocks.body, blocks.block, force, state.velocity)
     return stuck
 
 
 @njit(cache=True)
 def sweep_until_small(
-    blocks: SweepBlocks, state: Momentum, force: Floats, momentum: bool, tolerance: float,
-    sweeps: int, trial: int, useful: float,
-) -> tuple[Floats, float, int]:  # fmt: skip
+    blocks: SweepBlocks, state: Momentum, force: Floats, tolerance: float, sweeps: int,
+    trial: int, useful: float,
+) -> tuple[Floats, int]:  # fmt: skip
     """Sweep until the residual is at or below ``tolerance``, or ``sweeps`` are done in all, or
     ``trial`` of them left more than ``useful``.
 
-    Returns the best forces of those looked at, their residual, and the contacts without an answer
-    in the last sweep over all.
+    Returns the best forces of those looked at, and the contacts without an answer in the last sweep
+    over all.
     """
     best, stuck, enough = force.copy(), 0, 0.0
     best_residual = residual_of(blocks, force)
     mark, marked = best_residual, 0.0
     visit = np.arange(len(force))
-    some = momentum and len(visit) >= MANY_CONTACTS
+    some = len(visit) >= MANY_CONTACTS
     count, carry = 0, visit
     while best_residual > tolerance and state.tally[0] < sweeps:
         done = state.tally[0]
         check = min(float(sweeps), done + max(CHECK_AFTER, np.ceil(CHECK_EVERY * done)))
         while state.tally[0] < check:
             if some and count % ALL_EVERY > 0:
-                sweep_once(blocks, state, force, carry, momentum)
+                sweep_once(blocks, state, force, carry)
             else:
-                stuck = sweep_once(blocks, state, force, visit, momentum)
+                stuck = sweep_once(blocks, state, force, visit)
                 if some:
                     carry = carrying(force, state.last, visit)
             count += 1
             if state.tally[3] <= enough:
                 break
-        if momentum and state.tally[0] >= max(STALLED, 2.0 * marked):
+        if state.tally[0] >= max(STALLED, 2.0 * marked):
             if best_residual > STALLS * mark:
                 visit, count = visit[::-1].copy(), 0
                 state.tally[1], state.tally[2] = 1.0, np.inf
@@ -179,9 +164,9 @@ def sweep_until_small(
             best_residual = residual
         if state.tally[0] >= trial and best_residual > useful:
             break
-        if momentum and residual > 0.0:
+        if residual > 0.0:
             enough = state.tally[3] * min(0.9, tolerance / residual)
-    return best, best_residual, stuck
+    return best, stuck
 
 
 @njit(cache=True)
