@@ -6,7 +6,6 @@ import argparse
 from pathlib import Path
 
 from adapters.cli.arguments import add_json_flag, print_json
-from adapters.errors import UsageError
 
 
 def register(verb: str, parser: argparse.ArgumentParser) -> None:
@@ -55,11 +54,6 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
         "--probability", type=float, default=0.9, metavar="P",
         help="that the band should hold the truth; default: 0.9; refusals do not depend on it",
     )  # fmt: skip
-    parser.add_argument(
-        "--confidence", type=float, metavar="C",
-        help="also the cycles k that keep the mean error term below --error so surely (eq. 15)",
-    )  # fmt: skip
-    parser.add_argument("--error", type=float, metavar="E", help="in the unit of the series")
     add_json_flag(parser)
     parser.set_defaults(command=run_fit)
 
@@ -67,17 +61,11 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
 def run_fit(arguments: argparse.Namespace) -> int:
     """Fit a law to a series; print its parameters, a prediction and its band."""
     from adapters.errors import JumpRefused
+    from adapters.files import UNKNOWN
     from adapters.laws import get_law
-    from adapters.laws.fit import AGREE, count_cycles_needed, fit_auto, fit_series, read_series
+    from adapters.laws.fit import AGREE, fit_auto, fit_series, read_series
 
-    if (arguments.confidence is None) != (arguments.error is None):
-        raise UsageError("--confidence and --error belong together", remedy="give both or none")
     auto = arguments.law == "auto"
-    if auto and arguments.error is not None:
-        raise UsageError(
-            "--law auto is no single law, so it has no error term of eq. 15",
-            remedy="name a law for --error, such as --law log",
-        )
     law = get_law("log" if auto else arguments.law)
     series = read_series(
         arguments.paths, arguments.steps_per_cycle, arguments.columns, arguments.unit
@@ -89,10 +77,6 @@ def run_fit(arguments: argparse.Namespace) -> int:
     if arguments.load_change is not None:
         series, ahead = series.after(arguments.load_change), to_cycle - arguments.load_change
     series = series.since(arguments.from_cycle)
-    needed = {}
-    if arguments.error is not None:
-        cycles = count_cycles_needed(series, law, arguments.error, arguments.confidence)
-        needed = {"cycles_needed": cycles}
     try:
         if auto:
             found = fit_auto(series, ahead, arguments.probability, arguments.fail_at)
@@ -101,15 +85,13 @@ def run_fit(arguments: argparse.Namespace) -> int:
     except JumpRefused as refusal:
         if arguments.json:
             unexcluded = {} if arguments.fail_at is None else {"failure_excluded": False}
-            print_json(refusal.to_json(series.unit) | unexcluded | needed)
-        else:
-            print_cycles_needed(needed, arguments, series.unit)
+            print_json(refusal.to_json(series.unit) | unexcluded)
         raise
-    fitted = found.to_json() | needed
+    fitted = found.to_json()
     if arguments.json:
         print_json(fitted)
         return 0
-    unit = name_unit(series.unit)
+    unit = "(unit as given)" if series.unit == UNKNOWN else series.unit
     print(f"law {fitted['law']}, fitted to {len(series.cycle)} cycles")
     for name, value in fitted["parameters"].items():
         print(f"  {name} = {value:.6g}")
@@ -122,21 +104,4 @@ def run_fit(arguments: argparse.Namespace) -> int:
     print(f"  with probability {arguments.probability:g} in {low:.6g} ... {high:.6g} {unit}")
     if found.failure_excluded is False:
         print(f"  so that failure at {arguments.fail_at:g} is not excluded")
-    print_cycles_needed(needed, arguments, series.unit)
     return 0
-
-
-def name_unit(unit: str) -> str:
-    """The unit of a series, for a text."""
-    from adapters.files import UNKNOWN
-
-    return "(unit as given)" if unit == UNKNOWN else unit
-
-
-def print_cycles_needed(needed: dict[str, int], arguments: argparse.Namespace, unit: str) -> None:
-    """Print the bound of eq. 15 where it was asked for; a refused prediction has it too."""
-    if needed:
-        print(
-            f"cycles that keep the mean error term below {arguments.error:g} {name_unit(unit)} "
-            f"with confidence {arguments.confidence:g}: {needed['cycles_needed']}"
-        )

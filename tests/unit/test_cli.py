@@ -256,32 +256,6 @@ def test_fit_starts_anew_where_the_load_changed(
     assert abs(found["--from-cycle"] - expected) > 10
 
 
-def test_fit_confidence_is_eq_15(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """k = (b - a)^2 / (2 eps^2) ln(2 / p), here of residuals +1 and -1 about a straight line.
-
-    With b - a = 2, eps = 0.5 and p = 0.05 that is 8 ln 40 = 29.5, so 30 cycles.
-    """
-    series = tmp_path / "series.csv"
-    signs = (1, -1, -1, 1) * 2  # neither a mean nor a slope
-    rows = "".join(f"{n},{10 * n + sign}\n" for n, sign in enumerate(signs))
-    series.write_text("cycle,settlement\n" + rows)
-    words = ["fit", str(series), "--law", "linear", "--error", "0.5", "--confidence", "0.95"]
-    assert main([*words, "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["cycles_needed"] == 30
-    assert main(words) == 0
-    assert capsys.readouterr().out.rstrip().endswith(": 30")
-    assert main(words[:-2]) == 2
-    capsys.readouterr()
-    refused = [*words, "--to-cycle", "1000", "--fail-at", "500"]
-    assert main([*refused, "--json"]) == 6
-    content = json.loads(capsys.readouterr().out)
-    assert (content["prediction"], content["cycles_needed"]) == (None, 30)
-    assert main(refused) == 6
-    printed = capsys.readouterr()
-    assert printed.out.rstrip().endswith(": 30")
-    assert "given as failure" in printed.err
-
-
 @pytest.mark.parametrize(("law", "fewest"), [("auto", 4), ("log", 3)])
 def test_fit_of_too_few_cycles_names_file_and_flags(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], law: str, fewest: int

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import ceil, log
+from math import log
 
 import numpy as np
 import pytest
@@ -14,8 +14,7 @@ from adapters.errors import JumpRefused, NotConverged, UsageError
 from adapters.laws import Law, get_law
 from adapters.laws.fit import band as fit_band
 from adapters.laws.fit.band import estimate_fit_noise, estimate_prediction_band
-from adapters.laws.fit.prediction import Series, count_cycles_needed, fit_series
-from adapters.laws.fit.residual import fit_error_term
+from adapters.laws.fit.prediction import Series, fit_series
 
 pytestmark = pytest.mark.lowest
 
@@ -237,15 +236,6 @@ def test_cycle_zero_is_no_obstacle() -> None:
     assert with_zero == without
     linear = fit_series(Series(cycle, settlement), get_law("linear"), 20)
     assert linear.prediction == pytest.approx(2 * settlement[-1])
-
-
-def test_cycles_needed_is_eq_15_on_the_residuals() -> None:
-    """The bound takes a and b from the residuals of the law, p = 1 - confidence."""
-    cycle = np.arange(0.0, 41.0)
-    settlement = np.log(cycle + 1) + correlated_noise(2, 41, 0.5, 1)[:, 0]
-    residual = fit_error_term(LOG, cycle[1:], settlement[1:])
-    expected = ceil(np.ptp(residual) ** 2 / (2 * 0.3**2) * log(2 / 0.05))
-    assert count_cycles_needed(Series(cycle, settlement), LOG, 0.3, 0.95) == expected
 
 
 @pytest.mark.parametrize("to_cycle", [29.0, -1.0, np.nan, np.inf])

@@ -16,10 +16,9 @@ from adapters.laws.fit.candidates import ROWS_FEWEST, thinned
 from adapters.laws.fit.outlook import TO_TELL, LawSaid, compare_laws, outlook
 from adapters.laws.fit.refusal import Refusal, failed, failure, refusals
 from adapters.laws.fit.regime import find_regimes
-from adapters.laws.fit.residual import bound_cycles_for_error, fit_error_term
 from adapters.laws.form import Law
 
-__all__ = ["Prediction", "Series", "count_cycles_needed", "fit_auto", "fit_series", "read_series"]
+__all__ = ["Prediction", "Series", "fit_auto", "fit_series", "read_series"]
 
 
 @dataclass(frozen=True)
@@ -46,7 +45,7 @@ class Prediction:
         """What ``trackbed fit --json`` prints.
 
         The fields by name; of ``laws`` those of `LawSaid`.  ``failure_excluded`` only with
-        ``--fail-at``, and ``count_cycles_needed``, which the command adds, only with ``--error``.
+        ``--fail-at``.
         """
         content = asdict(self) | {"band": list(self.band)}
         if self.failure_excluded is None:
@@ -167,20 +166,6 @@ def find_regime(series: Series) -> str | None:
     if rows.sum() < ROWS_FEWEST:
         return None
     return find_regimes(*thinned(series.cycle[rows], series.settlement[rows, None]))[0].name
-
-
-def count_cycles_needed(series: Series, law: Law, error: float, confidence: float) -> int:
-    """Cycles that keep the mean error term below ``error`` with ``confidence`` (eq. 15).
-
-    ``error`` is in the unit of the series; p of eq. 15 is 1 - ``confidence``; the interval
-    [a, b] is the range of the residuals of ``law``.  See `residual.bound_cycles_for_error` for when
-    the bound means little.
-    """
-    cycle, settlement = _training_rows(series, law)
-    residual = fit_error_term(law, cycle, settlement)
-    return bound_cycles_for_error(
-        float(residual.min()), float(residual.max()), error, 1 - confidence
-    )
 
 
 def _check_target(
