@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adapters.errors import UsageError
+from trackbed.run_files import replace_file
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -86,10 +87,8 @@ def save_state(state: State, path: Path) -> None:
     arrays |= {f"contact_{name}": value for name, value in vars(state.contacts).items()}
     arrays |= {f"wall_{name}": value for name, value in state.wall_force.items()}
     scalars = np.array([state.piston_height, state.cycle, state.time_step])
-    temporary = path.with_name(path.name + ".partial")
-    with temporary.open("wb") as stream:
+    with replace_file(path) as temporary, temporary.open("wb") as stream:
         np.savez(stream, scalars=scalars, **arrays)
-    temporary.replace(path)
 
 
 def load_state(path: Path) -> State:

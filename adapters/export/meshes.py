@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
@@ -12,7 +11,7 @@ import numpy as np
 from adapters.bed import FloatArray, IntArray
 from adapters.export.fields import Array, contact_rows, gather_contact_fields, gather_grain_fields
 from adapters.export.instants import ExportedRun
-from trackbed.run_files import write_whole
+from trackbed.run_files import replace_file, write_whole
 
 
 def export_vtu(run: ExportedRun, into: Path, every: int) -> list[Path]:
@@ -53,7 +52,7 @@ def write_mesh(
 
     of_cells = {name: [values] for name, values in (cell_data or {}).items()}
     mesh = meshio.Mesh(points, [(kind, cells)], dict(point_data or {}), of_cells)
-    with whole_file(path) as temporary:
+    with replace_file(path) as temporary:
         mesh.write(temporary, file_format="vtu", compression=None)
 
 
@@ -65,14 +64,3 @@ def write_pvd(path: Path, members: Sequence[tuple[int, Path]]) -> None:
     ]
     head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n<Collection>\n'
     write_whole(path, head + "\n".join(lines) + "\n</Collection>\n</VTKFile>\n")
-
-
-@contextmanager
-def whole_file(path: Path) -> Iterator[Path]:
-    """A name to write to that becomes ``path`` when the block ends well, and else is removed."""
-    temporary = path.with_name(path.name + ".partial")
-    try:
-        yield temporary
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)

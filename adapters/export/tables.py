@@ -16,8 +16,8 @@ from adapters.export.fields import (
     split_columns,
 )
 from adapters.export.instants import ExportedRun, Instant
-from adapters.export.meshes import whole_file
 from adapters.files import Frame, Kind, write_dump
+from trackbed.run_files import replace_file
 
 ENGINE_NAME = {"velocity": "v"}
 """Field -> its name in a dump, where engines and OVITO have a shorter one."""
@@ -102,7 +102,7 @@ def _at(instant: Instant, columns: Mapping[str, Array]) -> dict[str, Array]:
 
 def write_csv_rows(path: Path, parts: Iterable[Mapping[str, Array]]) -> None:
     """Write tables of the same columns one below the other."""
-    with whole_file(path) as temporary, temporary.open("w", encoding="ascii") as stream:
+    with replace_file(path) as temporary, temporary.open("w", encoding="ascii") as stream:
         for number, columns in enumerate(parts):
             if number == 0:
                 stream.write(",".join(columns) + "\n")

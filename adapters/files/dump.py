@@ -12,6 +12,7 @@ import numpy as np
 
 from adapters.bed import FloatArray
 from adapters.errors import DumpError
+from trackbed.run_files import replace_file
 
 Kind = Literal["atoms", "entries"]
 
@@ -58,15 +59,10 @@ def write_dump(path: str | Path, frames: Iterable[Frame]) -> None:
     ``id`` and ``type`` too; without them it stops, and says nothing.
     """
     path = Path(path)
-    temporary = path.with_name(path.name + ".partial")
-    try:
-        compressed = path.suffix == ".gz"
-        with gzip.open(temporary, "wb") if compressed else temporary.open("wb") as stream:
-            for frame in frames:
-                stream.writelines(format_frame(frame))
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    open_bytes = gzip.open if path.suffix == ".gz" else open
+    with replace_file(path) as temporary, open_bytes(temporary, "wb") as stream:
+        for frame in frames:
+            stream.writelines(format_frame(frame))
 
 
 def format_frame(frame: Frame) -> Iterator[bytes]:

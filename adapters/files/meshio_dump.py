@@ -35,7 +35,8 @@ STEP, BOX = "time_step", "box"
 WHOLE = ("id", "type", "mol")
 """Columns of whole numbers."""
 
-_COMPONENT = re.compile(r"(?P<name>.+)(?:\[(?P<index>\d+)\]|(?P<axis>[xyz]))")
+_COMPONENT = re.compile(r"(\[\d+\]|[xyz])$")
+"""What a component has behind the name of its vector."""
 _REFERENCE = re.compile(r"[cfdi]2?_")
 """How an engine's name of a compute, a fix or a property begins: its components are name[1], ..."""
 
@@ -98,32 +99,16 @@ def _mesh(frame: Frame, path: str) -> meshio.Mesh:
 def gather_point_data(frame: Frame) -> Iterator[tuple[str, NDArray[np.generic]]]:
     """Columns by name, neighbours that are components of one vector as (n, k)."""
     others = [column for column in frame.columns if column not in ("x", "y", "z")]
-    for (name, _), family in ((key, list(group)) for key, group in groupby(others, _vector)):
-        if name not in others and _is_vector(family):
+    for name, group in groupby(others, lambda column: _COMPONENT.sub("", column) or column):
+        family = list(group)
+        ends = [column.removeprefix(name) for column in family]
+        numbers = [f"[{i}]" for i in range(1, len(ends) + 1)]
+        if name not in others and (ends == list("xyz") or (len(ends) > 1 and ends == numbers)):
             yield name, frame.block(*family)
-        else:
-            for column in family:
-                values = frame.column(column)
-                yield column, values.astype(np.int64) if column in WHOLE else values
-
-
-def _vector(column: str) -> tuple[str, str]:
-    """Name of the vector that a column may be a component of, and how it is written."""
-    match = _COMPONENT.fullmatch(column)
-    if match is None:
-        return column, ""
-    return match["name"], "axis" if match["axis"] else "index"
-
-
-def _is_vector(family: list[str]) -> bool:
-    """Whether columns of one name are all its components in order: x, y, z or [1], ..., [k]."""
-    matches = [_COMPONENT.fullmatch(column) for column in family]
-    if not all(matches):
-        return False
-    axes = [match["axis"] or match["index"] for match in matches if match]
-    return axes == list("xyz") or (
-        len(axes) > 1 and axes == [str(i) for i in range(1, len(axes) + 1)]
-    )
+            continue
+        for column in family:
+            values = frame.column(column)
+            yield column, values.astype(np.int64) if column in WHOLE else values
 
 
 def _columns(name: str, values: NDArray[np.generic]) -> dict[str, NDArray[np.generic]]:

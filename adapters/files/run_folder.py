@@ -35,18 +35,10 @@ from trackbed.run_files import (
 )
 
 COLUMNS = (
-    "cycle",
-    "settlement",
-    "kind",
-    "coordination_number",
-    "relative_density",
-    "piston_height",
-    "elastic_deflection",
-    "force_error",
-    "maximum_overlap",
-    "kinetic_translational",
+    "cycle", "settlement", "kind", "coordination_number", "relative_density", "piston_height",
+    "elastic_deflection", "force_error", "maximum_overlap", "kinetic_translational",
     "kinetic_rotational",
-)
+)  # fmt: skip
 """Columns of ``settlement.csv``: SI units; kind is ``computed``, ``healing`` or ``jumped``."""
 
 

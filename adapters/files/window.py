@@ -13,6 +13,7 @@ from adapters.bed import Contacts, FloatArray, IntArray, State
 from adapters.errors import EngineFailed
 from adapters.files.dump import Frame
 from adapters.files.dump_reader import read_frames
+from trackbed.run_files import replace_file
 
 ARRAYS = ("time_step", "identifier", "radius", "mass", "position", "velocity", "spin")
 """Fields of a `Window` that are plain arrays."""
@@ -227,10 +228,8 @@ def save_window(window: Window, path: Path) -> None:
     for column in fields(Contacts):
         rows = [getattr(contacts, column.name) for contacts in window.contacts]
         arrays[f"contact_{column.name}"] = np.concatenate(rows)
-    temporary = path.with_name(path.name + ".partial")
-    with temporary.open("wb") as stream:
+    with replace_file(path) as temporary, temporary.open("wb") as stream:
         np.savez(stream, **arrays)
-    temporary.replace(path)
 
 
 def load_window(path: Path) -> Window:

@@ -32,13 +32,8 @@ class History:
     """Mean settlement of the grains since the preparation [m]."""
     coordination_number: FloatArray
     """Contacts with other grains, mean over all grains."""
-    relative_density: FloatArray
     elastic_deflection: FloatArray
     """Rise of the piston on unloading [m]."""
-    force_error: FloatArray
-    """Root mean square of the piston's force error in the cycle over the peak force."""
-    maximum_overlap: FloatArray
-    """Greatest overlap of grains, and of grains with walls [m]."""
     cpu_s: FloatArray
     """CPU time from the start of loading to the row [s]."""
 

@@ -18,6 +18,7 @@ from adapters.bed import (
     SURFACE_SHARE,
     FloatArray,
     State,
+    bed_measure,
     draw_sample_start,
     load_state,
     measure_bed_height,
@@ -312,19 +313,18 @@ def _row(run: Run, state: State, kind: str) -> dict[str, Any]:
     preparation = run.outcome("preparation")
     container = run.scene.container
     walls = container.walls(state.piston_height, run.scene.piston_reach)
-    touching = neighbours(state.position, state.radius, walls)
-    grains = int((touching.second >= 0).sum())
+    bed = bed_measure(state.position, neighbours(state.position, state.radius, walls))
     inertia = 0.4 * state.mass * state.radius**2
     return {
         "cycle": state.cycle,
         "settlement": preparation.notes["mean_height"] - float(state.position[:, 2].mean()),
         "kind": kind,
-        "coordination_number": 2 * grains / len(state.radius),
+        "coordination_number": bed.coordination_number,
         "relative_density": relative_density(
             state.position, state.radius, container, preparation.notes["density_height"]
         ),
         "piston_height": state.piston_height,
-        "maximum_overlap": float(touching.overlap.max(initial=0.0)),
+        "maximum_overlap": bed.max_penetration,
         "kinetic_translational": 0.5 * float(state.mass @ (state.velocity**2).sum(axis=1)),
         "kinetic_rotational": 0.5 * float(inertia @ (state.spin**2).sum(axis=1)),
     }

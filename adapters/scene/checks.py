@@ -6,7 +6,7 @@ itself, so that one wrong key never hides what is wrong elsewhere.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -154,38 +154,39 @@ def _launcher(scene: Values) -> Iterator[Problem]:
         )
 
 
-def _engine(scene: Values) -> Iterator[Problem]:
-    name, known = scene.need("engine.name"), ("auto", *find_choices(ENGINES, "ENGINE"))
+def _choice(
+    scene: Values, key: str, what: str, known: Sequence[str], retired: Mapping[str, str]
+) -> Iterator[Problem]:
+    """A name that must be one of ``known``; ``retired`` ones left trackbed."""
+    name = scene.need(key)
     if name not in known:
-        yield Problem("engine.name", f"unknown engine {name!r}{suggest_word(name, known)}")
+        hint = explain_retired(name, retired) or suggest_word(name, known)
+        yield Problem(key, f"unknown {what} {name!r}{hint}")
+
+
+def _engine(scene: Values) -> Iterator[Problem]:
+    yield from _choice(
+        scene, "engine.name", "engine", ("auto", *find_choices(ENGINES, "ENGINE")), {}
+    )
 
 
 def _law(scene: Values) -> Iterator[Problem]:
     from adapters.laws import RETIRED, list_laws
 
-    law, known = scene.need("procedure.law"), list_laws()
-    if law not in known:
-        hint = explain_retired(law, RETIRED) or suggest_word(law, known)
-        yield Problem("procedure.law", f"unknown law {law!r}{hint}")
+    yield from _choice(scene, "procedure.law", "law", list_laws(), RETIRED)
 
 
 def _move(scene: Values) -> Iterator[Problem]:
     from adapters.moves import RETIRED, list_moves
 
-    move, known = scene.need("procedure.move"), list_moves()
-    if move not in known:
-        hint = explain_retired(move, RETIRED) or suggest_word(move, known)
-        yield Problem("procedure.move", f"unknown way {move!r}{hint}")
+    yield from _choice(scene, "procedure.move", "way", list_moves(), RETIRED)
 
 
 def _relaxation(scene: Values) -> Iterator[Problem]:
-    method = scene.need("procedure.relaxation")
-    if method not in ("smallest-move", "none"):  # what others ask loads the compiler
-        from adapters.relaxation import METHODS, RETIRED
+    if scene.need("procedure.relaxation") not in ("smallest-move", "none"):
+        from adapters.relaxation import METHODS, RETIRED  # loads the compiler
 
-        if method not in METHODS:
-            hint = explain_retired(method, RETIRED) or suggest_word(method, (*METHODS, "none"))
-            yield Problem("procedure.relaxation", f"unknown relaxation {method!r}{hint}")
+        yield from _choice(scene, "procedure.relaxation", "relaxation", (*METHODS, "none"), RETIRED)
 
 
 CHECKS: tuple[Check, ...] = (

@@ -6,12 +6,7 @@ import tomllib
 from importlib.resources import files
 from pathlib import Path
 
-__all__ = [
-    "find_scene_verb",
-    "list_scenes",
-    "read_template",
-    "scene_path",
-]  # fmt: skip
+__all__ = ["find_scene_verb", "list_scenes", "read_template", "scene_path"]
 
 VERB_OF_TABLE = {"sample": "run", "simulation": "qdem", "run": "rigid"}
 """A table of a scene file, and the verb that reads it."""

@@ -25,6 +25,7 @@ from adapters.files import COLUMNS, RunFolder
 from adapters.procedure.sweep.plan import SEED, Member, Sweep
 from adapters.procedure.sweep.run import Result
 from adapters.scene import flatten_keys
+from trackbed.run_files import replace_file
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -166,9 +167,8 @@ def save_table(stem: Path, rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
     paths = {}
     for kind, write in (("csv", csv.write_csv), ("parquet", parquet.write_table)):
         path = stem.with_name(f"{stem.name}.{kind}")
-        temporary = stem.with_name(f".{stem.name}.partial.{kind}")
-        write(table, temporary)
-        temporary.replace(path)
+        with replace_file(path) as temporary:
+            write(table, temporary)
         paths[f"{stem.name}.{kind}"] = str(path)
     return paths
 
