@@ -68,7 +68,7 @@ def piston_forces(
         content["grain_count"] = count
         content["piston"] = {"mass": 1.0, "height": height}
         content["piston"] |= cover_piston(
-            scene.container, scene.piston_reach, scene.sample.grain_radius
+            scene.container, scene.piston_reach, scene.sample.grain_radius.law
         )
         content["few"] = [each.tolist() for each in places]
         (folder / PARAMETERS).write_text(json.dumps(content))

@@ -13,12 +13,9 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
     """Arguments of ``relax``."""
     parser.add_argument("state", metavar="STATE", type=Path, help="a .npz of trackbed or a dump")
     parser.add_argument(
-        "--out",
-        metavar="STATE",
-        type=Path,
-        required=True,
+        "--out", metavar="STATE", type=Path, required=True,
         help=".npz, or any other name for a dump",
-    )
+    )  # fmt: skip
     parser.add_argument(
         "--scene", type=Path, help="for walls and stiffness; default: that of the run STATE is in"
     )
@@ -54,14 +51,12 @@ def run_relax(arguments: argparse.Namespace) -> int:
     from adapters.bed import make_no_contacts
     from adapters.files import read_state_file, write_state_file
     from adapters.relaxation import relax, relax_bare
-    from adapters.scene import load_scene
+    from adapters.scene import flatten_keys, load_scene
 
     if not arguments.out.parent.is_dir():
         raise UsageError("the folder of --out does not exist", where=str(arguments.out))
-    if arguments.scene is None:
-        scene = load_scene(*find_scene_of_state(arguments.state))
-    else:
-        scene = load_scene(arguments.scene)
+    given = arguments.scene
+    scene = load_scene(given) if given else load_scene(*find_scene_of_state(arguments.state))
     density = scene.material.grain.density
     state = read_state_file(arguments.state, density)
     walls = scene.container.walls(state.piston_height, scene.piston_reach)
@@ -91,12 +86,7 @@ def run_relax(arguments: argparse.Namespace) -> int:
         print_json(record)
         return 0
     print(f"{arguments.out}, at rest; all figures in SI units")
-    for key, value in record.items():
-        if isinstance(value, dict):
-            print(f"{key}:")
-            for name, figure in value.items():
-                print(f"  {name.replace('_', ' '):26}{figure:.6g}")
-        else:
-            shown = f"{value:.6g}" if isinstance(value, float) else value
-            print(f"{key.replace('_', ' '):28}{shown}")
+    for key, value in flatten_keys(record).items():
+        shown = f"{value:.6g}" if isinstance(value, float) else value
+        print(f"{key.replace('_', ' ').replace('.', ': '):34}{shown}")
     return 0

@@ -18,14 +18,9 @@ from pathlib import Path
 
 import numpy as np
 
-from adapters.bed import GRAVITY, Container, FloatArray, wall_names
+from adapters.bed import GRAVITY, Container, FloatArray
 from adapters.engines.contract import EngineStart
-from adapters.engines.plan import (
-    EQUILIBRIUM_RATIO,
-    count_cycle_steps,
-    plan_seating,
-    plan_settling,
-)
+from adapters.engines.plan import EQUILIBRIUM_RATIO, count_cycle_steps, plan_seating, plan_settling
 from adapters.engines.process import ProcessEngine
 from adapters.scene import Scene
 
@@ -75,8 +70,8 @@ class DeckEngine(ProcessEngine):
     loop_time = LOOP_TIME
 
     @abstractmethod
-    def write_scene(self, scene: Scene, folder: Path, piston: bool) -> None:
-        """``scene.in``, ``dump_states.in`` and what else depends on the scene alone."""
+    def format_scene(self, scene: Scene, piston: bool) -> dict[str, str]:
+        """Texts of ``scene.in``, ``dump_states.in`` and what else the scene alone says, by name."""
 
     @abstractmethod
     def write_start(self, scene: Scene, start: EngineStart, folder: Path) -> Parameters:
@@ -85,12 +80,6 @@ class DeckEngine(ProcessEngine):
     @abstractmethod
     def name_parts(self, scene: Scene) -> Parameters:
         """Names of the parts that depend on which contacts have friction."""
-
-    def wall_names(self, scene: Scene, piston: bool) -> tuple[str, ...]:
-        """Names of the walls whose forces ``states.dump`` holds; see
-        `adapters.engines.contract.Engine`."""
-        names = wall_names(scene.container.walls())
-        return (*names, "piston_wall") if piston else names
 
     def write_preparation(
         self, scene: Scene, position: FloatArray, radius: FloatArray, height: float, folder: Path
@@ -131,8 +120,9 @@ class DeckEngine(ProcessEngine):
             "skin": 0.3 * scene.sample.grain_radius.mean,
         }
         parameters = shared | parameters | self.name_parts(scene)
-        (folder / "parameters.in").write_text(format_parameters(parameters))
-        self.write_scene(scene, folder, piston)
+        texts = {"parameters.in": format_parameters(parameters), **self.format_scene(scene, piston)}
+        for name, text in texts.items():
+            (folder / name).write_text(text)
         named = (str(value) for name, value in parameters.items() if name.endswith("_part"))
         return copy_deck(folder, (*parts, *named), self.package)
 
@@ -218,11 +208,7 @@ def clip_convex(polygon: FloatArray, floor: list[float]) -> FloatArray:
 
 
 def gather_cycle_parameters(
-    scene: Scene,
-    start: EngineStart,
-    cycles: int,
-    folder: Path,
-    own: Parameters,
+    scene: Scene, start: EngineStart, cycles: int, folder: Path, own: Parameters
 ) -> Parameters:
     """Parameters of a window, an engine's ``own`` among those that LIGGGHTS and LAMMPS share.
 

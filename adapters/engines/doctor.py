@@ -26,7 +26,7 @@ class Finding:
     version: str
     """As the thing prints it; empty when it is not there."""
     where: str = ""
-    """Path of a program; configuration of a library."""
+    """Path of a program."""
     remedy: str = ""
     """What to do; empty when nothing is wrong."""
 
@@ -50,16 +50,6 @@ def _library(name: str) -> Finding:
         return Finding("library", name, "", remedy=f"pip install {name}")
 
 
-def _blas() -> Finding:
-    try:
-        import numpy
-
-        blas = numpy.show_config("dicts")["Build Dependencies"]["blas"]
-    except (ImportError, KeyError, TypeError):  # numpy is missing, or says it in another way
-        return Finding("library", "BLAS", "", remedy="numpy does not say which BLAS it uses")
-    return Finding("library", "BLAS", str(blas.get("version", "")), str(blas.get("name", "")))
-
-
 def _foreign_adapters() -> Iterator[Finding]:
     try:
         version = metadata.version("adapters")
@@ -81,7 +71,6 @@ def findings() -> list[Finding]:
         *(_engine(name) for name in list_real_engines()),
         Finding("python", "python", platform.python_version()),
         *(_library(name) for name in LIBRARIES),
-        _blas(),
         *_foreign_adapters(),
     ]
 

@@ -6,13 +6,12 @@ import os
 import re
 import shutil
 import sys
-from collections.abc import Callable
 from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
 
 from adapters.engines import lammps_decks
-from adapters.engines.contract import EngineRun, EngineStart
+from adapters.engines.contract import EngineStart
 from adapters.engines.decks import DeckEngine, Parameters
 from adapters.errors import EngineMissing
 from adapters.scene import Scene
@@ -90,13 +89,11 @@ class LammpsEngine(DeckEngine):
             launcher[0] = shutil.which(launcher[0], path=str(here)) or launcher[0]
         return [*launcher, *program, "-nonbuf", "-in", deck, "-log", "log.lammps"]
 
-    def write_scene(self, scene: Scene, folder: Path, piston: bool) -> None:
+    def format_scene(self, scene: Scene, piston: bool) -> dict[str, str]:
         """``scene.in``, ``dump_states.in`` and, in load cycles, ``piston_wall.in``."""
-        (folder / "scene.in").write_text(lammps_decks.scene_text(scene))
-        names = self.wall_names(scene, piston)
-        (folder / "dump_states.in").write_text(lammps_decks.format_dump_states(names))
-        if piston:
-            (folder / "piston_wall.in").write_text(lammps_decks.format_piston_wall(scene))
+        walls = {"piston_wall.in": lammps_decks.format_piston_wall(scene)} if piston else {}
+        states = lammps_decks.format_dump_states(self.wall_names(scene, piston))
+        return {"scene.in": lammps_decks.scene_text(scene), "dump_states.in": states} | walls
 
     def write_start(self, scene: Scene, start: EngineStart, folder: Path) -> Parameters:
         """Places of moved grains."""
@@ -112,18 +109,10 @@ class LammpsEngine(DeckEngine):
         kind = "frictional" if scene.material.grain.friction > 0 else "frictionless"
         return {"output_part": f"output_{kind}.in"}
 
-    def run(
-        self,
-        scene: Scene,
-        deck: str,
-        folder: Path,
-        watch: Callable[[], None],
-        digests: dict[str, str],
-    ) -> EngineRun:
-        """Run a deck, and write its contacts as every engine does; see `ProcessEngine.run`."""
-        made = super().run(scene, deck, folder, watch, digests)
+    def complete(self, scene: Scene, folder: Path) -> None:
+        """Write the contacts as every engine does; see `ProcessEngine.complete`."""
+        super().complete(scene, folder)
         lammps_decks.write_contacts(scene, folder)
-        return made
 
 
 ENGINE = LammpsEngine()

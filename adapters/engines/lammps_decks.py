@@ -47,17 +47,22 @@ def format_wall_contact(scene: Scene) -> str:
     return format_contact(scene.stiffness.wall, shear, scene.restitution, wall.friction)
 
 
+def find_shear_modulus(scene: Scene) -> float:
+    """G* between two grains [Pa]."""
+    one = scene.material.grain.young, scene.material.grain.poisson
+    return contact_law.equivalent_shear_modulus(*one, *one)
+
+
 def scene_text(scene: Scene) -> str:
     """``scene.in``: contact law between grains, and every wall that stands still.
 
     The cylinder is curved for LAMMPS, which takes
     1/R* = 1/R - 1/(2 R_c) with its radius R_c where LIGGGHTS takes 1/R* = 1/R.
     """
-    grain = scene.material.grain
-    shear = contact_law.equivalent_shear_modulus(
-        grain.young, grain.poisson, grain.young, grain.poisson
-    )
-    between = format_contact(scene.stiffness.grain, shear, scene.restitution, grain.friction)
+    between = format_contact(
+        scene.stiffness.grain, find_shear_modulus(scene), scene.restitution,
+        scene.material.grain.friction,
+    )  # fmt: skip
     wall = format_wall_contact(scene)
     mirror = format_contact(scene.stiffness.mirror, 0.0, scene.restitution, 0.0)
     lines = [
@@ -173,10 +178,7 @@ def find_elastic_displacement(
     ``force`` F_t on the first grain [N], shape (m, 3); ``overlap`` [m]; ``held`` rows of the two
     grains, shape (m, 2).  LAMMPS keeps a force, or a displacement, and shows neither.
     """
-    grain = scene.material.grain
-    shear = contact_law.equivalent_shear_modulus(
-        grain.young, grain.poisson, grain.young, grain.poisson
-    )
+    shear = find_shear_modulus(scene)
     radius, mass = grains.column("radius")[held], grains.column("mass")[held]
     reduced = radius.prod(axis=1) / radius.sum(axis=1)
     stiffness = contact_law.tangential_stiffness(overlap, shear, reduced)

@@ -42,15 +42,14 @@ class LiggghtsEngine(DeckEngine):
         words = ["liggghts", "-in", deck, "-log", "log.liggghts"]
         return [*scene.engine.launcher, *unbuffered, *words]
 
-    def write_scene(self, scene: Scene, folder: Path, piston: bool) -> None:
+    def format_scene(self, scene: Scene, piston: bool) -> dict[str, str]:
         """``scene.in`` and ``dump_states.in``."""
-        (folder / "scene.in").write_text(liggghts_decks.scene_text(scene))
-        names = self.wall_names(scene, piston)
-        (folder / "dump_states.in").write_text(liggghts_decks.format_dump_states(names))
+        states = liggghts_decks.format_dump_states(self.wall_names(scene, piston))
+        return {"scene.in": liggghts_decks.scene_text(scene), "dump_states.in": states}
 
     def write_start(self, scene: Scene, start: EngineStart, folder: Path) -> Parameters:
         """The piston's mesh, and the moved grains."""
-        margin = PISTON_MARGIN * scene.sample.grain_radius.greatest
+        margin = PISTON_MARGIN * scene.sample.grain_radius.law.greatest
         liggghts_decks.write_piston_stl(
             folder / "piston.stl", scene.container, scene.piston_reach, margin
         )

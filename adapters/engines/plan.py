@@ -84,7 +84,7 @@ def plan_seating(scene: Scene) -> SeatPlan:
     steps = scene.steps_per_cycle
     peak = float(scene.stress_at(np.linspace(0, 1, 1001)).max()) * scene.loaded_area
     followed = SEAT_DRAG_SHARE * scene.loading.piston_mass * SEAT_SPEED / scene.time_step
-    press_s = 2 * scene.sample.grain_radius.greatest / SEAT_SPEED
+    press_s = 2 * scene.sample.grain_radius.law.greatest / SEAT_SPEED
     cycles = ceil(press_s / (steps * scene.time_step))
     return SeatPlan(
         min(SEAT_SHARE * peak, followed),

@@ -18,6 +18,7 @@ from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from adapters.bed import wall_names
 from adapters.engines.contract import EngineRun, EngineStart
 from adapters.engines.plan import SETTLE_TIMES
 from adapters.errors import EngineFailed, EngineMissing, NotConverged
@@ -105,30 +106,6 @@ CRASHES = (signal.SIGSEGV, signal.SIGFPE, signal.SIGABRT, signal.SIGBUS, signal.
 """Signals by which a program ends itself; all others come from outside."""
 
 
-def count_tracked_cycles(scene: Scene, folder: Path) -> int:
-    """Load cycles done so far, from the first and the last whole line of ``piston.txt``."""
-    try:
-        with (folder / "piston.txt").open("rb") as stream:
-            stream.readline()
-            first = int(stream.readline().split()[0])
-            stream.seek(max(stream.seek(0, 2) - 400, 0))
-            last = int(stream.read().splitlines()[-2].split()[0])
-        return (last - first) // scene.steps_per_cycle
-    except (OSError, IndexError, ValueError):
-        return 0
-
-
-def check_restart(folder: Path) -> None:
-    """Raise `EngineFailed` when a finished run left no restart file, as on a full disk."""
-    path = folder / "end.restart"
-    if not path.exists() or path.stat().st_size == 0:
-        raise EngineFailed(
-            "the engine left no restart file",
-            where=str(path),
-            remedy="look whether the disk is full; resume computes it again",
-        )
-
-
 def read_screen_tail(folder: Path, lines: int = 3) -> str:
     """The engine's own error line, or the last lines it printed."""
     try:
@@ -173,12 +150,8 @@ def explain_engine_failure(status: int, folder: Path) -> EngineFailed:
 
 COMPLETE = re.compile(r"^COMPLETE step \d+", re.MULTILINE)
 """The last line of every deck: no exit code proves that a run got so far."""
-
-
 START_S = 30
 """Time from the start of an engine in which a second one beside it is looked for [s]."""
-
-
 START_BYTES = 1 << 16
 """Part of what is printed in which the engines' first words are looked for."""
 
@@ -232,10 +205,27 @@ class ProcessEngine(ABC):
     """How it is launched rightly."""
     ended_early: str | None = None
     """What it prints when it is ended by SIGTERM and exits 0 all the same."""
+    piston_wall = "piston_wall"
+    """Name of the piston among the walls whose forces ``states.dump`` holds."""
 
     @abstractmethod
     def command(self, scene: Scene, deck: str) -> list[str]:
         """Command line that runs ``deck`` in its folder."""
+
+    def complete(self, scene: Scene, folder: Path) -> None:
+        """Raise `EngineFailed` when a finished run left no restart file, as on a full disk."""
+        path = folder / "end.restart"
+        if not path.exists() or path.stat().st_size == 0:
+            raise EngineFailed(
+                "the engine left no restart file",
+                where=str(path),
+                remedy="look whether the disk is full; resume computes it again",
+            )
+
+    def wall_names(self, scene: Scene, piston: bool) -> tuple[str, ...]:
+        """Names of the walls whose forces ``states.dump`` holds, in the order of its columns."""
+        names = wall_names(scene.container.walls())
+        return (*names, self.piston_wall) if piston else names
 
     def program(self) -> list[str] | None:
         """Words that start it; None where it is not installed."""
@@ -279,8 +269,16 @@ class ProcessEngine(ABC):
         return text if text.startswith(self.title) else f"{self.title} {text}"
 
     def cycles_done(self, scene: Scene, start: EngineStart, folder: Path) -> int:
-        """Load cycles done so far, from ``piston.txt``."""
-        return count_tracked_cycles(scene, folder)
+        """Load cycles done so far, from the first and the last whole line of ``piston.txt``."""
+        try:
+            with (folder / "piston.txt").open("rb") as stream:
+                stream.readline()
+                first = int(stream.readline().split()[0])
+                stream.seek(max(stream.seek(0, 2) - 400, 0))
+                last = int(stream.read().splitlines()[-2].split()[0])
+            return (last - first) // scene.steps_per_cycle
+        except (OSError, IndexError, ValueError):
+            return 0
 
     def run(
         self,
@@ -313,6 +311,6 @@ class ProcessEngine(ABC):
             failure = explain_engine_failure(status, folder)
             failure.from_outside |= self.begun.search(text) is None
             raise failure
-        check_restart(folder)
+        self.complete(scene, folder)
         loop_s = sum(float(seconds) for seconds in self.loop_time.findall(text))
         return EngineRun(tuple(command), cpu_s, wall_s, max(wall_s - loop_s, 0.0), digests)

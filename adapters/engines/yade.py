@@ -11,19 +11,20 @@ from typing import Any
 
 import numpy as np
 
-from adapters.bed import DAMPING_FACTOR, GRAVITY, Container, FloatArray, damping_of_rebound
-from adapters.engines.contract import EngineStart
-from adapters.engines.decks import (
-    PISTON_MARGIN,
-    bound_box,
-    bound_section,
-    clip_convex,
-    copy_deck,
+from adapters.bed import (
+    DAMPING_FACTOR,
+    GRAVITY,
+    Container,
+    FloatArray,
+    RadiusDistribution,
+    damping_of_rebound,
 )
+from adapters.engines.contract import EngineStart
+from adapters.engines.decks import PISTON_MARGIN, bound_box, bound_section, clip_convex, copy_deck
 from adapters.engines.liggghts_decks import MIRROR_YOUNG
 from adapters.engines.plan import EQUILIBRIUM_RATIO, frictional, plan_seating, plan_settling
 from adapters.engines.process import ProcessEngine
-from adapters.scene import GrainRadius, Scene
+from adapters.scene import Scene
 
 SCRIPTS = {"in.prepare": "prepare.py", "in.cycles": "cycles.py"}
 """Script of each deck."""
@@ -50,17 +51,12 @@ class YadeEngine(ProcessEngine):
     remedy = "sudo apt-get install yade"
     begun, loop_time = BEGUN, LOOP_TIME
     launch = "launch it without MPI: YADE runs in one process"
+    piston_wall = "piston"
 
     def command(self, scene: Scene, deck: str) -> list[str]:
         """Command line that runs ``deck`` in its folder."""
         yade = ["yade", "-n", "-x", "-j1", SCRIPTS.get(deck, deck), PARAMETERS]
         return [*scene.engine.launcher, *yade]
-
-    def wall_names(self, scene: Scene, piston: bool) -> tuple[str, ...]:
-        """Names of the walls whose forces ``states.dump`` holds; see
-        `adapters.engines.contract.Engine`."""
-        names = scene.container.walls().plane_name
-        return (*names, "piston") if piston else names
 
     def write_preparation(
         self, scene: Scene, position: FloatArray, radius: FloatArray, height: float, folder: Path
@@ -83,7 +79,7 @@ class YadeEngine(ProcessEngine):
         content["piston"] = {
             "mass": scene.loading.piston_mass,
             "height": start.piston_height,
-            **cover_piston(scene.container, scene.piston_reach, scene.sample.grain_radius),
+            **cover_piston(scene.container, scene.piston_reach, scene.sample.grain_radius.law),
         }
         content["window"] = {
             "start": start.kind,
@@ -126,17 +122,11 @@ def _load(scene: Scene) -> dict[str, Any]:
 
 VERLET_SHARE = 0.1
 """How far a grain moves before YADE looks for new neighbours, in mean radii."""
-
-
 DISC_CORNERS = 96
 """Corners of the polygon that stands for a disc-shaped piston."""
-
-
 RIM_WIDTH = 0.2
 """How far inside a piston's rim grains still meet the rim, in mean radii: further than one moves in
 a load cycle, or than a contact is wide."""
-
-
 NO_WEIGHT = 1.0
 """Density of walls [kg/m^3]: nothing depends on it, and YADE wants one."""
 
@@ -168,7 +158,7 @@ def gather_shared_parameters(scene: Scene, height: float) -> dict[str, Any]:
     if container.symmetry:
         materials["mirror"] = (MIRROR_YOUNG, material.grain.poisson, NO_WEIGHT)
     names = ("young", "poisson", "density")
-    radius = np.array([scene.sample.grain_radius.greatest])
+    radius = np.array([scene.sample.grain_radius.law.greatest])
     return {
         "grain_count": scene.grain_count,
         "time_step": scene.time_step,
@@ -235,7 +225,7 @@ def cover_side(container: Container, angle: float, height: float) -> FloatArray:
     return np.column_stack([plane, corners[:, 1]])
 
 
-def cover_piston(container: Container, reach: float, grain: GrainRadius) -> dict[str, Any]:
+def cover_piston(container: Container, reach: float, grain: RadiusDistribution) -> dict[str, Any]:
     """The piston's face: ``triangles``, horizontal corners [m], shape (t, 3, 2), normal down.
 
     A whole piston (``reach`` infinite) is one triangle over the section and somewhat more.  A

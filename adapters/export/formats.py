@@ -25,8 +25,6 @@ def export_run(run: ExportedRun, to: str, into: Path, every: int = 1) -> list[Pa
     Files of an earlier export are replaced; none is ever half-written.  Returns what to open
     first, then the rest.  Raises `UsageError`, and `EngineFailed` on a full disk.
     """
-    if to not in FORMATS:
-        raise UsageError(f"there is no format {to}", remedy=f"name one of {', '.join(FORMATS)}")
     if every < 1:
         raise UsageError(f"every {every} cycles is no step", remedy="give a whole number from 1 on")
     with name_full_disk(into):

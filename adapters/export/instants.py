@@ -47,12 +47,7 @@ class ExportedRun:
         """Whether contacts between grains have a tangential force."""
         return self.scene.material.grain.friction > 0
 
-    def states(self, every: int = 1) -> Iterator[State]:
-        """The bed before loading, at every multiple of ``every`` cycles, and at the last one.
-
-        A jump's end is the first state of the window after it: forces and contacts are then the
-        engine's own.  A jump that no window follows yet is left out.
-        """
+    def _states(self, every: int) -> Iterator[State]:
         yield self.track.start()
         done, last = 0, self.last_cycle
         for name, _ in self.track.windows:
@@ -63,10 +58,14 @@ class ExportedRun:
             done = int(window.cycle[-1])
 
     def instants(self, every: int = 1) -> Iterator[Instant]:
-        """`states`, with what is asked of them."""
+        """The bed before loading, at every multiple of ``every`` cycles, and at the last one.
+
+        A jump's end is the first state of the window after it: forces and contacts are then the
+        engine's own.  A jump that no window follows yet is left out.
+        """
         start = self.track.start().position
         walls = self.scene.container.walls()  # only pairs of grains are counted
-        for state in self.states(every):
+        for state in self._states(every):
             touching = neighbours(state.position, state.radius, walls)
             grains = touching.second >= 0
             both = np.concatenate([touching.first[grains], touching.second[grains]])

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
-from math import isfinite, nan
+from math import nan
 from typing import Any
 
 import numpy as np
@@ -35,7 +35,7 @@ from adapters.jumps import (
 from adapters.laws.fit import Regime
 from adapters.procedure import stages
 from adapters.procedure.history import sum_cost
-from adapters.procedure.record import CHECK, DECISION
+from adapters.procedure.record import CHECK, DECISION, to_plain
 from adapters.procedure.seating import seat, warn_if_hung
 from adapters.procedure.stages import Bed, Run
 
@@ -212,18 +212,11 @@ class Journal:
         if key in self._known:
             return
         self._known.add(key)
-        details = {name: _finite(value) for name, value in content.items()}
-        self._run.folder.event(what, **(details | {"cycle": cycle, "attempt": attempt}))
+        details = to_plain(content) | {"cycle": cycle, "attempt": attempt}
+        self._run.folder.event(what, **details)
         why = str(content.get("why", ""))
         if what == DECISION and content["action"] == "compute" and content["binding"]:
             kind = why.partition(":")[0]
             if kind not in self._silent:
                 self._run.progress.say(f"cycle {cycle}: {why}; computing on")
             self._silent.add(kind)
-
-
-def _finite(value: Any) -> Any:
-    """The same with None for numbers that are not finite, which JSON does not have."""
-    if isinstance(value, list | tuple):
-        return [_finite(inner) for inner in value]
-    return None if isinstance(value, float) and not isfinite(value) else value

@@ -103,12 +103,6 @@ def list_jumped_spans(outcomes: Sequence[Outcome]) -> list[tuple[int, int]]:
     return [(o.first_cycle, o.last_cycle) for o in outcomes if o.stage == "jump" and o.rows]
 
 
-def find_last_common_cycle(own: History, full: History) -> int:
-    """Greatest cycle that both tables have; 0 for none."""
-    common = np.intersect1d(own.cycle, full.cycle)
-    return int(common[-1]) if len(common) else 0
-
-
 @dataclass(frozen=True)
 class FailedJump:
     """A jump that was given up."""

@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import isfinite
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from adapters.bed import FloatArray, State, load_state
 from adapters.errors import UsageError
@@ -16,7 +19,6 @@ from adapters.procedure.history import (
     FailedJump,
     History,
     failed_jumps,
-    find_last_common_cycle,
     history_of,
     list_jumped_spans,
 )
@@ -135,9 +137,21 @@ def find_comparable_cycle(record: Record) -> int:
     """
     if record.control is None:
         return 0
-    cycle = find_last_common_cycle(record.run.history, record.control.history)
+    common = np.intersect1d(record.run.history.cycle, record.control.history.cycle)
+    cycle = int(common.max(initial=0))
     spans = list_jumped_spans(record.run.outcomes)
     return 0 if spans and cycle <= spans[0][0] else cycle
+
+
+def to_plain(value: Any) -> Any:
+    """The same in types that JSON has; None for numbers that are not finite."""
+    if isinstance(value, dict):
+        return {key: to_plain(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [to_plain(inner) for inner in value]
+    if isinstance(value, np.generic):
+        return to_plain(value.item())
+    return None if isinstance(value, float) and not isfinite(value) else value
 
 
 Event = dict[str, Any]

@@ -20,8 +20,8 @@ from adapters.procedure.controlled import settle_controlled
 from adapters.procedure.fixed import settle_fixed
 from adapters.procedure.progress import Progress
 from adapters.procedure.stages import Bed, Clock, Run, Variant
-from adapters.scene import Scene, flatten_keys, load_scene
-from trackbed.run_files import record_provenance, write_whole
+from adapters.scene import Scene, load_scene
+from trackbed.run_files import list_differences, record_provenance, write_whole
 
 OWN_FILES = ("lock", "scene.toml", "load_series.csv", "dry_run")
 """What may be in a run folder before its manifest is written."""
@@ -202,13 +202,7 @@ def settle_manifest(
 
 def refuse_differences(old: dict[str, Any], new: dict[str, Any], path: Path) -> None:
     """Raise `SceneError` with every parameter that differs from the run's manifest."""
-    before, now = flatten_keys(old), flatten_keys(new)
-    lines = [
-        f"{key}: {before.get(key)!r} in the run, {now.get(key)!r} now"
-        for key in sorted(before.keys() | now.keys())
-        if before.get(key) != now.get(key)
-    ]
-    if lines:
+    if lines := list(list_differences("", old, new)):
         raise SceneError(
             "the scene differs from the one this run was started with:\n  " + "\n  ".join(lines),
             where=str(path),

@@ -65,18 +65,6 @@ class Comparison:
     speed_up_with_preparation: float = nan
 
 
-@dataclass(frozen=True)
-class Beds:
-    """Centres [m], shape (n, 3), that E_r is measured between."""
-
-    before_jump: FloatArray | None
-    """Before the first jump; the last computed state both runs share.  None without a jump."""
-    full: FloatArray
-    """The full run at the cycle of comparison."""
-    own: FloatArray
-    """What is compared with it."""
-
-
 def comparison(
     name: str,
     own: History,
@@ -84,12 +72,14 @@ def comparison(
     full: History,
     full_cycle: int,
     preparation_s: float,
-    beds: Beds | None = None,
+    beds: tuple[FloatArray | None, FloatArray, FloatArray] | None = None,
 ) -> Comparison:
     """``own`` at its cycle ``own_cycle`` taken for the bed of ``full`` at ``full_cycle``.
 
     The two cycles differ for "jump and move nothing", which is the full run cut short.
-    ``preparation_s``: CPU time of the preparation, the same for both [s].  E_r needs ``beds``.
+    ``preparation_s``: CPU time of the preparation, the same for both [s].  E_r needs ``beds``,
+    centres [m], (n, 3): before the first jump (the last state that both runs share; None without a
+    jump), of the full run at its cycle, and of what is compared with it.
     """
     mine, truth = own.row(own_cycle), full.row(full_cycle)
     coordination, deflection = (
@@ -99,10 +89,11 @@ def comparison(
     cost, full_cost = float(own.cpu_s[mine]), float(full.cpu_s[truth])
     displacement = coordinates = nan
     if beds is not None:
-        coordinates = measure_coordinates_error(beds.full, beds.own)
+        before_jump, in_full, in_own = beds
+        coordinates = measure_coordinates_error(in_full, in_own)
         # Without a move of the full run E_r has no denominator.
-        if beds.before_jump is not None and not np.array_equal(beds.before_jump, beds.full):
-            displacement = measure_displacement_error(beds.before_jump, beds.full, beds.own)
+        if before_jump is not None and not np.array_equal(before_jump, in_full):
+            displacement = measure_displacement_error(before_jump, in_full, in_own)
     return Comparison(
         name=name,
         computed=own.computed(own_cycle),

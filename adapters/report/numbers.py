@@ -18,9 +18,9 @@ from adapters.procedure import (
     find_comparable_cycle,
     list_jumped_spans,
     sum_cost,
+    to_plain,
 )
 from adapters.report.error import (
-    Beds,
     Comparison,
     JumpFigures,
     comparison,
@@ -90,7 +90,7 @@ class Numbers:
 
     def to_json(self) -> str:
         """JSON text; a number that is not finite is null."""
-        return json.dumps(_plain(asdict(self)), indent=1, allow_nan=False) + "\n"
+        return json.dumps(to_plain(asdict(self)), indent=1, allow_nan=False) + "\n"
 
 
 def numbers_of(record: Record) -> Numbers:
@@ -152,11 +152,11 @@ def error_rows(record: Record, cycle: int) -> tuple[Comparison, ...]:
     preparation_s = 0.0 if run.preparation is None else sum_cost(run.preparation.cost)
     truth = control.position(cycle)
     before_jump = run.position(spans[0][0]) if spans else None
-    beds = Beds(before_jump, truth, run.position(cycle))
+    beds = (before_jump, truth, run.position(cycle))
     rows = [comparison(PROCEDURE, run.history, cycle, full, cycle, preparation_s, beds)]
     if spans:
         early = run.history.computed(cycle)
-        beds = Beds(before_jump, truth, control.position(early))
+        beds = (before_jump, truth, control.position(early))
         still = comparison(NOTHING, full, early, full, cycle, preparation_s, beds)
         rows.append(still)
         settled = extrapolate_curve(full, get_law(procedure.law), procedure.k_i, early, cycle)
@@ -172,7 +172,7 @@ def error_rows(record: Record, cycle: int) -> tuple[Comparison, ...]:
                     speed_up_with_preparation=still.speed_up_with_preparation,
                 )
             )
-    beds = Beds(before_jump, truth, truth)
+    beds = (before_jump, truth, truth)
     rows.append(comparison(FULL, full, cycle, full, cycle, preparation_s, beds))
     return tuple(rows)
 
@@ -198,14 +198,3 @@ def _reproduce(record: Record) -> str:
     for override in record.manifest["overrides"]:
         words += ["--set", override]
     return shlex.join(words)
-
-
-def _plain(value: Any) -> Any:
-    """The same in types that JSON has."""
-    if isinstance(value, dict):
-        return {key: _plain(inner) for key, inner in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(inner) for inner in value]
-    if isinstance(value, np.generic):
-        return _plain(value.item())
-    return None if isinstance(value, float) and not isfinite(value) else value

@@ -2,8 +2,6 @@
 
 from adapters.scene.file import load_scene
 from adapters.scene.model import left_out
-from adapters.scene.tables import GrainRadius, Procedure, Scene, flatten_keys
+from adapters.scene.tables import Procedure, Scene, flatten_keys
 
-__all__ = [
-    "GrainRadius", "Procedure", "Scene", "flatten_keys", "left_out", "load_scene",
-]  # fmt: skip
+__all__ = ["Procedure", "Scene", "flatten_keys", "left_out", "load_scene"]

@@ -72,16 +72,6 @@ class GrainRadius(Table):
             self.distribution, self.mean, self.standard_deviation, self.truncation
         )
 
-    @property
-    def smallest(self) -> float:
-        """Lower bound of the radii [m]."""
-        return self.law.smallest
-
-    @property
-    def greatest(self) -> float:
-        """Upper bound of the radii [m]."""
-        return self.law.greatest
-
 
 class Sample(Table):
     """The grains and the container they are poured into."""
@@ -326,7 +316,7 @@ class Scene(Table):
         """Rayleigh time [s] of the smallest grain the radius distribution allows."""
         grain = self.material.grain
         return contact_law.rayleigh_time(
-            self.sample.grain_radius.smallest, grain.density, grain.young, grain.poisson
+            self.sample.grain_radius.law.smallest, grain.density, grain.young, grain.poisson
         )
 
     @property

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from adapters.bed import contact_law as law
 from adapters.bed.container import Container, count_sides
+from adapters.bed.radii import RadiusDistribution
 from adapters.bed.state import FloatArray, State
 from adapters.engines.contract import EngineStart
 from adapters.engines.decks import PISTON_MARGIN
@@ -26,7 +27,7 @@ from adapters.engines.yade import (
 )
 from adapters.errors import EngineFailed, EngineMissing, NotConverged, SceneError
 from adapters.scene.file import load_scene
-from adapters.scene.tables import GrainRadius, Scene
+from adapters.scene.tables import Scene
 from trackbed import command
 from trackbed.scenes import scene_path
 
@@ -179,7 +180,7 @@ def test_triangles_of_a_polygon_cover_it_once(corners: int, turn: float) -> None
 
 def test_grains_meet_the_rim_near_it() -> None:
     """Closer to it than a fifth of a mean radius; a piston of a pebble's size is all rim."""
-    grain = GrainRadius(distribution="constant", mean=0.003)
+    grain = RadiusDistribution("constant", 0.003)
     container = Container("cylinder", ("x", "y"), 0.03)
     assert cover_piston(container, 0.02, grain)["plane_reach"] == pytest.approx(0.02 - 0.0006)
     assert cover_piston(container, 0.0005, grain)["plane_reach"] == 0
@@ -189,7 +190,7 @@ def test_grains_meet_the_rim_near_it() -> None:
 def test_pistons_cover_what_is_loaded() -> None:
     """A whole piston the section with room to spare; a partial one its disc behind the mirrors."""
     container = Container("cylinder", ("x", "y"), 0.03)
-    grain = GrainRadius(distribution="constant", mean=0.004 / PISTON_MARGIN)
+    grain = RadiusDistribution("constant", 0.004 / PISTON_MARGIN)
     (whole,) = np.array(cover_piston(container, np.inf, grain)["triangles"])
     for point in [(-0.004, -0.004), (0.034, 0.034), (-0.003, 0.033), (0.033, -0.003)]:
         turns = cross(np.roll(whole, -1, axis=0) - whole, np.array(point) - whole)

@@ -344,11 +344,11 @@ def test_changed_scene_is_refused(tmp_path, whole, capsys):
     said = capsys.readouterr().err
     for change in changes:
         assert f"{change.partition('=')[0]}: " in said
-    assert said.count(" in the run, ") == 3
+    assert said.count(" there, ") == 3
     path = run / "scene.toml"
     path.write_text(path.read_text().replace("2710.0", "2700.0"))
     assert command.main(["resume", str(run)]) == 3
-    assert "material.grain.density: 2710.0 in the run, 2700.0 now" in capsys.readouterr().err
+    assert "material.grain.density: 2710.0 there, 2700.0 now" in capsys.readouterr().err
     assert table(run) == table(whole)
 
 

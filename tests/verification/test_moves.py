@@ -218,5 +218,5 @@ def test_scene_without_the_key_is_the_scene_of_older_runs(tmp_path: Path) -> Non
     assert usual == named
     assert other == usual | {"move": "profile"}
     run_scene(scene, tmp_path / "run", progress=QUIET)
-    with pytest.raises(SceneError, match=r"procedure\.move: None in the run, 'profile' now"):
+    with pytest.raises(SceneError, match=r'procedure\.move: nothing there, "profile" now'):
         run_scene(scene, tmp_path / "run", overrides=['procedure.move="profile"'], progress=QUIET)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 from math import isnan, log, nan
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -19,16 +20,15 @@ from adapters.procedure.history import (
     AVERAGED,
     History,
     failed_jumps,
-    find_last_common_cycle,
     history_of,
     list_jumped_spans,
     sum_cost,
 )
+from adapters.procedure.record import find_comparable_cycle
 from adapters.procedure.status import compare_with_full
 from adapters.report.error import (
     COORDINATION_BAR,
     HEIGHT_BAR,
-    Beds,
     comparison,
     extrapolate_curve,
     measure_jump,
@@ -191,7 +191,7 @@ def test_displacement_error_of_a_share(share: float, shift: float, unit: float) 
     random = np.random.default_rng(3)
     before = unit * (random.uniform(0, 0.06, (40, 3)) + shift)
     full = before + unit * random.normal(0, 1e-4, (40, 3))
-    beds = Beds(before, full, before + share * (full - before))
+    beds = (before, full, before + share * (full - before))
     own, truth = history_of(PROCEDURE), full_run()
     row_ = comparison("x", own, 100, truth, 100, 0.0, beds)
     # Differences of coordinates of size |shift| + 0.06 carry round-off of that size over 1e-4.
@@ -206,7 +206,7 @@ def test_a_run_that_did_not_move_has_no_displacement_error() -> None:
     """Without a denominator E_r is not known, rather than an exception or zero."""
     still = np.ones((5, 3))
     for before in (still, None):
-        row_ = comparison("x", full_run(), 100, full_run(), 100, 0.0, Beds(before, still, still))
+        row_ = comparison("x", full_run(), 100, full_run(), 100, 0.0, (before, still, still))
         assert isnan(row_.jump_displacement_error)
         assert row_.coordinates_error == 0
 
@@ -272,12 +272,12 @@ def test_a_jump_is_judged(share: float, verdict: str) -> None:
 
 
 def test_common_cycle() -> None:
-    """Run and control are compared at the last cycle both have, never inside a jump."""
-    own = history_of(PROCEDURE)
-    assert find_last_common_cycle(own, full_run(75)) == 75
-    assert find_last_common_cycle(history_of(PROCEDURE[:4]), full_run(75)) == 70
-    assert find_last_common_cycle(history_of(PROCEDURE[:4]), full_run(50)) == 50
-    assert find_last_common_cycle(own, history_of([])) == 0
+    """Run and control are compared at the last cycle both have, behind the first jump."""
+    cases = ((PROCEDURE, 75, 75), (PROCEDURE[:4], 75, 70), (PROCEDURE, 50, 0))
+    for outcomes, last, expected in cases:
+        run = SimpleNamespace(outcomes=outcomes, history=history_of(outcomes))
+        record = SimpleNamespace(run=run, control=SimpleNamespace(history=full_run(last)))
+        assert find_comparable_cycle(record) == expected  # type: ignore[arg-type]
 
 
 def test_a_sentence_compares_run_and_control() -> None:

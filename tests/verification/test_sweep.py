@@ -152,7 +152,7 @@ def test_failed_members_are_named_and_the_others_finish(
     scene.write_text(scene.read_text().replace("7075.0", "7100.0"))
     code, _, said = sweep(capsys, *words)
     assert code == 3
-    assert "loading.mean: 7075.0 in the run, 7100.0 now" in said
+    assert "loading.mean: 7075.0 there, 7100.0 now" in said
     assert sweep(capsys, scene, "--into", into / "members")[0] == 2
     assert len(in_process) == 2
 

@@ -6,6 +6,7 @@ from trackbed.run_files.folder import (
     MANIFEST,
     RESULT,
     is_written,
+    list_differences,
     lock_folder,
     refuse_format,
     refuse_links,
@@ -26,7 +27,7 @@ from trackbed.run_files.whole import (
 
 __all__ = [
     "MANIFEST", "RESULT", "add_run_arguments", "append_line", "digest_file", "folder",
-    "is_written", "lock_folder", "note_signals", "open_unlinked", "place_run", "raise_on_signals",
-    "read_object", "record_provenance", "refuse_both", "refuse_format", "refuse_links",
-    "refuse_writing", "replace_file", "seal_file", "sync_folder", "write_whole",
+    "is_written", "list_differences", "lock_folder", "note_signals", "open_unlinked", "place_run",
+    "raise_on_signals", "read_object", "record_provenance", "refuse_both", "refuse_format",
+    "refuse_links", "refuse_writing", "replace_file", "seal_file", "sync_folder", "write_whole",
 ]  # fmt: skip

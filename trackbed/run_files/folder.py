@@ -214,7 +214,9 @@ class RunFolder:
             )  # fmt: skip
 
 
-def list_differences(key: str, before: Any, after: Any, free: tuple[str, ...]) -> Iterator[str]:
+def list_differences(
+    key: str, before: Any, after: Any, free: tuple[str, ...] = ()
+) -> Iterator[str]:
     """What differs between two values of JSON, one line for each dotted key below ``key``."""
     if before == after or key in free:
         return
