@@ -131,15 +131,28 @@ class Sample:
         """That of a window that goes on from a finished one."""
         return start_of(self.run, stage)
 
-    def computed(self, start: EngineStart, cycles: int, folder: Path) -> Window:
-        """A window computed outside any run folder."""
+    def computed(
+        self, start: EngineStart, cycles: int, folder: Path, *,
+        scene: Scene | None = None, single_steps: int = 0, every: int = 1,
+    ) -> Window:  # fmt: skip
+        """A window computed outside any run folder, of another scene where one is given.
+
+        On LIGGGHTS and LAMMPS also ``single_steps`` instead of cycles, a frame ``every`` so many.
+        """
+        scene = scene or self.scene
         folder.mkdir()
-        digests = self.engine.write_cycles(self.scene, start, cycles, folder)
-        done = self.engine.run(self.scene, "in.cycles", folder, lambda: None, digests)
+        digests = self.engine.write_cycles(scene, start, cycles, folder)
+        if single_steps:
+            change = {"steps_per_cycle": every, "track_steps": every, "run_steps": single_steps}
+            lines = (folder / "parameters.in").read_text().splitlines()
+            kept = [line for line in lines if line.split()[1] not in change]
+            kept += [f"variable {name} index {value}" for name, value in change.items()]
+            (folder / "parameters.in").write_text("\n".join(kept) + "\n")
+        done = self.engine.run(scene, "in.cycles", folder, lambda: None, digests)
         assert done.decks == digests
         assert done.cpu_s >= 0
         assert 0 <= done.start_up_s <= max(done.wall_s, done.start_up_s)
-        names = self.engine.wall_names(self.scene, piston=True)
+        names = self.engine.wall_names(scene, piston=True)
         return read_window(folder, 0, names, start.piston_height)
 
     # --- faults -----------------------------------------------------------------------------

@@ -6,9 +6,13 @@ tests.  Faults of its process are in ``test_faults.py``.
 
 from __future__ import annotations
 
+import shutil
 import signal
+import subprocess
 import time
+from collections.abc import Callable
 from dataclasses import replace
+from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +20,7 @@ import pytest
 
 from adapters.bed.sample import GRAVITY
 from adapters.bed.state import Contacts, State, load_state
+from adapters.engines.contract import get_engine
 from adapters.files.dump_reader import read_frames
 from adapters.files.run_folder import RunFolder
 from adapters.procedure.run import run_scene
@@ -32,8 +37,7 @@ from tests.engine_sample import (
     window_of,
 )
 from tests.forked_commands import Commands, processes_in
-from trackbed import command
-from trackbed.scenes import read_template
+from trackbed.scenes import read_template, scene_path
 
 ROOT = Path(__file__).parents[2]
 HISTORY = 7
@@ -348,6 +352,109 @@ def test_load_series_across_a_jump(name: str, tmp_path: Path) -> None:
         np.testing.assert_allclose(track.target_force, target, rtol=1e-9)
 
 
+@with_decks
+@pytest.mark.parametrize(
+    "changes",
+    [
+        ("material.grain.friction=0.0", "material.wall.friction=0.0"),
+        ("sample.symmetry=[]", "sample.radius=0.012"),
+        ("loading.area_share=0.6",),
+    ],
+    ids=["frictionless", "whole cylinder", "partial piston"],
+)
+@pytest.mark.long
+def test_other_scenes(name: str, tmp_path: Path, changes: tuple[str, ...]) -> None:
+    """Less, or other, physics is prepared, loaded and read: without friction no deck and no file
+    has a tangential force, and a piston on a part of the section presses that part only."""
+    overrides = (*TINY, *SHORT, "procedure.total_cycles=4", f'engine.name="{name}"', *changes)
+    run_scene(scene_path("karrech-coarse"), tmp_path / "run", overrides=overrides, progress=QUIET)
+    scene = load_scene(scene_path("karrech-coarse"), overrides)
+    window = window_of(tmp_path / "run", "window_000001")
+    assert len(window) == 3
+    error = np.sqrt(np.mean((window.piston.contact_force - window.piston.target_force) ** 2))
+    assert error < 0.1 * window.piston.target_force.max()
+    place = np.hypot(window.position[..., 0], window.position[..., 1])
+    pressed = np.abs(window.wall_force["piston_wall"]).max(axis=2) > 0
+    assert (place[pressed] < scene.piston_reach + window.radius.max()).all()
+    frictionless = scene.material.grain.friction == 0
+    assert any(contacts.tangential_force.any() for contacts in window.contacts) != frictionless
+    assert window.spin.any() != frictionless
+    folder = tmp_path / "run" / "window_000001"
+    decks = "".join(path.read_text() for path in folder.glob("*.in"))
+    assert ("mindlin" in decks or "tangential history" in decks) != frictionless
+    assert not (folder / "pairs.dump").exists()
+
+
+@with_decks
+def test_momentum(name: str, samples: Callable[[str], Sample], tmp_path: Path) -> None:
+    """Velocity Verlet: m (v1 - v0) / dt = (F0 + F1) / 2, exactly, for the sum over the grains.
+
+    Contacts cancel in the sum, so F is walls and weight: a wall that is missing from the dump, or
+    of the wrong sign, can not hide.  Velocities have 16 digits, their difference is a part in 1e5.
+    """
+    sample = samples(name)
+    steps = sample.computed(sample.start(SECOND), 1, tmp_path / "steps", single_steps=20)
+    change = np.diff(np.einsum("n,cna->ca", steps.mass, steps.velocity), axis=0)
+    change /= sample.scene.time_step
+    force = np.sum(list(steps.wall_force.values()), axis=0).sum(axis=1)
+    force[:, 2] -= GRAVITY * steps.mass.sum()
+    mean = (force[1:] + force[:-1]) / 2
+    np.testing.assert_allclose(change, mean, rtol=1e-7, atol=1e-9 * np.abs(force).max())
+    assert np.abs(mean).max() > 1e-3 * GRAVITY * steps.mass.sum()  # something was balanced
+
+
+@with_decks
+def test_walls_keep_their_springs(
+    name: str, samples: Callable[[str], Sample], tmp_path: Path
+) -> None:
+    """Put back at rest, the bed drags on floor and cylinder as before, but for damping and what it
+    adds to Coulomb's limit; without the springs all drag would be gone."""
+    sample = samples(name)
+    start, before = sample.start(SECOND), sample.window(SECOND).state(-1)
+    moved = replace(start, moved=at_rest(before), piston_mesh=start.piston_mesh + 1)
+    window = sample.computed(moved, 1, tmp_path / "again", single_steps=1)
+    after = window.state(0)
+    assert np.array_equal(after.position, before.position)
+    assert not after.velocity.any()
+    for wall, axes in (("floor", [0, 1]), ("cylinder", [2])):
+        drag, again = before.wall_force[wall][:, axes], after.wall_force[wall][:, axes]
+        least, change = (0.01, 0.3) if name == "liggghts" else (1e-3, 0.75)
+        assert np.linalg.norm(drag) > least * GRAVITY * before.mass.sum()
+        assert np.linalg.norm(again - drag) < change * np.linalg.norm(drag)
+        cosine = np.sum(again * drag) / np.linalg.norm(again) / np.linalg.norm(drag)
+        assert np.linalg.norm(again) > 0.4 * np.linalg.norm(drag)
+        assert cosine > 0.7
+    # The piston starts from rest where it was asked to.
+    assert window.piston_start == start.piston_height
+    assert abs(window.piston.height[0] - start.piston_height) < 1e-6
+
+
+@with_decks
+@pytest.mark.long
+def test_example_by_hand(name: str, tmp_path: Path) -> None:
+    """The shipped decks with the files of example/ run without Python, window after window."""
+    decks = Path(str(files(f"{name}_inputs")))
+    for path in (*decks.glob("*.in"), *decks.glob("in.*"), *(decks / "example").iterdir()):
+        shutil.copy(path, tmp_path)
+    program = get_engine(name).program()
+    assert program is not None
+
+    def by_hand(deck: str, *words: str) -> str:
+        command = [*program, "-in", deck, *words]
+        done = subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, text=True)
+        return done.stdout
+
+    assert "COMPLETE step" in by_hand("in.prepare")
+    later = ("-var", "seat_part", "seat_none.in", "-var", "start_part", "start_continue.in")
+    for words in ((), later):
+        shutil.copy(tmp_path / "end.restart", tmp_path / "start.restart")
+        assert "COMPLETE step" in by_hand("in.cycles", *words)
+        track = np.loadtxt(tmp_path / "piston.txt", skiprows=1)
+        assert np.isfinite(track).all()
+        error = track[:, 2] - track[:, 1]
+        assert np.sqrt(np.mean(error**2)) < 0.05 * track[:, 1].max()
+
+
 # --- dies cleanly ---------------------------------------------------------------------------
 
 
@@ -392,12 +499,4 @@ def test_killed_run_resumes_to_the_identical_table(
     assert commands.kill() == -signal.SIGKILL
     assert gone(run)
     assert commands.run(*sample.words(run)) == 0, commands.output.read_text()
-    assert (run / "settlement.csv").read_bytes() == sample.table
-
-
-@pytest.mark.long
-def test_lost_stage_is_computed_again(sample: Sample, tmp_path: Path) -> None:
-    """Without its last window a run resumes to the identical table."""
-    run = sample.copy(tmp_path / "run", AFTER)
-    assert command.main(["resume", str(run)]) == 0
     assert (run / "settlement.csv").read_bytes() == sample.table

@@ -19,8 +19,6 @@ from adapters.procedure.run import run_scene
 from adapters.scene.tables import Scene
 from tests.damaged_files import (
     Damage,
-    cut,
-    gone,
     last_frame,
     lost_from_the_start,
     track_with,
@@ -66,7 +64,6 @@ def check_goes_on(sample: Sample, run: Path) -> None:
 
 LEFT: dict[str, tuple[str, Damage, int, str]] = {
     "nan": (SECOND, with_value("z", np.nan), 6, "column z of grain 7 is nan"),
-    "nan in the rain": (PREPARATION, with_value("vx", np.nan), 6, "column vx of grain 7 is nan"),
     "nan of the piston": (
         SECOND,
         track_with(slice(-5, -4), 2, np.nan),
@@ -76,8 +73,6 @@ LEFT: dict[str, tuple[str, Damage, int, str]] = {
     "lost grain": (SECOND, last_frame(without_grain), 6, "lost grains: 7"),
     "lost in the rain": (PREPARATION, lost_from_the_start, 6, "1 of 40 grains are lost"),
     "flying grain": (SECOND, with_value("z", 1e3), 6, "mean move in one cycle"),
-    "states cut": (SECOND, cut("states.dump", 0.6), 6, "the file ends inside"),
-    "no piston": (SECOND, gone("piston.txt"), 5, "left no piston.txt"),
 }
 """Stage, damage to what the engine left there, exit code, words."""
 

@@ -236,13 +236,6 @@ def test_bed_without_motion_and_bed_that_rises() -> None:
     assert find_asked_gain([stretch(10, np.zeros(20)), stretch(101, np.zeros(19))], 9, nothing) == 0
 
 
-def test_slopes_of_a_logarithm_are_one() -> None:
-    """Every block of u = a ln N has the slope a."""
-    assert estimate_slopes([log_stretch(10, 70), log_stretch(500, 520)]).slope == pytest.approx(
-        SLOPE
-    )
-
-
 def test_kappa_is_found_with_its_error_and_taken_out() -> None:
     """u = a ln N and kappa G / n behind two jumps: kappa within a fifth and within two standard
     errors that are three tenths of those before; taken out, three quarters of it are gone."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import json
 import os
 from pathlib import Path
@@ -12,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adapters.errors import EngineFailed, UsageError
-from adapters.files.run_folder import COLUMNS, Outcome, RunFolder, name_full_disk, place_stage
+from adapters.errors import UsageError
+from adapters.files.run_folder import COLUMNS, Outcome, RunFolder, place_stage
 
 ROOT = Path(__file__).parents[2]
 
@@ -267,18 +266,3 @@ def test_no_run_folder(tmp_path: Path, content: bytes | None) -> None:
     with pytest.raises(UsageError, match="not a run folder") as caught:
         RunFolder(tmp_path).manifest()
     assert caught.value.where == str(tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("number", "named"),
-    [(errno.ENOSPC, True), (errno.EDQUOT, True), (errno.EFBIG, True), (errno.EIO, False)],
-)
-def test_disk_full_is_named(tmp_path: Path, number: int, named: bool) -> None:
-    """A full disk or quota becomes exit code 5 with a remedy; other faults stay what they are."""
-    with pytest.raises(EngineFailed if named else OSError) as caught, name_full_disk(tmp_path):
-        raise OSError(number, os.strerror(number))
-    if named:
-        assert "the disk is full" in str(caught.value)
-        assert "resume" in str(caught.value)
-        assert caught.value.exit_code == 5
-        assert caught.value.from_outside

@@ -177,12 +177,6 @@ def test_first_jump_is_no_longer_than_its_window() -> None:
     assert limits[decision.binding] == min(limits.values())
 
 
-def test_decision_is_a_function_of_what_was_seen() -> None:
-    """The same observations give the same decision, to the last bit."""
-    control = known(of_law(50, 20, 0.0), of_law(90, 20, 0.1))
-    assert decide(control, SETTINGS) == decide(control, SETTINGS)
-
-
 def test_noise_shortens_the_jump_and_the_half_width_holds_it() -> None:
     """Ten times the noise, a shorter jump; the half-width is within the tolerance in both."""
     random, lengths = np.random.default_rng(6), []
