@@ -12,7 +12,7 @@ import csv
 import io
 import re
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from difflib import get_close_matches
 from errno import EINVAL
 from importlib import import_module
@@ -41,7 +41,6 @@ SI = {
 }  # fmt: skip
 """Units that a table may give, and what one of them is in SI."""
 TIMES = ("s", "ms", "us", "µs", "min", "h")
-
 BRACKETED = re.compile(r"(.*?),?\s*[\[(]\s*([^\])]*?)\s*[\])]\s*")
 """A name with a unit in brackets, known or not."""
 MARKS = "' \u2019\u00a0\u2009\u202f"
@@ -69,11 +68,6 @@ class Table:
     def where(self, row: int, column: str = "") -> str:
         """Place of a row, as errors name it."""
         return f"{self.path}:{self.lines[row]}" + (f", column {column}" if column else "")
-
-    def keep_rows(self, kept: Sequence[int]) -> Table:
-        """The table with these rows only."""
-        lines, rows = [self.lines[row] for row in kept], [self.rows[row] for row in kept]
-        return replace(self, lines=lines, rows=rows)
 
     def split_title(self, place: int, units: Collection[str]) -> tuple[str, str]:
         """Name of a column in lower case, and its unit, empty where none of ``units`` is known."""

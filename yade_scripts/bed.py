@@ -31,13 +31,10 @@ from yade.wrapper import (
 )
 
 O = Omega()
-
 GRAIN_MASK, WALL_MASK, BALLAST_MASK = 1, 3, 4
 """Group masks: bodies meet when they share a bit; walls, of bit 2, never meet one another."""
-
 PLANE, RIM = 8, 16
 """Bits of grains under a piston over a part of the bed: each meets its plane, or its rim."""
-
 STILL = 1e-100
 """Share of the time step with which forces are worked out anew: no spring stretches, and
 velocities, which the law divides by the step, keep their digits."""

@@ -13,10 +13,8 @@ from yade import Omega
 from yade.wrapper import PyRunner
 
 O = Omega()
-
 SAVED = "end.yade.gz"
 """YADE knows the format of a saved scene by this ending; whole, it is renamed end.restart."""
-
 STATE_COLUMNS = "id x y z vx vy vz omegax omegay omegaz radius mass"
 
 
@@ -190,7 +188,6 @@ def kinetic_energies(grains):
 
 ROOM, ROOM_OF_BODY = 100_000, 3_000
 """Room for a saved scene [bytes], and for each body in it; a body takes about 1,000."""
-
 SAVE_S = 600
 """Longest time to write one [s]."""
 

@@ -36,14 +36,11 @@ from adapters.bed.state import FloatArray
 
 DAMPING_FACTOR = sqrt(5 / 6)
 """LIGGGHTS' damping over 2 alpha sqrt(m* S_n), dimensionless."""
-
 OVERLAP_BOUND = 0.05
 """Greatest overlap over the smallest radius: Hertz contact is a law of small overlaps."""
-
 CHAIN_FACTOR = 10.0
 """Greatest contact force over the mean one: force chains have an exponential tail, and the
 largest of a hundred thousand contacts stays below it."""
-
 CONTACT_TIME_FACTOR = 2.943275
 """Contact time of an undamped Hertz collision times speed over greatest overlap, dimensionless."""
 

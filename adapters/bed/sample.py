@@ -21,10 +21,8 @@ from adapters.errors import NotConverged, SceneError
 
 GRAVITY = 9.81
 """Acceleration of gravity [m/s^2], along -z."""
-
 SURFACE_SHARE = 0.9
 """Part of a bed's height, from the floor, that lies below the uneven free surface."""
-
 START_ROUNDS = 1000
 """Rounds of drawing overlapping grains again before a random start is given up."""
 

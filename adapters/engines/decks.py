@@ -26,13 +26,10 @@ from adapters.scene import Scene
 
 LOOP_TIME = re.compile(r"^Loop time of (\S+) on", re.MULTILINE)
 """How LIGGGHTS and LAMMPS say how many seconds the time steps took."""
-
 GRAIN, WALL, MIRROR = 1, 2, 3
 """Atom types: grains; walls, piston face and piston mass; mirror planes."""
-
 PISTON_MARGIN = 1.0
 """By how much the piston's mesh is wider than the container, in greatest radii."""
-
 STATE_COLUMNS = "id x y z vx vy vz omegax omegay omegaz radius mass"
 """Columns of ``states.dump`` before the forces of the walls."""
 

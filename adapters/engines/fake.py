@@ -23,10 +23,8 @@ from adapters.scene import Scene
 
 SETTLEMENT = 2e-5
 """Displacement a of the mean grain in u = -a ln(1 + N) [m]."""
-
 SPACING = 0.9999
 """Distance of the lattice of grains over the diameter of the greatest: neighbours overlap."""
-
 CYCLE_SAMPLES = 20
 """Samples of the piston's record in a cycle."""
 

@@ -14,11 +14,11 @@ from adapters.engines import lammps_decks
 from adapters.engines.contract import EngineStart
 from adapters.engines.decks import DeckEngine, Parameters
 from adapters.errors import EngineMissing
+from adapters.files import write_dump
 from adapters.scene import Scene
 
 BANNER = re.compile(r"Simulator - (\d+ \w+ (\d{4}).*)")
 """What ``lmp -h`` says of its version."""
-
 PROCESS = re.compile(r"^LAMMPS \(\d+ \w+ \d{4}", re.MULTILINE)
 """What every run says once, however many processes it has."""
 
@@ -112,7 +112,9 @@ class LammpsEngine(DeckEngine):
     def complete(self, scene: Scene, folder: Path) -> None:
         """Write the contacts as every engine does; see `ProcessEngine.complete`."""
         super().complete(scene, folder)
-        lammps_decks.write_contacts(scene, folder)
+        frames = lammps_decks.convert_contact_frames(scene, folder)
+        write_dump(folder / "contacts.dump", frames)
+        (folder / "pairs.dump").unlink()
 
 
 ENGINE = LammpsEngine()

@@ -14,7 +14,7 @@ import numpy as np
 
 from adapters.bed import Container, FloatArray, IntArray, State, contact_law
 from adapters.engines.decks import STATE_COLUMNS, place_piston_atom
-from adapters.files import Frame, read_frames, write_dump
+from adapters.files import Frame, read_frames
 from adapters.scene import Scene
 
 TANGENTIAL = "mindlin_rescale/force"
@@ -138,16 +138,8 @@ COLUMNS = tuple(f"c_contact[{i}]" for i in range(1, 13))
 """Pair, normal and tangential force on the first grain, tangential spring, overlap."""
 
 
-def write_contacts(scene: Scene, folder: Path) -> None:
-    """Write ``contacts.dump`` from ``pairs.dump`` and ``states.dump``, and remove the first.
-
-    Raises `DumpError` when one of the two is malformed.
-    """
-    write_dump(folder / "contacts.dump", convert_contact_frames(scene, folder))
-    (folder / "pairs.dump").unlink()
-
-
 def convert_contact_frames(scene: Scene, folder: Path) -> Iterator[Frame]:
+    """Frames of ``contacts.dump`` from ``pairs.dump`` and ``states.dump``; raises `DumpError`."""
     states = read_frames(folder / "states.dump")
     for pairs, grains in zip(read_frames(folder / "pairs.dump"), states, strict=True):
         values = convert_contacts(scene, pairs.values, grains)

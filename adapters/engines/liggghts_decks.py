@@ -24,7 +24,6 @@ from adapters.scene import Scene
 MIRROR_YOUNG = 1e15
 """Young's modulus of a mirror plane [Pa]: a rigid frictionless plane under a sphere has the
 stiffness and the damping of the mirrored pair exactly; a finite one is softer."""
-
 PISTON_EDGE = 0.02
 """Least edge of a partial piston's mesh where a mirror cuts it, in its reach: LIGGGHTS refuses a
 triangle with an angle below 0.0045 rad, half the edge in a fan about a corner."""

@@ -12,16 +12,12 @@ from adapters.scene import Scene
 
 EQUILIBRIUM_RATIO = 1e-6
 """Kinetic (translational) over potential energy at which a bed counts as settled; section 2.3."""
-
 SETTLE_TIMES = 40
 """Falling times after which a bed that still moves is given up."""
-
 SEAT_SPEED = 0.1
 """Greatest speed of the piston while it finds the bed [m/s]."""
-
 SEAT_SHARE = 1.0
 """Force that seats the piston, over the peak of the load."""
-
 SEAT_DRAG_SHARE = 0.5
 """Greatest drag of the seating times the time step over the piston's mass: an explicit step turns
 a drag above 2 into growing oscillations, and one above 1 into oscillations."""

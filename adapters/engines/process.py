@@ -27,7 +27,6 @@ from adapters.scene import Scene
 POLL_S, POLL_MOST_S, POLL_SHARE = 0.05, 1.0, 1e-3
 """Time between two looks at a running engine [s]; at a long run it grows to so great a part of its
 length, up to the second: a look costs 0.3 ms."""
-
 END_S = 10
 """Time an engine has to end when it is asked to [s], before it is killed."""
 

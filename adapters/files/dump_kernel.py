@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 BLOCK_READ, TOKEN_UNUSUAL, ROW_SHORT, ROW_LONG = range(4)
 """What `read_rows` returns first; see there."""
-
 _EXPONENT_LOWEST, _EXPONENT_HIGHEST = -342, 308
 """Decimal exponents beyond which a mantissa of 19 digits rounds to zero or to infinity."""
 _FRACTION_FULL = 10**18

@@ -25,16 +25,12 @@ from adapters.files.dump_reader import read_frames
 
 FORMAT = "lammps-dump"
 """Name of the format in meshio."""
-
 EXTENSIONS = (".dump", ".lammpstrj", ".liggghts")
 """Endings of file names that are taken for text dumps; with ``.gz`` behind them, too."""
-
 STEP, BOX = "time_step", "box"
 """Keys of ``Mesh.field_data``: the step count, (1,), and the box, low and high [m], (3, 2)."""
-
 WHOLE = ("id", "type", "mol")
 """Columns of whole numbers."""
-
 _COMPONENT = re.compile(r"(\[\d+\]|[xyz])$")
 """What a component has behind the name of its vector."""
 _REFERENCE = re.compile(r"[cfdi]2?_")

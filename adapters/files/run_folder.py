@@ -64,22 +64,16 @@ class Outcome:
 
 NEEDED = ("*.npz", "end.restart")
 """Files of a stage that a run goes on from; the others may be removed to save space."""
-
 FREE_LEAST = 2**20
 """Free space below which a disk counts as full when an engine has failed [bytes]."""
-
 MANIFEST = ("scene", "overrides", "control")
 """What a manifest must hold for its run to be resumed."""
-
 ASKED_ON = "asked to go on cycle by cycle"
 """Event of a run whose user wants every cycle computed where no jump is allowed."""
-
 STAGES = ("preparation", "jump", "window")
 """Kinds of stages; at one cycle in this order: a jump of h = 0 comes before its window."""
-
 STAGE = re.compile(r"preparation|jump_\d{6,}_\d+|window_\d{6,}")
 """Name of a stage's folder."""
-
 SEAL = "seal"
 """Key of an ``outcome.json`` with the SHA-256 of the others; older records have none."""
 

@@ -169,4 +169,6 @@ def _computed_rows(table: Table, place: int) -> Table:
                 where=table.where(row, "kind"),
                 remedy=f"the kinds are {', '.join(KINDS)}",
             )
-    return table.keep_rows([row for row, kind in enumerate(kinds) if kind == "computed"])
+    kept = [row for row, kind in enumerate(kinds) if kind == "computed"]
+    lines, rows = [table.lines[row] for row in kept], [table.rows[row] for row in kept]
+    return replace(table, lines=lines, rows=rows)

@@ -21,12 +21,7 @@ from adapters.jumps.control import (
     trace_curve,
 )
 from adapters.jumps.forecast import Forecast, fit_forecast, integrate_gain
-from adapters.jumps.rates import (
-    Stretch,
-    count_blocks,
-    estimate_noise,
-    measure_rates,
-)
+from adapters.jumps.rates import Stretch, count_blocks, estimate_noise, measure_rates
 from adapters.jumps.slopes import Landing, estimate_slopes, reseating, unmoved
 
 ROLL_BACK = 2.0

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from adapters.bed import FloatArray
@@ -11,7 +9,6 @@ from adapters.errors import UsageError
 from adapters.laws.form import check_training_data, outer
 
 
-@dataclass(frozen=True)
 class Karrech2007:
     """u(t) = a ln t + b t, closed form (eqs 20, 21); a jump adds the whole law (eq. 17).
 
@@ -20,27 +17,22 @@ class Karrech2007:
     - Eq. 17 adds u(t + (k+h) T), all displacement since the first cycle, to a state that holds
       most of it already.  Meant is the increment u(t + (k+h) T) - u(t + k T).
     - Without a constant the estimate depends on the unit of time: t -> s t turns a ln t into
-      a ln t + a ln s, which no a and b can take up.  ``period`` is the duration of a cycle in
-      the unit that is to be tried: 1 counts in cycles, 0.02 in seconds at 50 Hz.
+      a ln t + a ln s, which no a and b can take up.  Here t counts in cycles.
 
     The estimate also depends on where u is zero.  Do not use it for predictions.
     """
 
-    period: float = 1.0
-    """Duration T of a cycle, in any unit of time."""
-
     name = "karrech2007"
     parameter_names = ("a", "b")
-    parameter_units = ("m", "m per unit of time")
+    parameter_units = ("m", "m/cycle")
     minimum_cycles = 2
     first_state = 1
     as_printed = True
 
     def fit(self, cycle: FloatArray, displacement: FloatArray) -> FloatArray:
-        """Parameters a [m] and b [m per unit of time], shape (2, ...); see `Law.fit`."""
+        """Parameters a [m] and b [m/cycle], shape (2, ...); see `Law.fit`."""
         cycle, displacement = check_training_data(self, cycle, displacement)
-        t = cycle * self.period
-        log_t = np.log(t)
+        t, log_t = cycle, np.log(cycle)
         log_log, t_log, t_t = log_t @ log_t, t @ log_t, t @ t
         determinant = log_log * t_t - t_log**2
         if determinant <= len(t) * np.finfo(float).eps * log_log * t_t:
@@ -57,7 +49,7 @@ class Karrech2007:
 
     def value(self, parameters: FloatArray, cycle: float | FloatArray) -> FloatArray:
         """a ln t + b t [m]; see `Law.value`."""
-        t = np.asarray(cycle, float) * self.period
+        t = np.asarray(cycle, float)
         return outer(np.log(t), parameters[0]) + outer(t, parameters[1])
 
     def increment(

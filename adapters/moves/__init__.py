@@ -9,7 +9,6 @@ __all__ = ["DEFAULT", "RETIRED", "Jump", "get_move", "list_moves"]
 
 DEFAULT = "smoothed"
 """The way of a scene that names none."""
-
 RETIRED = {
     "robust": "smoothed",
     "shrunk": "smoothed",

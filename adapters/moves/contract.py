@@ -8,13 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from adapters.bed import Container, FloatArray
-from adapters.errors import UsageError
 from adapters.laws.form import Law
 
 
 @dataclass(frozen=True, eq=False)
 class Jump:
-    """A window of computed cycles and the jump behind it; raises `UsageError` for what is none."""
+    """A window of computed cycles, and the jump behind it."""
 
     cycle: FloatArray
     """Cycles done at the window's cycle ends, the first the state before it, healing cycles left
@@ -27,18 +26,6 @@ class Jump:
     h: float
     """Cycles to jump."""
     container: Container
-
-    def __post_init__(self) -> None:
-        position, radius = self.position, self.radius
-        if position.ndim != 3 or position.shape[2] != 3 or radius.shape != position.shape[1:2]:
-            raise UsageError(
-                f"positions of shape {position.shape} and radii of shape {radius.shape} are not "
-                "those of states of the same grains"
-            )
-        if not len(radius):
-            raise UsageError("there are no grains to move")
-        if not (np.isfinite(self.h) and self.h >= 0):
-            raise UsageError(f"a jump of {self.h:g} cycles is none", remedy="give h >= 0")
 
     @property
     def place(self) -> FloatArray:

@@ -2,12 +2,7 @@
 
 from adapters.procedure import run
 from adapters.procedure.checks import FORCE_ERROR_GOAL, FORCE_START_CYCLES
-from adapters.procedure.history import (
-    AVERAGED,
-    History,
-    list_jumped_spans,
-    sum_cost,
-)
+from adapters.procedure.history import AVERAGED, History, list_jumped_spans, sum_cost
 from adapters.procedure.progress import Progress
 from adapters.procedure.record import (
     CONTROL,

@@ -13,10 +13,8 @@ from adapters.scene import Scene
 
 FORCE_ERROR_BOUND = 0.25
 """Greatest rms of piston force minus target, over the peak target, from the fourth cycle on."""
-
 FORCE_ERROR_GOAL = 0.03
 """The same, as the report's goal."""
-
 FORCE_START_CYCLES = 3
 """Cycles in which the piston finds the bed; its force is not judged in them."""
 

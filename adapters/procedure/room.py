@@ -12,12 +12,7 @@ from adapters.scene import Scene
 
 
 def find_room(
-    scene: Scene,
-    before: State,
-    target: FloatArray,
-    piston_height: float,
-    *,
-    may_wait: bool = False,
+    scene: Scene, before: State, target: FloatArray, piston_height: float, *, may_wait: bool = False
 ) -> tuple[FloatArray, dict[str, Any], float]:
     """Relaxed positions (n, 3), the relaxation's record, and the piston's height, in metres.
 

@@ -25,7 +25,6 @@ from trackbed.run_files import list_differences, record_provenance, write_whole
 
 OWN_FILES = ("lock", "scene.toml", "load_series.csv", "dry_run")
 """What may be in a run folder before its manifest is written."""
-
 CONTROL = Variant("control", jumps=False)
 
 

@@ -51,7 +51,6 @@ METHODS = ("smallest-move", "karrech2007")
 """What a user may name."""
 RETIRED = {"proximal": "smallest-move"}
 """Methods that left trackbed, and the nearest one that is here."""
-
 GAP_FACTOR = 5.0
 """Pairs nearer than so many mean overlaps belong to the network: they close under any load."""
 

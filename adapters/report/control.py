@@ -8,6 +8,12 @@ from adapters.jumps import BAND_PROBABILITY
 from adapters.procedure import Record, estimate_band_of_run, list_checks, list_decisions
 from trackbed.report import micrometres, paragraph, per_cent, plain, section, table
 
+HEADER = (
+    "cycle", "", "<i>k</i>", "<i>h</i>", "gain expected (µm)", "moved by (µm)", "half-width (µm)",
+    "realised error", "rate off by (standard errors)", "", "why",
+)  # fmt: skip
+"""Columns of the table of decisions."""
+
 
 def control(record: Record) -> str:
     """Decisions and checks of a controlled run; empty for another."""
@@ -73,19 +79,7 @@ def control(record: Record) -> str:
             "less what the bed is ahead of its own rates by, and what it will settle more because "
             "it was moved. The last column names the rule that set <i>h</i>, and the longest jump "
             "by each.",
-            (
-                "cycle",
-                "",
-                "<i>k</i>",
-                "<i>h</i>",
-                "gain expected (µm)",
-                "moved by (µm)",
-                "half-width (µm)",
-                "realised error",
-                "rate off by (standard errors)",
-                "",
-                "why",
-            ),
+            HEADER,
             rows,
             words=frozenset({10}),
         ),

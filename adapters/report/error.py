@@ -21,7 +21,6 @@ from adapters.procedure import History
 
 COORDINATION_BAR = 0.03
 """Greatest relative change of the coordination number, by a relaxation or against a control."""
-
 HEIGHT_BAR = 0.05
 """Greatest change of the mean height by a relaxation over the jump's own settlement."""
 

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 COMPUTED, HEALING, JUMPED, CONTROL = "#0b5fa5", "#e07b00", "#8c8c8c", "#111111"
 """Colours of computed, healing and jumped cycles, and of the full run."""
-
 SPAN = "#e9e9e9"
 """Shade of a jumped span."""
 

@@ -9,6 +9,12 @@ from adapters.report.error import COORDINATION_BAR, HEIGHT_BAR
 from adapters.report.numbers import Numbers
 from trackbed.report import micrometres, paragraph, per_cent, section, table, verdict
 
+HEADER = (
+    "cycles jumped", "settlement by the law", "full run, same cycles", "law", "relaxation",
+    "healing cycles", "coordination number changed", "height changed by relaxation",
+)  # fmt: skip
+"""Columns of the table of jumps."""
+
 
 def describe_jumps(record: Record, numbers: Numbers) -> str:
     """What each step of a jump adds to the error, and what the bed made of it."""
@@ -35,16 +41,7 @@ def describe_jumps(record: Record, numbers: Numbers) -> str:
             "parted, its increment is another bed's. Bars: coordination number, walls counted, "
             f"within {100 * COORDINATION_BAR:.0f} % of the state before; mean height within "
             f"{100 * HEIGHT_BAR:.0f} % of the jump's own settlement.",
-            (
-                "cycles jumped",
-                "settlement by the law",
-                "full run, same cycles",
-                "law",
-                "relaxation",
-                "healing cycles",
-                "coordination number changed",
-                "height changed by relaxation",
-            ),
+            HEADER,
             rows,
         ),
         owed(record),

@@ -28,15 +28,7 @@ from adapters.report.error import (
     measure_jump,
     relative_error,
 )
-from adapters.report.verdict import (
-    FITTED,
-    FULL,
-    NOTHING,
-    PROCEDURE,
-    CostSplit,
-    list_fails,
-    split_cost,
-)
+from adapters.report.verdict import FITTED, FULL, NOTHING, PROCEDURE, list_fails, split_cost
 from adapters.scene import flatten_keys, left_out
 
 
@@ -64,7 +56,8 @@ class Numbers:
     jumps: tuple[JumpFigures, ...]
     preparation: dict[str, float]
     """Figures of the settled bed by dotted name; empty before it is settled."""
-    costs: tuple[CostSplit, ...]
+    costs: tuple[dict[str, Any], ...]
+    """By `adapters.report.verdict.PURPOSES`."""
     fails: tuple[str, ...]
     """Where the claim fails, in sentences."""
     left_out: tuple[str, ...]
@@ -125,7 +118,7 @@ def numbers_of(record: Record) -> Numbers:
         jumps=jumps,
         preparation={} if prepared is None else flatten_keys(prepared.notes["figures"]),
         costs=costs,
-        fails=tuple(list_fails(record, rows, jumps, costs[0])),
+        fails=tuple(list_fails(record, rows, jumps)),
         left_out=left_out(scene),
         failed_jumps=tuple((jump.stage, jump.why) for jump in run.failed_jumps),
         stops=tuple((e["time"], e.get("why", "")) for e in run.events if e["event"] == "stopped"),

@@ -17,7 +17,7 @@ from adapters.report.error import Comparison
 from adapters.report.figure import draw_settlement
 from adapters.report.jumps import describe_jumps
 from adapters.report.numbers import Numbers, numbers_of
-from adapters.report.verdict import FITTED, FULL, NOTHING, PROCEDURE, PYTHON_BAR
+from adapters.report.verdict import FITTED, FULL, NOTHING, PROCEDURE, PURPOSES
 from trackbed.report import (
     MINUS,
     TIMES,
@@ -151,16 +151,11 @@ def _error(numbers: Numbers) -> str:
         f"time of 180 % is <i>S</i> {MINUS} 1 = 1.8."
     )
     header = (
-        f"at cycle {numbers.compared_at}",
-        "cycles computed",
-        "settlement (µm), error",
-        "coordination number, error",
-        "elastic deflection (µm), error",
-        "E<sub>r</sub> of displacements",
-        "E<sub>r</sub> of coordinates",
-        "CPU time (s)",
+        f"at cycle {numbers.compared_at}", "cycles computed", "settlement (µm), error",
+        "coordination number, error", "elastic deflection (µm), error",
+        "E<sub>r</sub> of displacements", "E<sub>r</sub> of coordinates", "CPU time (s)",
         "speed-up",
-    )
+    )  # fmt: skip
     rows = [
         (
             row.name,
@@ -217,32 +212,17 @@ def show_with_error(row: Comparison, value: str, error: float) -> str:
 
 def _cost(numbers: Numbers) -> str:
     """Where the time went, and the work that no machine changes."""
-    purposes = (
-        ("engine: time steps", "engine", ".1f"),
-        ("engine: start-up", "start_up", ".1f"),
-        ("parse", "parse", ".2f"),
-        ("fit", "fit", ".2f"),
-        ("relax", "relax", ".2f"),
-        ("other Python", "other_python", ".2f"),
-        ("failed jumps, by the clock", "failed_jumps", ".1f"),
-        ("total", "total", ".1f"),
-        ("preparation, not in the total", "preparation", ".1f"),
-        ("load cycles computed", "cycles_computed", "d"),
-        ("grain-steps", "grain_steps", ".3g"),
-    )
     rows = [
-        (label, *(plain(getattr(cost, purpose), form) for cost in numbers.costs))
-        for label, purpose, form in purposes
+        (label, *(plain(cost[purpose], form) for cost in numbers.costs))
+        for purpose, (label, form) in PURPOSES.items()
     ]
-    shares = (per_cent(cost.python_share, ".1f") for cost in numbers.costs)
     return section(
         "Cost",
         table(
-            "CPU time in s from the start of loading. Python's share counts parse, fit, relax and "
-            f"other Python; its bar is {100 * PYTHON_BAR:.0f} %. Grain-steps (grains {TIMES} time "
-            "steps computed) are work that no machine changes.",
-            ("", *(cost.name for cost in numbers.costs)),
-            [*rows, ("Python's share", *shares)],
+            f"CPU time in s from the start of loading. Grain-steps (grains {TIMES} time steps "
+            "computed) are work that no machine changes.",
+            ("", *(cost["name"] for cost in numbers.costs)),
+            rows,
             "total",
         ),
     )

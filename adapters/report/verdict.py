@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from math import nan
+from typing import Any
 
 import numpy as np
 
@@ -18,41 +18,30 @@ PROCEDURE, NOTHING, FITTED, FULL = (
     "full run (control)",
 )
 """Names of the rows of the error table."""
-
-PYTHON_BAR = 0.05
-"""Greatest share of Python in the CPU time of a run."""
-
 FEW_GRAINS = 500
 """Fewer grains than this settle in bursts: one such bed cannot judge a law."""
 
 
-@dataclass(frozen=True)
-class CostSplit:
-    """CPU time of one run from the start of loading, by purpose [s]."""
-
-    name: str
-    engine: float
-    """Time steps, without start-up."""
-    start_up: float
-    """Of the engine: reading, building neighbour lists, writing."""
-    parse: float
-    fit: float
-    relax: float
-    other_python: float
-    failed_jumps: float
-    """What failed jumps lost."""
-    total: float
-    python_share: float
-    """Parse, fit, relax and other Python over the total."""
-    preparation: float
-    """CPU time of the rain of grains, not in ``total`` [s]."""
-    cycles_computed: int
-    grain_steps: float
-    """Work that no machine changes: grains times time steps computed."""
+PURPOSES = {
+    "engine": ("engine: time steps", ".1f"),
+    "start_up": ("engine: start-up", ".1f"),
+    "parse": ("parse", ".2f"),
+    "fit": ("fit", ".2f"),
+    "relax": ("relax", ".2f"),
+    "other_python": ("other Python", ".2f"),
+    "failed_jumps": ("failed jumps, by the clock", ".1f"),
+    "total": ("total", ".1f"),
+    "preparation": ("preparation, not in the total", ".1f"),
+    "cycles_computed": ("load cycles computed", "d"),
+    "grain_steps": ("grain-steps", ".3g"),
+}
+"""What `split_cost` tells, as ``report.json`` has it, with its name and format on the page: CPU
+time from the start of loading [s] (start-up is reading, building neighbour lists, writing), cycles,
+and work that no machine changes, grains times time steps computed."""
 
 
-def split_cost(record: Record, track: Track) -> CostSplit:
-    """CPU time of a track by purpose."""
+def split_cost(record: Record, track: Track) -> dict[str, Any]:
+    """The cost of a track by `PURPOSES`, and its ``name``."""
     loading = [outcome for outcome in track.outcomes if outcome.stage != "preparation"]
     parts = {
         purpose: sum(outcome.cost.get(purpose, 0.0) for outcome in loading)
@@ -63,7 +52,7 @@ def split_cost(record: Record, track: Track) -> CostSplit:
     total = parts["engine"] + python + failed
     # The engine's count of time steps goes on through jumps.
     ends = [o.notes["time_step"] for o in track.outcomes if o.stage in ("preparation", "window")]
-    return CostSplit(
+    return dict(
         name=PROCEDURE if track is record.run else FULL,
         engine=parts["engine"] - parts["start_up"],
         start_up=parts["start_up"],
@@ -73,7 +62,6 @@ def split_cost(record: Record, track: Track) -> CostSplit:
         other_python=parts["other"],
         failed_jumps=failed,
         total=total,
-        python_share=python / total if total > 0 else nan,
         preparation=nan if track.preparation is None else sum_cost(track.preparation.cost),
         cycles_computed=sum(o.last_cycle - o.first_cycle for o in loading if o.stage == "window"),
         grain_steps=float(record.scene.grain_count * (ends[-1] - ends[0])) if ends else 0.0,
@@ -81,10 +69,7 @@ def split_cost(record: Record, track: Track) -> CostSplit:
 
 
 def list_fails(
-    record: Record,
-    rows: Sequence[Comparison],
-    jumps: Sequence[JumpFigures],
-    cost: CostSplit,
+    record: Record, rows: Sequence[Comparison], jumps: Sequence[JumpFigures]
 ) -> Iterator[str]:
     """Where the claim fails: cheaper ways that do as well, bars missed, a bed too small."""
     if not len(record.run.history.cycle):
@@ -112,7 +97,6 @@ def list_fails(
             HEIGHT_BAR,
         ),
         ("piston's rms force error in its worst cycle after three", force, FORCE_ERROR_GOAL),
-        ("Python's share of the CPU time", [cost.python_share], PYTHON_BAR),
     ):
         worst = find_greatest(values)
         if worst > bar:

@@ -24,10 +24,8 @@ ALTERNATIVES = (
     ("engine.rayleigh_share", "engine.time_step"),
 )
 """Pairs of keys of which a scene gives exactly one."""
-
 JUMP_KEYS, TOLERANCE_KEY = ("procedure.k", "procedure.h"), "procedure.tolerance"
 """Cycles computed and jumped by hand, and what stands instead."""
-
 ENGINES = "adapters.engines"
 """The room of the engines; only looked for by name, as they import the scene."""
 

@@ -21,7 +21,6 @@ from trackbed.scene_files import Problem
 
 COUNT_GREATEST = 10**8
 """Most grains a scene may have."""
-
 RAYLEIGH_SHARE_DOUBTFUL = 0.4
 """Share of the Rayleigh time above which a time step is doubtful."""
 WIDTH_DOUBTFUL = 8

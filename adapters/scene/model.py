@@ -9,7 +9,6 @@ from adapters.scene.tables import Scene
 
 ENGINE_TITLES = {"auto": "LIGGGHTS", "liggghts": "LIGGGHTS", "lammps": "LAMMPS", "yade": "YADE"}
 """Engines as their users write them."""
-
 KEPT = {
     "auto": "LIGGGHTS keeps the spring",
     "liggghts": "LIGGGHTS keeps the spring",

@@ -37,7 +37,6 @@ from trackbed.scene_files import NonNegative, Positive, Table
 
 TRACK_SAMPLES = 100
 """Least number of samples of the piston's record in a cycle."""
-
 FLAT_WALLED = ("yade",)
 """Engines without a cylinder: planes tangent to it take its place."""
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +13,10 @@ from adapters.errors import UsageError
 from adapters.laws import get_law
 from adapters.laws.form.contract import Law
 from adapters.moves import get_move, list_moves
-from adapters.moves.contract import Jump, Move
+from adapters.moves.contract import Move
 from adapters.procedure.run import run_scene
-from tests.settling_bed import CYCLE, LOG, QUARTER, QUIET, WHOLE, bed, moved
-from tests.small_bed import small_bed
+from tests.settling_bed import CYCLE, QUIET, WHOLE, bed, moved
+from tests.small_bed import read_rows, small_bed
 
 every_move = pytest.mark.parametrize("name", list_moves())
 
@@ -128,23 +127,6 @@ def test_a_loose_grain_is_not_flung(name: str) -> None:
     assert np.delete(change, 7).max() < 0.25 * np.linalg.norm(alone)
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"h": -1.0}, "a jump of -1 cycles"),
-        ({"h": np.nan}, "a jump of nan"),
-        ({"radius": np.ones(59)}, "not those of states of the same grains"),
-        ({"position": np.zeros((21, 0, 3)), "radius": np.ones(0)}, "no grains"),
-    ],
-)
-def test_arguments_out_of_range_are_refused(change: dict[str, object], message: str) -> None:
-    """Each argument that makes no sense is named."""
-    position, radius = bed()
-    arguments = {"cycle": CYCLE, "position": position, "radius": radius, "law": LOG, "h": 30.0}
-    with pytest.raises(UsageError, match=message):
-        Jump(**(arguments | change), container=QUARTER)  # type: ignore[arg-type]
-
-
 @every_move
 def test_damaged_position_is_named(name: str) -> None:
     """A position that is not finite stops the jump."""
@@ -180,8 +162,7 @@ def test_a_run_with_each_way(name: str, tmp_path: Path) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(small_bed(k=10, h=8, total_cycles=50))
     run_scene(scene, tmp_path / "run", overrides=[f'procedure.move="{name}"'], progress=QUIET)
-    with (tmp_path / "run" / "settlement.csv").open() as stream:
-        rows = list(csv.DictReader(stream))
+    rows = read_rows(tmp_path / "run")
     settled = float(rows[-1]["settlement"]) / (SETTLEMENT * np.log(51))
     assert [row["kind"] for row in rows].count("jumped") == 2
     assert settled == pytest.approx(1.0, rel=0.03) or (not way.moves_piston and settled < 0.95)

@@ -34,10 +34,7 @@ SMALL = (
 """What the tests change: fewer and softer grains, and cycles of a hundred steps."""
 YIELDING = ("--oversubscribe", "--mca", "mpi_yield_when_idle", "1")
 """Two processes on a machine with other work: who waits lets the other go on."""
-LAUNCHERS = {
-    "liggghts": ("mpirun", *YIELDING, "-np", "2"),
-    "lammps": ("mpiexec", "-n", "2"),
-}
+LAUNCHERS = {"liggghts": ("mpirun", *YIELDING, "-np", "2"), "lammps": ("mpiexec", "-n", "2")}
 
 
 def launcher_of(engine: str) -> tuple[str, ...]:

@@ -12,13 +12,7 @@ import pytest
 
 from adapters.bed import contact_law as law
 from tests import yade_few_grains
-from tests.tangential_rules import (
-    LOOPS,
-    force_incremental,
-    force_rescaled,
-    force_secant,
-    work,
-)
+from tests.tangential_rules import LOOPS, force_incremental, force_rescaled, force_secant, work
 from validation.bench import few_grains, few_grains_lammps
 from validation.bench.few_grains import (
     PLACE,

@@ -25,17 +25,7 @@ from adapters.files.dump_reader import read_frames
 from adapters.files.run_folder import RunFolder
 from adapters.procedure.run import run_scene
 from adapters.scene.file import load_scene
-from tests.engine_sample import (
-    AFTER,
-    FIRST,
-    JUMP,
-    QUIET,
-    SECOND,
-    TINY,
-    Sample,
-    at_rest,
-    window_of,
-)
+from tests.engine_sample import AFTER, FIRST, JUMP, QUIET, SECOND, TINY, Sample, at_rest, window_of
 from tests.forked_commands import Commands, processes_in
 from trackbed.scenes import read_template, scene_path
 

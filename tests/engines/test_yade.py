@@ -20,13 +20,7 @@ from adapters.scene.file import load_scene
 from adapters.scene.tables import Scene
 from tests.yade_few_grains import track_run
 from trackbed.scenes import read_template
-from validation.bench.few_grains import (
-    RADIUS,
-    Track,
-    grain_mass,
-    head_on,
-    table_1,
-)
+from validation.bench.few_grains import RADIUS, Track, grain_mass, head_on, table_1
 
 pytestmark = pytest.mark.engine("yade")
 

@@ -11,11 +11,7 @@ from trackbed.command import main
 from trackbed.errors import EXIT_CODES, Interrupted, TrackbedError, describe_exit_codes
 
 ERRORS = ("adapters.errors", "qdem_fem.files.errors", "rigid_lcp.errors")
-DOORS = {
-    "run": "engine",
-    "qdem": "simulation",
-    "rigid": "run",
-}
+DOORS = {"run": "engine", "qdem": "simulation", "rigid": "run"}
 """Verbs that read a scene file, and a table of each."""
 
 

@@ -431,12 +431,7 @@ ROW_END = GRAINS[: GRAINS.index("5 1 -0.009 1e-3")]
     ],
 )  # fmt: skip
 def test_fault_is_named(
-    tmp_path: Path,
-    text: str,
-    line: int,
-    step: int | None,
-    says: str,
-    whole: int,
+    tmp_path: Path, text: str, line: int, step: int | None, says: str, whole: int
 ) -> None:
     """Each fault: file, line, time step, lost grains, a remedy; frames before it are kept."""
     path = written(tmp_path, text)

@@ -157,8 +157,7 @@ def test_a_received_folder_leads_nowhere_else(run: RunFolder, tmp_path: Path, na
 
 
 @pytest.mark.parametrize(
-    "content",
-    [b"{", b"null", b"[1]", b'"text"', b"{}", b"\xff\xfe\x00", b'{"stage": "window"}'],
+    "content", [b"{", b"null", b"[1]", b'"text"', b"{}", b"\xff\xfe\x00", b'{"stage": "window"}']
 )
 def test_damaged_outcome_is_no_outcome(run: RunFolder, content: bytes) -> None:
     """A record that is cut, empty, of another kind or no text is no record."""

@@ -25,7 +25,7 @@ from adapters.engines.yade import (
     damping_ratio,
     gather_shared_parameters,
 )
-from adapters.errors import EngineFailed, EngineMissing, NotConverged, SceneError
+from adapters.errors import EngineFailed, NotConverged, SceneError
 from adapters.scene.file import load_scene
 from adapters.scene.tables import Scene
 from trackbed import command
@@ -218,20 +218,6 @@ def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
 
     monkeypatch.setenv("PATH", f"{tmp_path}")
     return make
-
-
-def test_version_is_told(program) -> None:
-    """The banner of the program."""
-    program("echo 'Yade version: 2023.02a '")
-    assert ENGINE.version() == "Yade 2023.02a"
-
-
-@pytest.mark.parametrize("text", ["echo hello", "exit 1", "echo 'Yade version: 2018.02b'"])
-def test_foreign_and_old_programs_are_refused(text: str, program) -> None:
-    """With what they say, and how to get the right one."""
-    program(text)
-    with pytest.raises(EngineMissing, match="apt-get install yade"):
-        ENGINE.version()
 
 
 STARTED = "echo Running script prepare.py"

@@ -16,11 +16,7 @@ from adapters.bed.container import Container, Walls
 from adapters.bed.overlaps import find_behind_discs, measure_rows, neighbours
 from adapters.bed.state import FloatArray, State
 from adapters.errors import NotConverged, UsageError
-from adapters.relaxation.kernel import (
-    add_hertz_energy,
-    estimate_norm,
-    solve_multipliers,
-)
+from adapters.relaxation.kernel import add_hertz_energy, estimate_norm, solve_multipliers
 from adapters.relaxation.measured import Relaxation, RelaxationNotConverged
 from adapters.relaxation.methods import bound_equilibrium_overlap, relax, relax_bare
 from tests.deepest_overlap import deepest
@@ -297,14 +293,7 @@ def test_nine_grain_cell(method: str) -> None:
     state, walls = nine_grains()
     estimate = state.position.copy()
     estimate[4] += [1.5e-3, 0.0, 1e-3]
-    found = relax(
-        estimate,
-        state,
-        walls,
-        STIFFNESS,
-        method=method,
-        keep_height=False,
-    )
+    found = relax(estimate, state, walls, STIFFNESS, method=method, keep_height=False)
     assert found.estimated.max_penetration > 1e-3
     assert found.relaxed.max_penetration < 2e-7
     if method == "karrech2007":

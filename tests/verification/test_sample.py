@@ -83,11 +83,7 @@ def test_radii_follow_their_law(law: RadiusDistribution) -> None:
     assert abs(volume.mean() - law.volume_mean) < 5 * error
 
 
-@given(
-    mean=st.floats(1e-3, 1.0),
-    relative=st.floats(0.01, 0.3),
-    truncation=st.floats(0.2, 3.0),
-)
+@given(mean=st.floats(1e-3, 1.0), relative=st.floats(0.01, 0.3), truncation=st.floats(0.2, 3.0))
 def test_mean_volume_is_the_integral(mean: float, relative: float, truncation: float) -> None:
     """E[4/3 pi r^3] in closed form equals the integral over the cut normal density."""
     law = RadiusDistribution("normal", mean, relative * mean, truncation)
@@ -210,11 +206,7 @@ def test_start_that_is_too_dense_is_refused() -> None:
 # ---------------------------------------------------------------------------------- volumes
 
 
-@given(
-    height=st.floats(-2, 4),
-    centre=st.floats(-1, 3),
-    radius=st.floats(0.01, 1.5),
-)
+@given(height=st.floats(-2, 4), centre=st.floats(-1, 3), radius=st.floats(0.01, 1.5))
 def test_cap_is_the_integral_of_discs(height: float, centre: float, radius: float) -> None:
     """Volume below a plane = integral of pi (r^2 - (z - c)^2) up to the plane."""
     top = min(max(height, centre - radius), centre + radius)

@@ -13,27 +13,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 STYLE: Any = {
-    "font.size": 9.5,
-    "axes.titlesize": 10,
-    "axes.titlelocation": "left",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#e3e3e3",
-    "grid.linewidth": 0.6,
-    "axes.axisbelow": True,
-    "axes.edgecolor": "#555555",
-    "axes.linewidth": 0.8,
-    "xtick.color": "#333333",
-    "ytick.color": "#333333",
-    "lines.linewidth": 1.5,
-    "legend.frameon": False,
-    "legend.fontsize": 8.5,
-    "savefig.dpi": 170,
-    "svg.hashsalt": "trackbed",
-    "svg.fonttype": "path",
-    "figure.constrained_layout.use": True,
-}
+    "font.size": 9.5, "figure.constrained_layout.use": True, "savefig.dpi": 170,
+    "svg.hashsalt": "trackbed", "svg.fonttype": "path",
+    "axes.titlesize": 10, "axes.titlelocation": "left", "axes.linewidth": 0.8,
+    "axes.spines.top": False, "axes.spines.right": False, "axes.edgecolor": "#555555",
+    "axes.grid": True, "axes.axisbelow": True, "grid.color": "#e3e3e3", "grid.linewidth": 0.6,
+    "xtick.color": "#333333", "ytick.color": "#333333", "lines.linewidth": 1.5,
+    "legend.frameon": False, "legend.fontsize": 8.5,
+}  # fmt: skip
 
 
 def save_figure(draw: Callable[[], Figure], path: Path) -> Path:

@@ -45,7 +45,6 @@ summary { cursor: pointer; color: #0b5fa5; }
 """
 
 TYPES = {".svg": "image/svg+xml", ".png": "image/png"}
-
 MINUS, TIMES, UNKNOWN = "\N{MINUS SIGN}", "\N{MULTIPLICATION SIGN}", "\N{EN DASH}"
 """Signs as in print, and what stands for a number that is not known."""
 

@@ -30,11 +30,8 @@ BOUNDS = {
     "less_than_equal": ("le", "at most"),
 }
 """Types of pydantic's errors: name of the bound in their context, and its words."""
-
 HARDLY = 1e-12
 """A least value up to this stands for "above zero"."""
-
-
 LONGEST = 1 << 24
 """Most bytes of a scene file."""
 

@@ -38,7 +38,6 @@ JUDGED = 0.9
 """Probability of the band that a prediction is judged by (`fit.refusal`, `compare_laws`), whatever
 band is asked for: a narrower one is no way round a refusal.  The study of laws measured the
 refusals at 90 %, the probability that regimes need too."""
-
 TO_TELL = "to see a regime"
 """What `ROWS_FEWEST` rows are needed for, in the words of an error."""
 

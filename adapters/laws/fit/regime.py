@@ -28,7 +28,6 @@ RESOLUTION = 1e-3
 A bed that has settled but for its last digit is at rest, whichever way that digit goes."""
 CERTAIN = 0.9
 """Probability from which a bed is said to shake down, to ratchet or to collapse."""
-
 SHAKEDOWN, STEADY, RATCHETING, COLLAPSE = REGIMES = (
     "shakedown",
     "steady",

@@ -13,12 +13,10 @@ from adapters.errors import EngineMissing, UsageError
 
 LOCAL, SLURM = "local", "slurm"
 """Names for ``--scheduler``; anything else is the address of a scheduler."""
-
 ANY_PORT = "127.0.0.1:0"
 """Of a scheduler's pages: Dask's own port is taken where two sweeps run at once."""
 CONNECT_S = 30
 """How long a scheduler may take to answer [s]."""
-
 EXTRA = "pip install 'trackbed[sweep]'"
 
 

@@ -20,7 +20,6 @@ THREADS = (
     "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS",
 )  # fmt: skip
 """A member runs on one core unless the worker's environment says more: others run beside it."""
-
 COMMAND = (sys.executable, "-m", "trackbed")
 """The command, as it is installed on the worker."""
 

@@ -21,7 +21,6 @@ from adapters.scene import Scene, load_scene
 
 SEED = "sample.seed"
 """The key that ``--seeds`` counts up."""
-
 NAME_LONGEST = 120
 """Longest name of a member's folder [characters]; a longer one is cut, with a digest."""
 

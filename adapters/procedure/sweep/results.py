@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
 CONFIDENCE = 0.95
 """Probability that a band holds the mean, for seeds whose settlements are normal."""
-
 SAMPLE_FIGURES = ("coordination_number", "relative_density")
 """Columns of the last row that the table of members has too."""
 
