@@ -64,7 +64,7 @@ class Conditions:
         """Amplitudes (k, series) at ``times`` (k,); column 0 is one, for what is constant."""
         columns = [np.ones((len(times), 1))]
         columns += [driver.sample(times) for driver in self.drivers()]
-        return np.concatenate(columns, axis=1)
+        return np.ascontiguousarray(np.concatenate(columns, axis=1))  # kernels compile once
 
     def pack_loads(self, packed: Packed, place: Integers) -> Loads:
         """The kernel's list of forces; ``place`` (n,) is the kernel's number of a node."""

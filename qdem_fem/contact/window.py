@@ -80,7 +80,7 @@ def build_contact_window(made_from: str) -> Any:
         step of contact said.  Comes back where that is not `GO_ON`.
         """
         stamp = made_from  # noqa: F841  (makes it a part of the key)
-        forces = state.forces
+        forces, one = state.forces, np.int64(1)  # a literal would compile another window
         for k in range(steps):
             for i in acting:
                 for c in range(3):
@@ -93,12 +93,12 @@ def build_contact_window(made_from: str) -> Any:
                 )
             if threads is None:
                 _, bad = WINDOW_ONE(
-                    law, viscous, layout, state, loads, held, ahead, row, gravity, work, step, 1
+                    law, viscous, layout, state, loads, held, ahead, row, gravity, work, step, one
                 )
                 said = advance_contact(contact, None, state.displacement, state.velocity, step)
             else:
                 _, bad = WINDOW_THREADS(
-                    law, viscous, layout, state, loads, held, ahead, row, gravity, work, step, 1
+                    law, viscous, layout, state, loads, held, ahead, row, gravity, work, step, one
                 )
                 said = advance_contact(contact, True, state.displacement, state.velocity, step)
             if bad > 0.0 or said != GO_ON:
@@ -126,7 +126,7 @@ def list_forces(contact: Any) -> tuple[Any, Any, Any, Any]:
     their places in the windows of forces, and the forces [N]."""
     if contact is None:
         none = np.zeros(0, np.int64)
-        return none, none, none, none.reshape(0, 1)
+        return none, none, none, np.zeros((0, 3))
     if isinstance(contact, Contact):
         spheres = contact.spheres
         return spheres.place, contact.pairs.acting, spheres.force_at, contact.force

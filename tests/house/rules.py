@@ -263,7 +263,8 @@ def check_studies(house: House) -> Iterator[Breach]:
         if file.startswith(("tests/studies/", "tests/house/")):
             continue
         text = path.read_text(encoding="utf-8")
-        for one in read_imports(ast.parse(text), {}):
+        tree = ast.parse(text) if "validation.studies" in text else ast.Module([], [])
+        for one in read_imports(tree, {}):
             if one.module.startswith("validation.studies."):
                 yield Breach(file, one.line, "rule 5", f"imports {one.module}")
         for number, line in enumerate(text.splitlines(), 1):

@@ -157,7 +157,7 @@ def make_pairs(
         np.flatnonzero((np.diff(first) > 0) | (np.diff(back_first) > 0) | walls.any(axis=1)),
         image,
         np.concatenate([[0], np.cumsum(walls.sum(axis=1))]),
-        np.nonzero(walls)[1],
+        np.ascontiguousarray(np.nonzero(walls)[1]),
     )
 
 

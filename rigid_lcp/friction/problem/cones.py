@@ -64,7 +64,7 @@ def natural_residual(force: Floats, velocity: Floats, mu: Floats, rho: float) ->
     it: at mu = 1000 a residual of 1e-12 means approach to 1e-9.
     """
     found: float = _natural_residual(
-        np.ascontiguousarray(force), np.ascontiguousarray(velocity), mu, rho
+        np.ascontiguousarray(force, float), np.ascontiguousarray(velocity, float), mu, rho
     )
     return found
 
