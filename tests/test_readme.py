@@ -44,6 +44,7 @@ def done() -> set[str]:
     return set()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("language", "code"), blocks())
 def test_block_runs(language: str, code: str, folder: Path, done: set[str]) -> None:
     """Each code block runs as it is printed, in order, in one empty folder."""

@@ -43,6 +43,7 @@ def test_places_in_auto_differ() -> None:
     assert len(set(places)) == len(places)
 
 
+@pytest.mark.long
 def test_tiny_run(sample: Sample) -> None:
     """Forty grains, eleven cycles, one jump: every stage ends, and its files are read."""
     stages = [outcome.stage for outcome in RunFolder(sample.run).outcomes()]

@@ -46,6 +46,7 @@ def test_a_load_cycle_is_one_call_of_the_engine() -> None:
     assert sum(over_cycles) == 1
 
 
+@pytest.mark.long
 def test_nothing_damps_but_contacts() -> None:
     """A grain that touches nothing keeps velocity and step: no numerical damping, a fixed step."""
     scene = table_1(f"material.grain.viscous_alpha={ALPHA}")
@@ -62,6 +63,7 @@ def test_nothing_damps_but_contacts() -> None:
     assert moved == pytest.approx(np.full(300, speed * step), rel=1e-7)
 
 
+@pytest.mark.long
 def test_a_partial_piston_pushes_once() -> None:
     """Anywhere under it by eq. 5, and no more when a grain goes from its plane to its rim and back.
 

@@ -41,6 +41,7 @@ def tree(folder: Path) -> dict[str, bytes]:
 # --- the lock -------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("room", FOLDERS)
 def test_second_writer_is_refused(room: str, tmp_path: Path) -> None:
     """Another process gets the pid of the first; when the first is gone the folder is free."""

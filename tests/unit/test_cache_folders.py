@@ -41,6 +41,7 @@ def run_without_home(code: str, folder: Path) -> str:
     return run.stdout.strip()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("numba_first", [True, False])
 def test_kernels_are_defined_and_pictures_drawn(tmp_path: Path, numba_first: bool) -> None:
     """numba refuses to define a kernel that it can keep nowhere: it is given a private folder."""

@@ -287,6 +287,7 @@ def test_cite_is_bibtex(capsys: pytest.CaptureFixture[str]) -> None:
     assert f"version = {{{trackbed.__version__}}}" in text
 
 
+@pytest.mark.long
 def test_validate_lists_cases(capsys: pytest.CaptureFixture[str]) -> None:
     """``validate`` without a case lists the studies, and what measures now, with dashes; so does
     ``python -m validation``."""

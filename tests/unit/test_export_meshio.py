@@ -76,6 +76,7 @@ def test_other_names_say_the_format(tmp_path: Path) -> None:
     assert len(mesh.points) == 3
 
 
+@pytest.mark.long
 def test_importing_registers(tmp_path: Path) -> None:
     """Without the import meshio does not know the format, with it it does."""
     path = tmp_path / "states.dump"

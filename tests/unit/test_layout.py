@@ -86,6 +86,7 @@ def test_version_is_one() -> None:
     assert f"## [{trackbed.__version__}]" in (ROOT / "CHANGELOG.md").read_text()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("option", "outcome"), [(["--nothing-missing"], "error"), ([], "skipped")])
 def test_markers_of_what_may_be_missing(tmp_path: Path, option: list[str], outcome: str) -> None:
     """Without its engine or library a test is skipped with the reason; in ``test-all`` it fails."""

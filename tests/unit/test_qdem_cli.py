@@ -99,6 +99,7 @@ def test_the_verb_starts_light() -> None:
     assert not heavy & set(found.stdout.split())
 
 
+@pytest.mark.long
 def test_run_writes_what_it_promises(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Tables, fields, manifest, result and a report that loads nothing, for one short run."""
     assert command(scene, "--json") == 0
@@ -185,6 +186,7 @@ def test_frequency_of_the_run_is_that_of_its_own_matrices(scene: Path) -> None:
     assert min(abs(found / expected - 1)) < 1e-5
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("share", [0.0, 0.13, 0.5, 0.97])
 def test_interrupted_run_goes_on_to_the_same_bits(
     scene: Path, monkeypatch: pytest.MonkeyPatch, share: float

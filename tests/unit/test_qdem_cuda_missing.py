@@ -28,6 +28,7 @@ sys.meta_path.insert(0, NoRuntime())
 """numba-cuda's own behaviour on a machine without CUDA's runtime: the import raises."""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("error", ["OSError", "ImportError", "RuntimeError"])
 def test_a_scene_on_a_gpu_ends_in_a_sentence(tmp_path: Path, error: str) -> None:
     """What, where, what to do; exit code 4 and no traceback."""
@@ -47,6 +48,7 @@ def test_a_scene_on_a_gpu_ends_in_a_sentence(tmp_path: Path, error: str) -> None
     )
 
 
+@pytest.mark.long
 def test_tests_of_the_gpu_are_skipped_with_the_reason(tmp_path: Path) -> None:
     """Collecting and running them raises nothing, and nothing of theirs is imported."""
     hook = tmp_path / "no_cuda_runtime.py"

@@ -250,6 +250,7 @@ def test_all_problems_are_named_at_once() -> None:
     assert "no volume" in text
 
 
+@pytest.mark.long
 @given(
     changes=st.lists(
         st.tuples(

@@ -377,6 +377,7 @@ def loads_or_refuses(path: Path) -> bool:
     return True
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("text", [CANTILEVER, VIBRATION, BASE])
 def test_damaged_scenes_never_end_in_a_traceback(tmp_path: Path, text: str) -> None:
     """Random damage gives a scene or a `QdemError`: 200 each here, 5,500 once, by hand."""

@@ -393,6 +393,7 @@ def test_status(copy: Path) -> None:
     assert stopped.next == f"trackbed resume {copy}"
 
 
+@pytest.mark.long
 def test_plotting_library_is_loaded_only_to_draw() -> None:
     """Importing the report's modules loads no matplotlib, and the status no numba."""
     code = (

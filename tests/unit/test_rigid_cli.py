@@ -20,6 +20,7 @@ def scene(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.long
 def test_a_run_ends_where_friction_stops_the_block(scene, capsys):
     """``s = v^2 / (2 mu g)``; a step of h stops it within ``v h`` of that."""
     assert command.main(["rigid", str(scene), "--json"]) == 0

@@ -106,6 +106,7 @@ def test_broad_phase_finds_every_near_pair(seed: int) -> None:
     np.testing.assert_array_equal(near_pairs(arrays.kind, boxes, arrays.movable), expected)
 
 
+@pytest.mark.long
 @given(st.integers(0, 2**32 - 1), st.floats(-3, 3), st.floats(-100, 100))
 @settings(max_examples=30, deadline=None)
 def test_turned_scene_has_turned_contacts(seed: int, turn: float, shift: float) -> None:

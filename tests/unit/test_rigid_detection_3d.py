@@ -155,6 +155,7 @@ def test_spheres_in_one_place_part_along_z() -> None:
 # --- symmetries and names ---
 
 
+@pytest.mark.long
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 10_000))
 def test_numbering_does_not_matter(seed: int) -> None:
@@ -170,6 +171,7 @@ def test_numbering_does_not_matter(seed: int) -> None:
     )
 
 
+@pytest.mark.long
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 10_000))
 def test_contacts_turn_with_the_scene(seed: int) -> None:
@@ -186,6 +188,7 @@ def test_contacts_turn_with_the_scene(seed: int) -> None:
     assert np.allclose(found.gap, moved.gap, atol=1e-15)
 
 
+@pytest.mark.long
 @settings(max_examples=20, deadline=None)
 @given(st.integers(0, 10_000), st.sampled_from([1e-3, 1e3]))
 def test_unit_of_length_does_not_matter(seed: int, unit: float) -> None:

@@ -89,6 +89,7 @@ def test_the_same_scene_seen_otherwise_moves_the_same(method, change, as_it_is):
     np.testing.assert_allclose(spins, as_it_is[method][2], atol=1e4 * GROWTH)
 
 
+@pytest.mark.long
 @METHODS
 def test_a_run_made_twice_is_the_same_to_the_last_digit(method, as_it_is):
     for once, again in zip(as_it_is[method], fall(method), strict=True):
@@ -127,6 +128,7 @@ def test_free_bodies_keep_their_momentum(method):
     assert least < 0.9 * energy  # they did collide
 
 
+@pytest.mark.long
 def test_a_symmetric_heap_stays_symmetric():
     """Three discs on the ground, two upon them: their mirror images move as mirror images."""
     scene = Scene()

@@ -183,6 +183,7 @@ def test_no_solution_is_a_proof(method):
     assert said > 0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("dim", [2, 3])
 def test_a_contact_that_bears_on_nothing_among_many(dim):
     """Of 301 contacts one has no row in W, as between fixed bodies: it parts, the others solve."""

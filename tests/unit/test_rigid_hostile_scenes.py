@@ -114,6 +114,7 @@ def test_a_half_space_that_would_not_go_where_it_is_sent_is_refused(given):
         Scene().add(HalfSpace([0, 1]), **given)
 
 
+@pytest.mark.long
 def test_a_belt_carries_a_block_along():
     """A half-space that moves along its face: ``v = mu g t`` until the block has its speed."""
     scene = Scene()
@@ -280,6 +281,7 @@ def test_a_scene_that_changes_later_does_not_change_its_runs():
     assert np.abs(second.velocities).max() < 1e-12
 
 
+@pytest.mark.long
 @METHODS
 @pytest.mark.parametrize("clone", [copy.deepcopy, lambda run: pickle.loads(pickle.dumps(run))])
 def test_a_run_copied_or_pickled_goes_on_the_same(method, clone):

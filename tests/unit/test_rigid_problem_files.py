@@ -359,6 +359,7 @@ W = np.diag([1.0, 2.0, 1.0, 2.0])
 Q = np.array([-1.0, 0.5, 1.0, 0.0])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("written", "checked"),
     [

@@ -409,6 +409,7 @@ VALUES = st.sampled_from(
 )
 
 
+@pytest.mark.long
 @settings(max_examples=150, deadline=None)
 @given(
     changes=st.dictionaries(st.sampled_from(ALL_KEYS), VALUES, max_size=4),
@@ -433,6 +434,7 @@ def test_no_scene_ends_in_a_traceback(
         assert scene.loaded_area <= scene.container.area
 
 
+@pytest.mark.long
 @settings(max_examples=150, deadline=None)
 @given(cut=st.integers(0, len(KARRECH)), inserted=st.text(max_size=12), length=st.integers(0, 40))
 def test_damaged_text_never_ends_in_a_traceback(

@@ -315,6 +315,7 @@ def test_agreement_is_that_of_what_comes(level: float) -> None:
         assert all(one.agrees for one in said.values())
 
 
+@pytest.mark.long
 @given(
     seed=st.integers(0, 1000),
     unit=st.sampled_from([1e-3, 100.0, -1.0]),

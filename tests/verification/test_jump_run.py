@@ -142,6 +142,7 @@ def test_collapse_is_refused_with_its_code(
     assert status(tmp_path / "run").cycles_computed == 200
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("share", "sinking", "code"), [(0.3, 5e-6, 6), (1.0, 5e-6, 0), (0.3, 0.0, 0)]
 )
@@ -271,6 +272,7 @@ def test_killed_at_file_operations(commands: Commands, tmp_path: Path) -> None:
     assert said(run_folder) == said(whole)
 
 
+@pytest.mark.long
 def test_jump_that_fails_is_halved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A relaxation that fails twice: shorter jumps from the same state, then the run goes on."""
     from adapters.errors import NotConverged

@@ -277,6 +277,7 @@ def by_tolerance(
     return RunFolder(folder)
 
 
+@pytest.mark.long
 def test_jumps_that_choose_themselves_wait_too(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -217,6 +217,7 @@ def test_no_engine_is_left_behind(
     assert comes_true(lambda: not alive(engine))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("launcher", "end_s"),
     [

@@ -177,6 +177,7 @@ def test_unknown_law_names_the_nearest(wrong: str, meant: str) -> None:
         get_law("sato")
 
 
+@pytest.mark.long
 def test_hundred_thousand_grains_take_less_than_a_second() -> None:
     """Fit and increment of 1e5 grains, 3 axes, 100 cycles: under 1 s of one thread, linear laws."""
     cycle = np.arange(51.0, 151.0)

@@ -231,6 +231,7 @@ def test_a_jump_of_no_settlement_is_tried_with_less_of_its_move(
     assert (jump.notes["attempt"], jump.notes["gain"]) == (4, 0.0)
 
 
+@pytest.mark.long
 def test_a_jammed_bed_is_moved_by_what_it_has_room_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -92,6 +92,7 @@ def test_double_precision_and_held_bodies_have_none() -> None:
 # --- what they are for ---------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("strain", ["finger", "small", "svk"])
 def test_a_flight_of_ten_metres_costs_no_strain(strain: Any) -> None:
     """Its vibration is that of the stone at rest in double precision.

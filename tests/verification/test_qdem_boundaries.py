@@ -72,6 +72,7 @@ def test_images_meet_as_bodies_do() -> None:
         assert found == pytest.approx(asked, abs=1e-11 if drift else 1e-12)
 
 
+@pytest.mark.long
 def test_a_closed_ring_is_at_rest() -> None:
     """Two blocks that fill the width, pressed into each other alike on both sides: no net force.
 

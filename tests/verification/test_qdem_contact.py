@@ -169,6 +169,7 @@ def test_kernel_is_its_twin(walls: bool) -> None:
     assert twin.slid > 0.1
 
 
+@pytest.mark.long
 def test_threads_give_the_same_bits() -> None:
     """Several blocks of spheres, one thread or more: forces, springs and losses are equal."""
     count = 2 * SPHERES_AT_ONCE + 17

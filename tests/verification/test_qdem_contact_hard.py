@@ -30,6 +30,7 @@ def test_energies_close(words: str, model: str) -> None:
     assert stored > 0.01
 
 
+@pytest.mark.long
 @BY_MODEL
 def test_spinning_grain_keeps_its_angular_momentum(model: str) -> None:
     """Without friction: to rounding of some thousand steps; and friction took nothing."""

@@ -52,6 +52,7 @@ def test_bodies_deep_in_each_other_are_named(
         run.advance(1e-8)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("y", "said"),
     [

@@ -121,6 +121,7 @@ def test_a_march_is_stable_below_the_step_and_not_above(share: float, steps: int
         assert run.energy().kinetic / grown == pytest.approx(growth, rel=1e-2)
 
 
+@pytest.mark.long
 def test_a_march_that_meets_nearer_vertices_than_it_began_with_stops() -> None:
     """The elements' step, though stiff vertices come near on the way: found before they touch."""
     run = two(2e-3, STONE, stiffness=1e12)

@@ -243,6 +243,7 @@ def test_radius_ratio_closed_forms() -> None:
     assert find_radius_ratios(nodes, np.array([[4, 6, 5, 7]])) == pytest.approx(-ratios[1])
 
 
+@pytest.mark.long
 def test_out_of_reach_says_what_was_reached() -> None:
     recipe = GrainRecipe(roundness=0.98, roundness_scatter=0.0)
     with pytest.raises(MeshError, match=r"roundness 0\.980 .*reached was roundness 0\."):

@@ -52,6 +52,7 @@ def test_graded_box_fills_the_cube_and_turns_no_element() -> None:
 # --- materials -------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_locking_is_that_of_linear_tetrahedra() -> None:
     """Against K u = f on the same mesh, and against quadratic tetrahedra: Kuhn's cells lock."""
     hold(hard.locking_checks(((12, 2, 2),), (12, 2, 2)))

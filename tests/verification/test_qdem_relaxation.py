@@ -34,6 +34,7 @@ def judged(body: q.Body, force: np.ndarray) -> tuple[np.ndarray, Any]:
     return qdem_judge.static_solve(matrix, free, force, method="direct").displacement, matrix
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("cells", "steps"), [((24, 4, 3), 500), ((48, 6, 4), 800), ((7, 2, 5), 500)]
 )

@@ -192,6 +192,7 @@ def test_load_is_a_seeds_own_linear_and_nothing_without_roughness() -> None:
     assert not one[[0, -1]].any()
 
 
+@pytest.mark.long
 def test_a_record_of_rough_rails_is_written_by_the_command(tmp_path: Path) -> None:
     """Fast, so that there is little of it; the far axles of both ends leave little there."""
     words = ["train", "--out", str(tmp_path / "train.csv"), "--cars", "1", "--speed", "90"]

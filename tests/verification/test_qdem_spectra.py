@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from qdem_fem.files.errors import UsageError
 from qdem_fem.report.spectra import (
-    FloatArray,
+    Floats,
     find_amplitudes,
     find_peak_frequencies,
     smooth_spectrum,
@@ -18,8 +18,8 @@ from qdem_fem.report.spectra import (
 
 
 def damped(
-    time: FloatArray, frequency: float, decay: float = 0.0, amplitude: float = 1.0, phase: float = 0
-) -> FloatArray:
+    time: Floats, frequency: float, decay: float = 0.0, amplitude: float = 1.0, phase: float = 0
+) -> Floats:
     """A exp(-decay t) cos(2 pi f t + phase), t from the first sample."""
     t = time - time[0]
     return amplitude * np.exp(-decay * t) * np.cos(2 * np.pi * frequency * t + phase)

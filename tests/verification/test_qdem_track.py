@@ -162,6 +162,7 @@ def test_grains_that_fall_in_a_column_do_not_stand_as_a_tower() -> None:
     assert top < 0.05
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("slow", [2, 100])
 def test_what_rings_while_the_sum_of_all_grows_is_stopped_by_itself(
     slow: int, monkeypatch: pytest.MonkeyPatch
@@ -430,6 +431,7 @@ def test_a_dry_run_prepares_no_bed(tmp_path: Path, capsys: pytest.CaptureFixture
     assert [file.name for file in tmp_path.iterdir()] == ["scene.toml"]
 
 
+@pytest.mark.long
 def test_scene_of_the_small_track_is_sound() -> None:
     prepared = load_scene(Path(__file__).parents[2] / "trackbed" / "scenes" / "track-small.toml")
     assert isinstance(prepared, TrackPrepared)

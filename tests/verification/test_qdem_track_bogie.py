@@ -106,6 +106,7 @@ def test_a_flat_that_can_not_be_is_refused_by_its_key(tmp_path: Path, flat: str,
     assert "track.bogie" in str(caught.value)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("bogie", "said"),
     [

@@ -145,6 +145,7 @@ def rows_written(folder: Path, count: int) -> None:
     table.append(np.column_stack([time, *(len(names) * [1e-3 * time**2])]))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("count", [2, FEWEST_SAMPLES - 1, FEWEST_SAMPLES])
 def test_a_run_too_short_for_spectra_ends_with_the_rest(tmp_path: Path, count: int) -> None:
     """Settlement is there, spectra from four accelerations on; a window that smooths nothing is

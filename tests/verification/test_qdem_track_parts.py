@@ -95,6 +95,7 @@ def scene_of(folder: Path, part: str, *changes: tuple[str, str]) -> TrackPrepare
     return prepared
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("layout", [WHOLE, HALF])
 def test_loose_ballast_keeps_to_its_shoulder_and_off_the_sleeper(
     layout: TrackLayout, tmp_path: Path
@@ -116,6 +117,7 @@ def test_loose_ballast_keeps_to_its_shoulder_and_off_the_sleeper(
     assert outside.min() >= 2 * layout.radius - 1e-9
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore::qdem_fem.files.errors.StepWarning")  # contacts set the step
 @pytest.mark.parametrize(("part", "seats"), [("half", 1), ("whole", 2)])
 def test_each_rail_seat_takes_its_own_pressure(
@@ -182,6 +184,7 @@ def test_a_wrong_part_is_refused_with_a_sentence(
         scene_of(tmp_path, part, change)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "grains"), [("track-half", 1200), ("track", 5700)])
 def test_scenes_of_half_and_whole_sleepers_are_sound(name: str, grains: int) -> None:
     prepared = load_scene(SCENES / f"{name}.toml")

@@ -34,6 +34,7 @@ def prepared_in(folder: Path, *overrides: str) -> TrackPrepared:
     return scene_at(folder, *FEW, *overrides)
 
 
+@pytest.mark.long
 def test_rigid_grains_begin_with_the_forces_of_deformable_ones(folder: Path) -> None:
     """To the bit: they lie where those lay.  The sleeper keeps its strain, grains have none."""
     prepared = prepared_in(folder)

@@ -65,6 +65,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Bed:
     return fallen(recipe_at(tmp_path_factory.mktemp("whole")), None)
 
 
+@pytest.mark.long
 def test_a_killed_stage_goes_on_to_the_same_bits(
     whole: Bed, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -80,6 +81,7 @@ def test_a_killed_stage_goes_on_to_the_same_bits(
     assert bed.rests["bed"]["cpu_s"] > 0
 
 
+@pytest.mark.long
 def test_more_patience_goes_on_where_less_gave_up(whole: Bed, tmp_path: Path) -> None:
     """The message names the time; what was computed is not lost, whatever `KEEP` is."""
     recipe, part = recipe_at(tmp_path), tmp_path / "bed.part.npz"
@@ -93,6 +95,7 @@ def test_more_patience_goes_on_where_less_gave_up(whole: Bed, tmp_path: Path) ->
     assert part.stat().st_mtime_ns == seen
 
 
+@pytest.mark.long
 def test_a_stage_of_something_else_is_refused(tmp_path: Path) -> None:
     """Another recipe's part, and a damaged one: a sentence that says to remove it."""
     recipe, part = recipe_at(tmp_path), tmp_path / "bed.part.npz"
@@ -108,6 +111,7 @@ def test_a_stage_of_something_else_is_refused(tmp_path: Path) -> None:
         fallen(recipe, part)
 
 
+@pytest.mark.long
 def test_what_a_kill_left_of_a_stage_that_is_done_is_not_read(
     whole: Bed, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -115,6 +115,7 @@ def scene_in_the_air(folder: Path, text: Callable[[str], str]) -> TrackPrepared:
     return prepared
 
 
+@pytest.mark.long
 def test_skin_and_friction_of_a_scene_are_the_runs(tmp_path: Path) -> None:
     prepared = scene_in_the_air(tmp_path, lambda text: text.replace(
         "radius = 0.012", "radius = 0.012\nskin = 1.5e-3"))  # fmt: skip

@@ -36,6 +36,7 @@ def test_static_answers_by_relaxation_and_by_whole_periods() -> None:
     assert relaxed.tip == pytest.approx(settled.tip, rel=1e-5)
 
 
+@pytest.mark.long
 def test_order_of_convergence_towards_the_reference_of_second_order() -> None:
     """Excess stiffness of linear elements goes with h^2, here by relaxation, which costs less."""
     answers = [static.relaxed(cantilever((12 * k, 2 * k, 2 * k))) for k in (2, 3)]
@@ -49,6 +50,7 @@ def test_first_frequency_after_unloading() -> None:
     assert abs(mode.decay) < 1e-4 * expected
 
 
+@pytest.mark.long
 def test_five_frequencies() -> None:
     """One skew release holds the five lowest modes, each within 0.1 % of the judge's."""
     five = vibration.five_frequencies(cantilever(SMALL))

@@ -55,6 +55,7 @@ def column(count: int, overlap: FloatArray) -> Bed:
     return state_at_rest(x, radius), BOX.walls()
 
 
+@pytest.mark.long
 def test_hertz_potential_is_that_of_eq_5(settled: Bed) -> None:
     """psi and its gradient, the force of eq. 5, against a NumPy twin."""
     state, walls = settled

@@ -57,6 +57,7 @@ def test_a_sphere_spins_on_like_a_top() -> None:
     assert np.abs(run.positions[0] - [0.0, 0.0, 0.1]).max() < 1e-13
 
 
+@pytest.mark.long
 def test_a_spinning_stone_flies_on_a_parabola_with_its_momentum() -> None:
     stone = ballast_stone(np.random.default_rng(0), 0.05)
     scene = Scene(dim=3)

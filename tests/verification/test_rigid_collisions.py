@@ -86,6 +86,7 @@ def test_energy_is_as_derived(eps: float, seed: int) -> None:
     assert left.min() >= -1e-11 * np.abs(normal).max()
 
 
+@pytest.mark.long
 @given(st.integers(0, 10**6))
 @settings(deadline=None, max_examples=8)
 def test_different_restitution_makes_no_energy(seed: int) -> None:
@@ -182,6 +183,7 @@ def wedged_rod() -> BodySpace:
     return BodySpace(sp.csr_array(np.array(rows)), sp.csr_array(sp.eye_array(3)), 3)
 
 
+@pytest.mark.long
 def test_impulses_that_do_not_exist_take_restitution_back() -> None:
     """Newton's law, mu = 2: restitution is taken back until there are impulses, and the rod stops.
     Moreau's law has them, u' = -eps u.  Below mu = 1 all is well: spin -eps."""

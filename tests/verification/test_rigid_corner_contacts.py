@@ -95,6 +95,7 @@ def test_corners_carry_radii_zero_and_names_last(form: str) -> None:
     assert len(names) == 3
 
 
+@pytest.mark.long
 @settings(max_examples=30, deadline=None)
 @given(st.integers(0, 10_000), st.sampled_from(FORMS))
 def test_rates_are_the_derivatives_of_the_gap(seed: int, form: str) -> None:
@@ -239,6 +240,7 @@ def test_stones_that_meet_at_corners_never_overlap(form: str) -> None:
         assert np.linalg.norm(run.velocities[0]) > 0.05
 
 
+@pytest.mark.long
 def test_a_cube_on_its_corner_upon_another_s_comes_down() -> None:
     """A cube stands on its tip on the tip of a fixed one, a hair to the side: it falls off, and
     never into it."""

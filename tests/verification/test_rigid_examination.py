@@ -89,6 +89,7 @@ def test_problems_follow_from_family_seed_and_number(name: str) -> None:
     assert not same(once, elsewhere)
 
 
+@pytest.mark.long
 def test_beds_follow_from_family_seed_and_number(monkeypatch: pytest.MonkeyPatch) -> None:
     """So do small beds, and families do not share theirs."""
     monkeypatch.setattr(beds, "SIZES", (8, 12))

@@ -47,6 +47,7 @@ def moments(scene):
     return np.concatenate([*(part.sum(axis=0) for part in parts), [world.energy(motion)]])
 
 
+@pytest.mark.long
 @settings(max_examples=60, deadline=None)
 @given(seed=st.integers(0, 10**6), dim=st.sampled_from([2, 3]), far=st.sampled_from([0.0, 10.0]))
 def test_a_break_conserves_everything(seed, dim, far):
@@ -111,6 +112,7 @@ def test_a_plane_through_corners_makes_no_slivers():
         assert parts[0].volume + parts[1].volume == pytest.approx(1.0, rel=1e-14)
 
 
+@pytest.mark.long
 def test_a_stone_can_be_cut_again_and_again():
     generator = np.random.default_rng(4)
     scene = Scene(3)
@@ -156,6 +158,7 @@ def pile():
     return scene
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("body", "point", "direction"),
     [(1, (0.1, 0.3), (0.2, 1.0)), (3, (0.6, 0.9), (0.0, 1.0)), (4, (0.6, 1.5), (0.1, 1.0))],

@@ -17,6 +17,7 @@ from rigid_lcp.shapes.rotations import quaternion_of_rotation, quaternion_produc
 from tests.rigid_solids import CUBE, UPRIGHT, contacts, near_pair
 
 
+@pytest.mark.long
 @settings(max_examples=40, deadline=None)
 @given(st.integers(0, 10_000))
 def test_gap_rate_is_the_derivative_of_the_gap(seed: int) -> None:
@@ -49,6 +50,7 @@ def test_gap_rate_is_the_derivative_of_the_gap(seed: int) -> None:
     assert checked > 0
 
 
+@pytest.mark.long
 @settings(max_examples=40, deadline=None)
 @given(st.integers(0, 10_000))
 @example(750)  # a sphere whose centre is 0.025 from an edge

@@ -99,6 +99,7 @@ def touching(name: str, seed: int, share: float) -> Pair:
     return shapes, np.array([np.zeros(3), inside + far * direction]), turns, axes
 
 
+@pytest.mark.long
 @settings(max_examples=40, deadline=None)
 @given(st.sampled_from(FAMILIES), st.integers(0, 10_000), st.sampled_from([1e-6, 1e-3, 3e-2]))
 @example("tetrahedra", 14, 1e-6)

@@ -42,6 +42,7 @@ MILANKOVITCH = 0.10748
 """Least thickness over mean radius of a semicircular arch of very many stones."""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("share", [1.0, 1 + 1e-9, 1 - 1e-9, 0.98, 1.02])
 def test_block_at_its_threshold(share: float) -> None:
     """It slides iff ``mu < tan(slope)``: ``g (sin - mu cos) t^2 / 2``, 1.7e-9 t^2 m at 1 - 1e-9."""
@@ -82,6 +83,7 @@ def test_tower_of_200_boxes() -> None:
     assert stack_drop(stack(200), 0.05) < 1e-10
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("phi", [0.2, 0.5])
 def test_card_house(phi: float) -> None:
     """It stands iff ``mu >= tan(phi)/2``."""
@@ -141,6 +143,7 @@ def test_arch() -> None:
     assert stack_drop(arch(16, 0.10), 0.02) > 1e-6
 
 
+@pytest.mark.long
 def test_many_stones_reach_the_known_limit() -> None:
     """The difference is that of straight stones, of the order of the square of their angle."""
     few, many = (abs(arch_limit(stones) - MILANKOVITCH) for stones in (21, 61))
@@ -225,6 +228,7 @@ def test_three_discs_jam_an_opening() -> None:
     assert stack_drop(run, 0.05) < 1e-10
 
 
+@pytest.mark.long
 def test_needles_gain_next_to_no_energy() -> None:
     """Without friction a step adds energy of the third order in h only, where the Jacobian turns:
     the pages tell 7.8e-8 J of 13 J for these (chaotic) needles; 1e-6 J is a part of 1e-7."""

@@ -15,6 +15,7 @@ from tests.rigid_motions import rocking_block, rocking_block_answer
 from validation.bench.rigid.scenes import FLOOR, G, gravity_on
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("share", [0.5, 0.9])
 def test_rocking_block(share: float) -> None:
     """Housner's block: each impact leaves ``(1 - 3/2 sin^2 alpha)^2`` of the energy, at its time.
@@ -35,6 +36,7 @@ def test_rocking_block(share: float) -> None:
         assert abs(run.spins[0]) < 1e-5
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
 def test_a_box_clatters_to_rest(restitution: float) -> None:
     """It lands on one corner, then the other, ever faster; the cut-off lets it lie flat."""
@@ -52,6 +54,7 @@ def test_a_box_clatters_to_rest(restitution: float) -> None:
     assert run.overlap < 1e-11
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mu", [0.1, 0.5])
 def test_sliding_reverses_or_ends(mu: float) -> None:
     """A block thrown uphill stops, and slides down again iff ``mu < tan(slope)``: parabolas."""

@@ -114,6 +114,7 @@ def test_block_that_slides_down(method):
     assert np.abs(tangential) == pytest.approx(0.3 * normal, rel=1e-9)
 
 
+@pytest.mark.long
 def test_relaxation_has_the_same_limit():
     """Explicit eq. 40 to the end and the direct limit: 1e-12 of residual is 1e-9 in the forces,
     as the softest mode of this pile is 1e3 times softer than the stiffest."""

@@ -72,6 +72,7 @@ def test_a_light_ball_between_a_wall_and_a_heavy_one(ratio: float, step: float, 
     assert run.steps_cut_off == 0
 
 
+@pytest.mark.long
 def test_an_inelastic_collapse_ends() -> None:
     """e = 0.9 at a mass ratio of 1e6: the light ball collides ever faster with ever less.  It is
     closed after a bounded number of rounds, energy never grows, and a message says so."""
@@ -208,6 +209,7 @@ def test_bodies_that_part_by_turning_need_no_round() -> None:
     assert not passed_collisions.needs_impulse(closing, 1e-12).any()
 
 
+@pytest.mark.long
 def test_boxes_that_tumble_in_a_closed_box_keep_their_energy() -> None:
     """Without friction and gravity, with restitution 1, the kinetic energy stays.
 

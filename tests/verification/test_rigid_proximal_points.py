@@ -178,6 +178,7 @@ def test_sweeps_and_points_by_turns_solve_a_bed_that_each_alone_leaves() -> None
     assert half.residual > gauss_seidel(problem, None, 1e-12, 1000).residual  # the best one is past
 
 
+@pytest.mark.long
 def test_the_end_of_a_path_is_a_start_too() -> None:
     """A bed that sweeps, Newton and proximal points leave at 1e-8, from paths' ends alone."""
     trial = Trial(packing(60, 3, seed=208, friction=0.1), None, 1e-12)

@@ -100,6 +100,7 @@ def gas(dim: int, seed: int) -> Scene:
     return scene
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("dim", [2, 3])
 def test_a_gas_with_friction_never_gains_energy(dim: int) -> None:
     """Step for step: ``E' <= E`` to round-off, and collisions happen."""

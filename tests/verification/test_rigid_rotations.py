@@ -183,6 +183,7 @@ def test_bodies_with_equal_moments_move_exactly(moments: list[float]) -> None:
     assert np.allclose(found_spin, exact_spin, atol=2e-11)
 
 
+@pytest.mark.long
 def test_intermediate_axis_flips_when_the_ode_says_so() -> None:
     """A box thrown about its middle axis turns over (Dzhanibekov); time of the flip and path."""
     inertia = box(1.0, 2.0, 3.0).mass_properties(1.0)[1]

@@ -164,6 +164,7 @@ def test_stopped_by_a_signal(scene, whole, tmp_path, number, capsys):
     goes_on(scene, tmp_path / "run", whole)
 
 
+@pytest.mark.long
 def test_the_reader_of_the_progress_goes_away(scene: Path, tmp_path: Path) -> None:
     """As in ``trackbed rigid ... 2>&1 | head -1``: the run comes to its end all the same."""
     command = [sys.executable, "-m", "trackbed", *run_words(scene, tmp_path / "run")]
@@ -175,6 +176,7 @@ def test_the_reader_of_the_progress_goes_away(scene: Path, tmp_path: Path) -> No
 # --- other writers, damage --------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_damage_to_a_frame(scene: Path, whole: list[dict[str, Any]], tmp_path: Path) -> None:
     """Bytes that are lost or wrong, anywhere: from that frame on it is computed again."""
     folder, draw = tmp_path / "run", random.Random(SEED)
@@ -192,6 +194,7 @@ def test_damage_to_a_frame(scene: Path, whole: list[dict[str, Any]], tmp_path: P
         goes_on(scene, folder, whole)
 
 
+@pytest.mark.long
 def test_a_damaged_result_is_made_again(scene, whole, tmp_path):
     folder = tmp_path / "run"
     shutil.copytree(scene.parent / "whole", folder)

@@ -74,6 +74,7 @@ def test_fourth_order(mu: float) -> None:
     assert errors[-1] < 1e-7
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mu", [0.0, 5.0])
 def test_both_methods_have_one_limit(mu: float) -> None:
     """Time stepping goes to the same answer as Runge-Kutta: second order while nothing changes."""
@@ -123,6 +124,7 @@ def test_a_block_that_slides_past_an_edge_lands_on_nothing(dim: int) -> None:
     assert (run.pace.collisions, run.pace.accepted) == (0, 20)
 
 
+@pytest.mark.long
 def test_blocks_that_are_pushed_slide_past_an_edge() -> None:
     """The same on a block that pushes another: the collision that was seen at the edge once parted
     these two, and they met again every 0.3 us for ever."""
@@ -179,6 +181,7 @@ def test_zeno_is_cut_off() -> None:
     assert run.pace.collisions == pytest.approx(14, abs=1)
 
 
+@pytest.mark.long
 def test_step_is_halved_and_doubled(monkeypatch: pytest.MonkeyPatch) -> None:
     """Section 9: overlaps halve the step; three clean steps double it, up to the longest one."""
     run = bouncing_disc(0.1, 0.5, method="acceleration", step=0.01)

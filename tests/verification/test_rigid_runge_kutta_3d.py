@@ -27,6 +27,7 @@ def orders(error: Callable[[float], float], steps: list[float]) -> Floats:
 # --- free flight ---
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("method", "order"), [("acceleration", 4.0), ("time-stepping", 2.0)])
 def test_a_free_stone_obeys_eulers_equations(method: Method, order: float) -> None:
     """Spun 42 rad/s about no principal axis for half a turn; both to their orders."""
@@ -45,6 +46,7 @@ def test_a_free_stone_obeys_eulers_equations(method: Method, order: float) -> No
 # --- rolling ---
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("method", "step"), [("acceleration", 0.02), ("acceleration", 0.01), ("time-stepping", 1e-3)]
 )
@@ -89,6 +91,7 @@ def test_a_sphere_rolls_down_with_five_sevenths(azimuth: float) -> None:
     assert np.allclose(run.positions[0] - radius * normal, way * slope, atol=1e-12)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", ["acceleration", "time-stepping"])
 def test_a_sphere_rolls_in_circles_on_a_turntable(method: Method) -> None:
     """``v' = 2/7 W z x v`` on a table that turns by W, whatever its spin about z (Milne 1948).

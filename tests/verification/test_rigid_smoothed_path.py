@@ -108,6 +108,7 @@ def kicked() -> FrictionProblem:
     return made
 
 
+@pytest.mark.long
 def test_a_point_lies_inside_the_cones_and_has_sigma_for_its_product(kicked, monkeypatch):
     """``x o s = sigma e``: the product is sigma, and what is beside the axis nothing."""
     module = sys.modules[smoothed_path.__module__]

@@ -220,6 +220,7 @@ def test_the_sharp_path_solves_in_few_steps_what_the_smoothed_one_leaves(monkeyp
     assert "smoothed path points" not in found.work
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("jammed")
 def test_dear_factorisations_do_not_keep_from_the_smoothed_path(struck, monkeypatch):
     """Beds of thousands of spheres take minutes to settle, so every factorisation is called dear

@@ -38,6 +38,7 @@ def test_free_flight_is_exact() -> None:
     assert run.time == pytest.approx(1.0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", ["time-stepping", "acceleration"])
 @pytest.mark.parametrize("mu", [0.02, 0.5])
 def test_disc_rolls_or_slides(mu: float, method: Method) -> None:
@@ -54,6 +55,7 @@ def test_disc_rolls_or_slides(mu: float, method: Method) -> None:
     )
 
 
+@pytest.mark.long
 def test_block_slides_to_rest() -> None:
     """It stops after ``v^2 / (2 mu g)``, to first order: within half a step's way at the end."""
     run = block_on_incline(0.0, 0.5, step=1e-3)
@@ -78,6 +80,7 @@ def test_zeno_bounce() -> None:
     assert errors[1] < 0.5 * errors[0]
 
 
+@pytest.mark.long
 def test_energy_of_many_bounces() -> None:
     """Restitution 1: a bounce keeps the energy to round-off, whatever the step."""
     run = bouncing_disc(0.02, 1.0, step=3e-3)
@@ -103,6 +106,7 @@ def test_balls_that_bounce_upon_each_other_keep_their_energy() -> None:
     assert run.energy == pytest.approx(begin, rel=1e-12)
 
 
+@pytest.mark.long
 def test_energy_never_grows_without_friction() -> None:
     """Boxes and discs that fall into a heap: no step adds energy but by overlaps removed."""
     scene = Scene(2)
@@ -139,6 +143,7 @@ def test_forces_are_in_balance() -> None:
     assert contact_frames(contacts.normal).shape == (10, 2, 2)
 
 
+@pytest.mark.long
 def test_poured_grains_come_to_rest() -> None:
     """A small heap loses its energy, and its overlaps stay below 1e-4 of a grain."""
     run = poured(12, step=2e-3)

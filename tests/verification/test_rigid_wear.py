@@ -63,6 +63,7 @@ def test_block_that_slides_down_loses_k_times_work(dim):
     assert run.worn.mass == pytest.approx(2700 * gone, abs=1e-12)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("dim", "k"), [(2, 4e-5), (3, 1e-5)])
 def test_wear_that_is_seen_takes_mass_and_keeps_the_rest_moving(dim, k):
     """A share of the block goes, off its lower corners: mass and inertia are those of the worn
@@ -276,6 +277,7 @@ def test_wear_too_small_to_cut_waits_and_too_much_is_refused(shape):
         slope(shape.dim, step=1e-2, wear=Wear(1.0, every=5)).advance(0.5)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("dim", [2, 3])
 def test_pile_wears_without_overlap_or_a_burst(dim):
     """Stones thrown on each other: energy never grows while they wear, all volume is accounted

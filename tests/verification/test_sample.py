@@ -215,6 +215,7 @@ def test_cap_is_the_integral_of_discs(height: float, centre: float, radius: floa
     assert cap == pytest.approx(discs, rel=1e-9, abs=1e-9 * radius**3)
 
 
+@pytest.mark.long
 @settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 10_000), low=st.floats(0, 0.6), thickness=st.floats(0.05, 1))
 def test_relative_density_is_monte_carlo(seed: int, low: float, thickness: float) -> None:
