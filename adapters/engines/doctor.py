@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib import metadata
 
@@ -21,7 +20,7 @@ class Finding:
     """One thing looked for on this machine."""
 
     kind: str
-    """"engine", "python", "library" or "conflict"."""
+    """"engine", "python" or "library"."""
     name: str
     version: str
     """As the thing prints it; empty when it is not there."""
@@ -50,28 +49,12 @@ def _library(name: str) -> Finding:
         return Finding("library", name, "", remedy=f"pip install {name}")
 
 
-def _foreign_adapters() -> Iterator[Finding]:
-    try:
-        version = metadata.version("adapters")
-    except metadata.PackageNotFoundError:
-        return
-    yield Finding(
-        "conflict",
-        "adapters (PyPI)",
-        version,
-        remedy="this unrelated package and trackbed both install a folder adapters/ and one "
-        "hides the other: pip uninstall adapters, then reinstall trackbed, or give trackbed a "
-        "virtual environment of its own",
-    )
-
-
 def findings() -> list[Finding]:
     """Everything looked for, engines first; a finding with a ``remedy`` asks for a hand."""
     return [
         *(_engine(name) for name in list_real_engines()),
         Finding("python", "python", platform.python_version()),
         *(_library(name) for name in LIBRARIES),
-        *_foreign_adapters(),
     ]
 
 

@@ -113,22 +113,6 @@ for _symbol, _instruction in (
     _arithmetic(_symbol, _instruction)
 
 
-@infer_global(operator.neg)
-class LanesNegative(AbstractTemplate):
-    """``-lanes``."""
-
-    key = operator.neg
-
-    def generic(self, args: Any, kws: Any) -> Any:
-        return signature(args[0], args[0]) if isinstance(args[0], Lanes) else None
-
-
-@lower_builtin(operator.neg, Lanes)
-def negate_lanes(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    """``-lanes``."""
-    return builder.fneg(args[0])
-
-
 def _pointer(context: Any, builder: Any, kind: types.Array, array: Any, offset: Any) -> Any:
     """Address of element ``offset`` of a contiguous array, whatever its shape."""
     data = context.make_array(kind)(context, builder, array).data
