@@ -79,8 +79,15 @@ def _parts_of_skfem(mesh: Any, where: str) -> MeshParts:
             remedy="skfem.MeshTet.from_mesh(mesh) keeps the corners",
         )
     node_sets: dict[str, Any] = {}
-    for name, facets in (getattr(mesh, "boundaries", None) or {}).items():
-        node_sets[name] = np.unique(mesh.facets[:, np.asarray(facets, dtype=np.int64)])
+    try:
+        for name, facets in (getattr(mesh, "boundaries", None) or {}).items():
+            node_sets[name] = np.unique(mesh.facets[:, np.asarray(facets, dtype=np.int64)])
+    except (IndexError, TypeError, ValueError) as error:
+        raise MeshError(
+            f"the boundaries of the {kind} can not be read: {error}",
+            where=where,
+            remedy="name facets of the mesh only",
+        ) from error
     subdomains = getattr(mesh, "subdomains", None) or {}
     return MeshParts(np.asarray(mesh.p).T, np.asarray(mesh.t).T, node_sets, dict(subdomains))
 

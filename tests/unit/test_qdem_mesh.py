@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -212,6 +213,7 @@ DAMAGES: dict[str, tuple[Any, str]] = {
     "skfem curved": (skfem.MeshTet2(), "MeshTet.from_mesh"),
     "skfem hexahedra": (skfem.MeshHex(), "MeshHex1 has no tetrahedra"),
     "skfem triangles": (skfem.MeshTri(), "MeshTri1 has no tetrahedra"),
+    "skfem facets": (replace(skfem.MeshTet(), _boundaries={"a": np.array([99])}), "boundaries of"),
     "meshio curved": (meshio.Mesh(np.eye(10, 3), {"tetra10": [range(10)]}), "tetra10"),
     "meshio surface": (
         meshio.Mesh(UNIT, {"triangle": [[0, 1, 2]], "line": [[0, 1]]}),
