@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from rigid_lcp import Disc, HalfSpace, Polygon
 from rigid_lcp.contact.arrays import Contacts, contact_rows
-from rigid_lcp.contact.detection_plane import detect_2d, shapes_2d
+from rigid_lcp.contact.detection_plane import detect_2d, shapes_2d, widest_face
 from rigid_lcp.contact.near_pairs import bound_shapes, near_pairs, place_shapes
 from rigid_lcp.errors import SceneError
 
@@ -42,6 +42,10 @@ def test_two_faces_make_two_contacts(shift: float) -> None:
     np.testing.assert_allclose(contacts.normal[:, 1], upward, atol=1e-15)
     if shift:
         assert sorted(contacts.body_a) == [0, 1]
+    wide = Polygon.rectangle(3.0, 1.0)
+    for shapes, middle in (([BOX, wide], 0.0), ([wide, BOX], shift)):  # the whole narrower face
+        ends = found(shapes, [(0, 0), (shift, 1.0)], [0, 0]).point[:, 0]
+        np.testing.assert_allclose(np.sort(ends), [middle - 0.5, middle + 0.5])
 
 
 def test_corner_on_face() -> None:
@@ -137,3 +141,14 @@ def test_rows_of_keys() -> None:
     np.testing.assert_array_equal(there, [True, False, True, True])
     np.testing.assert_array_equal(rows[there], [1, 2, 0])
     assert not contact_rows(np.zeros(0, np.int64), np.array([1]))[1].any()
+
+
+@given(st.floats(-3, 3), st.floats(-3, 3), st.floats(0, 6))
+@settings(max_examples=30, deadline=None)
+def test_widest_face_is_the_separation(x: float, y: float, turn: float) -> None:
+    """Against all vertices over all faces in plain NumPy."""
+    own, c, s = Polygon.regular(5, 1.0), np.cos(turn), np.sin(turn)
+    other = Polygon.regular(3, 0.7).vertices @ np.array([[c, s], [-s, c]]) + [x, y]
+    heights = np.einsum("fvi,fi->fv", other - own.vertices[:, None], own.normals).min(axis=1)
+    face, separation = widest_face(own.vertices, own.normals, other)
+    assert [separation, heights[face]] == pytest.approx([heights.max()] * 2, abs=1e-14)

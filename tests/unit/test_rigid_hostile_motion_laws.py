@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigid_lcp import Disc, HalfSpace, Polygon, Scene, Simulation
+from rigid_lcp import Disc, HalfSpace, Polygon, Scene, Simulation, solve_friction
 from rigid_lcp.arrays import Floats
 
 CORNERS = {"time-stepping": (5, 6, 7, 8, 4), "acceleration": (5, 6)}
@@ -142,3 +142,17 @@ def test_a_symmetric_heap_stays_symmetric():
     mirrored = [0, 3, 2, 1, 5, 4]
     np.testing.assert_allclose(run.positions[mirrored] * [-1, 1], run.positions, atol=1e-12)
     np.testing.assert_allclose(-run.spins[mirrored], run.spins, atol=1e-9)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_contact_counted_twice_changes_no_motion(dim):
+    """Forces of the two share what the one had: ``J^T r`` is the same where motion is unique."""
+    jacobian, q = np.random.default_rng(5).normal(size=(dim, 6)), np.array([-1.0, 0.4, -0.2])[:dim]
+    single, double = (
+        solve_friction(rows @ rows.T, np.tile(q, count), 0.3, dim)
+        for count in (1, 2) for rows in [np.tile(jacobian, (count, 1))]
+    )  # fmt: skip
+    assert single.solved
+    assert double.solved
+    np.testing.assert_allclose(double.r.reshape(2, dim).sum(axis=0), single.r, atol=1e-10)
+    np.testing.assert_allclose(double.u, np.tile(single.u, 2), atol=1e-10)

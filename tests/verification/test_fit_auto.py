@@ -25,7 +25,7 @@ from adapters.laws.fit.candidates import (
 from adapters.laws.fit.outlook import AGREE, compare_laws, outlook
 from adapters.laws.fit.prediction import Prediction, Series, find_regime, fit_auto, fit_series
 from adapters.laws.fit.refusal import UNCERTAIN, refusals
-from adapters.laws.fit.regime import SHAKEDOWN, find_regimes, independent
+from adapters.laws.fit.regime import SHAKEDOWN, find_regimes, independent, select_tail
 from trackbed.command import main
 
 READ = np.unique(np.geomspace(1, 1000, 22).round())
@@ -73,6 +73,13 @@ def test_exponent_of_the_tail_is_measured(exponent: float) -> None:
     assert abs(found.exponent - exponent) < max(2 * found.deviation, 0.05)
     assert found.deviation < (0.15 if exponent > 0 else 0.8)
     assert (found.bounded > 0.5) == (exponent < 0)
+
+
+def test_tail_is_the_last_decade() -> None:
+    """Cycles from N_k / 10 on, six at least."""
+    tail = select_tail(READ)
+    assert READ[tail][0] >= 100 > READ[tail.start - 1]
+    assert len(np.geomspace(1, 1e6, 8)[select_tail(np.geomspace(1, 1e6, 8))]) == 6
 
 
 def test_alike_residuals_count_for_fewer() -> None:

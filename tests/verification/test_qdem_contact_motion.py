@@ -339,11 +339,12 @@ def test_a_saved_run_goes_on_to_the_same_bits(tmp_path: Path) -> None:
         grinding(skin=1e-4).restore(tmp_path / "state.npz")
 
 
-def rigid_pair(threads: int | None) -> q.Simulation:
+def rigid_pair(threads: int | None, layers: int = 2) -> q.Simulation:
     """Two rigid cubes that grind on each other."""
+    cells = (2, 2, layers)
     bodies = [
-        q.Body(make_box_mesh((SIDE,) * 3, (2, 2, 2), origin=origin), STONE, name=str(k), rigid=True)
-        for k, origin in enumerate(((0, 0, 0), (0.004, 0.002, SIDE + 2 * RADIUS - 2e-6)))
+        q.Body(make_box_mesh((SIDE,) * 3, cells, origin=origin), STONE, name=str(k), rigid=True)
+        for k, origin in enumerate(((0, 0, 0), (0.004, 0.002, SIDE + 0.01113)))
     ]
     contact = q.SphereContact(RADIUS, 1e6, 0.5)
     run = q.Simulation(bodies, threads=threads, gravity=(0, 0, -9.81), contact=contact)
@@ -363,6 +364,18 @@ def test_rigid_bodies_are_on_the_threads_asked_for(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(contact_window, "THREAD_SPHERES", 20)
     assert contact_window.choose_threads(asked[None], kernels[None]) == 2
     assert contact_window.choose_threads(asked[2], None) == asked[2].assembly.threads == 1
+
+
+@pytest.mark.skipif(numba.config.NUMBA_NUM_THREADS < 2, reason="numba has one thread only")
+@pytest.mark.parametrize("make", [lambda n: grinding(threads=n), lambda n: rigid_pair(n, 80)])
+@pytest.mark.long
+def test_threads_change_no_bit(make: Callable[[int], q.Simulation]) -> None:
+    """Of a whole contact window; the rigid ones' 1300 spheres go to the threads by 512."""
+    runs = [make(1), make(2)]
+    for run in runs:
+        run.advance(60 * run.step)
+    assert runs[0].energy().friction > 0
+    assert state_of(runs[0]) == state_of(runs[1])
 
 
 def test_bodies_that_do_not_touch_move_as_without_contact() -> None:

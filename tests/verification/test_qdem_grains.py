@@ -119,9 +119,12 @@ def test_rounded_cube_has_the_roundness_of_its_edges() -> None:
     Its surface is that of a finely cut cube, each node moved to the nearest point of the rounded
     one; corners and ridges come within the 10 % that the mesh size leaves.
     """
-    nodes, faces = 2 * CUBE, find_hull_faces(CUBE)
+    nodes, faces, sharp = 2 * CUBE, find_hull_faces(CUBE), []
     for _ in range(5):
         nodes, faces = halved(nodes, faces, sphere=False)
+        sharp.append(find_roundness(nodes, faces))
+    assert sharp[-1] / sharp[-2] == pytest.approx(0.5, abs=0.05)  # that of the mesh size alone
+    assert sharp[-1] < 0.08
     for q in (0.6, 0.8):
         core = np.clip(nodes, -(1 - q), 1 - q)
         away = nodes - core
@@ -136,6 +139,7 @@ def test_inscribed_sphere_touches_four_planes_and_cuts_none(seed: int, count: in
     """The optimum of the linear programme, by its own conditions."""
     nodes = place_corners_apart(np.random.default_rng(seed), count) * [1.5, 1.0, 0.6]
     faces = find_hull_faces(nodes)
+    assert find_node_areas(nodes * [4.0, 1.0, 1.0], faces).min() > 0  # with obtuse triangles
     centre, radius = find_inscribed_sphere(nodes, faces)
     a, b, c = nodes[faces].transpose(1, 0, 2)
     normal = np.cross(b - a, c - a)

@@ -11,12 +11,18 @@ from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 from scipy.spatial.distance import pdist
 
-from adapters.bed.contact_law import normal_force
+from adapters.bed.contact_law import normal_force, overlap_under_force
 from adapters.bed.container import Container, Walls
 from adapters.bed.overlaps import find_behind_discs, measure_rows, neighbours
 from adapters.bed.state import FloatArray, State
 from adapters.errors import NotConverged, UsageError
-from adapters.relaxation.kernel import add_hertz_energy, estimate_norm, solve_multipliers
+from adapters.relaxation.kernel import (
+    add_hertz_energy,
+    estimate_norm,
+    fill_changes,
+    fill_moves,
+    solve_multipliers,
+)
 from adapters.relaxation.measured import Relaxation, RelaxationNotConverged
 from adapters.relaxation.methods import bound_equilibrium_overlap, relax, relax_bare
 from tests.deepest_overlap import deepest
@@ -101,6 +107,11 @@ def test_multipliers_against_scipy(seed: int) -> None:
         if second[c] >= 0:
             j[c, 3 * second[c] : 3 * second[c] + 3] = normal[c]
     j[m, 2::3] = share
+    move, change = np.empty((n, 3)), np.empty(m + 1)
+    fill_moves(first, second, normal, share, right, move)
+    fill_changes(first, second, normal, share, move, change)
+    np.testing.assert_allclose(move.ravel(), -right @ j, atol=1e-13)
+    np.testing.assert_allclose(change, j @ move.ravel(), atol=1e-13)
     gram = j @ j.T + slack * np.eye(m + 1)
     norm = estimate_norm(first, second, normal, share, n, 200)
     assert norm == pytest.approx(np.linalg.eigvalsh(j @ j.T).max(), rel=1e-2)
@@ -199,6 +210,7 @@ def test_equilibrium_does_not_move(settled: Bed) -> None:
     found = relax(state.position, state, walls, STIFFNESS)
     assert found.largest_move < 1e-12
     assert found.coordination_change == 0
+    assert relax_bare(state, walls, STIFFNESS).largest_move < 1e-12
 
 
 def test_printed_functional_holds_its_own_equilibrium(settled: Bed) -> None:
@@ -442,3 +454,14 @@ def test_pressed_bed_without_a_past(bed: Bed) -> None:
     limit = 1.01 * bound_equilibrium_overlap(pressed, STIFFNESS)
     assert found.estimated.max_penetration > 5e-5
     assert deepest(found.position, state.radius, walls) <= limit
+
+
+def test_bound_of_overlaps_is_above_the_heaviest_contact_of_a_column() -> None:
+    """There each contact carries all weight above it; Hertz: overlap grows as force^(2/3)."""
+    state, _ = column(6, np.zeros(6))
+    weight = GRAVITY * state.mass
+    carried = overlap_under_force(weight[1:].sum(), STIFFNESS.grain, 1.5e-3)
+    bound = bound_equilibrium_overlap(state, STIFFNESS)
+    assert carried < bound < 1.2 * carried
+    loaded = bound_equilibrium_overlap(state, STIFFNESS, 7 * weight.sum())
+    assert loaded == pytest.approx(4 * bound)

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_lcp import BodySpace
+from rigid_lcp import BodySpace, HalfSpace, Scene, Simulation, box
 from rigid_lcp.friction.problem.definition import friction_problem
 from rigid_lcp.unique.elastic_limit import elastic_limit
 from tests.rigid_elastic import find_least_forces
@@ -178,3 +178,11 @@ def test_contacts_that_hold_need_one_step(make):
     if problem.friction.any():
         assert difference(answer.r, find_least_forces(problem)) < 1e-11
         assert answer.iterations == 1
+
+
+def test_forces_of_a_run_are_those_of_equal_springs():
+    """A box of 1 kg on its four corners: a quarter of its weight on each."""
+    scene = Scene(3)
+    scene.add(box(1, 1, 1), density=1.0, position=(0, 0, 0.5), friction=0.5)
+    scene.add(HalfSpace((0, 0, 1)))
+    assert Simulation(scene).unique_forces().normal_force == pytest.approx([GRAVITY / 4] * 4)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from math import cos, sin
+from math import cos, pi, sin
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,9 @@ import pytest
 
 from rigid_lcp import HalfSpace, Polygon, Scene, Simulation
 from rigid_lcp.errors import NotConverged
+from rigid_lcp.motion.acceleration_forces import find_forces, try_lasting_forces
 from tests.rigid_motions import rocking_block, rocking_block_answer
+from validation.bench.rigid.packings import tower
 from validation.bench.rigid.scenes import FLOOR, G, gravity_on
 
 
@@ -95,3 +97,46 @@ def test_many_elastic_impacts_keep_the_energy() -> None:
     run.advance(0.2)
     assert run.pace.collisions > 10
     assert abs(run.energy / energy - 1) < 1e-14 * run.pace.collisions
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
+def test_two_corners_at_once(restitution: float) -> None:
+    """A box falls into a right-angled groove, both flanks flush: it comes back without turning."""
+    scene = Scene(2, (0, 0))
+    scene.add(
+        Polygon.rectangle(1, 1), density=1.0, position=(0, 1), angle=pi / 4, velocity=(0, -1),
+        restitution=restitution,
+    )  # fmt: skip
+    for normal in ((1, 1), (-1, 1)):
+        scene.add(HalfSpace(normal, 0.0), friction=0.3, restitution=restitution)
+    run = Simulation(scene, "acceleration", step=0.01)
+    run.advance(0.5)
+    np.testing.assert_allclose([*run.velocities[0], run.spins[0]], [0, restitution, 0], atol=1e-9)
+
+
+@pytest.mark.parametrize(("boxes", "speed", "mu"), [(6, 0.0, 0.5), (2, 1.0, 0.2)])
+def test_lasting_contacts_are_solved_at_once(boxes: int, speed: float, mu: float) -> None:
+    """A redundant tower, at rest or its lowest box sliding: every contact presses, none moves but
+    along its slip, where friction is -mu r_N (eqs 26, 27).  None where one would have to pull, or
+    to grip by more than its friction."""
+    problem = tower(boxes, 2)
+    slip, friction, lifted = np.zeros((2 * boxes, 1)), problem.friction.copy(), problem.offset + 0
+    slip[:2], friction[:2] = speed, mu
+    found = try_lasting_forces(problem.bodies, problem.offset, friction, slip)
+    assert found is not None
+    assert found.residual < 1e-13
+    r, u = found.r.reshape(-1, 2), (problem.delassus @ found.r + problem.offset).reshape(-1, 2)
+    u[slip[:, 0] > 0, 1] = 0.0
+    assert np.abs(u).max() < 1e-12 * np.abs(problem.offset).max()
+    assert (r[:, 0] > 0).all()
+    assert (np.abs(r[:, 1]) <= friction * r[:, 0] * (1 + 1e-12)).all()
+    assert r[:2, 1] == pytest.approx(-mu * speed * r[:2, 0], abs=1e-12)
+    lifted[4 - 2 * boxes :: 2] = 1.0
+    for limit in (friction, 0.0 * friction):
+        assert try_lasting_forces(problem.bodies, lifted, limit, slip) is None
+    asked, error = find_forces(problem.bodies, lifted, friction, slip, 1e-12, G)
+    assert error < 1e-11
+    assert (asked.r[::2] == 0).any()
+    friction[2:] = 0.1  # slowed down by 0.2 g, a box above would have to grip by more
+    found = try_lasting_forces(problem.bodies, problem.offset, friction, slip)
+    assert (found is None) == (speed > 0)

@@ -7,7 +7,7 @@ import pytest
 import scipy.sparse as sp
 
 from rigid_lcp import BodySpace, Disc, HalfSpace, Polygon, Scene, Simulation, Sphere, box
-from rigid_lcp.collision.passing import Closing, Impulses, gains_energy
+from rigid_lcp.collision.passing import Closing, Impulses, Share, gains_energy
 from rigid_lcp.errors import NotConverged
 from rigid_lcp.motion.acceleration_forces import find_forces
 from rigid_lcp.scene.simulation import Method
@@ -155,3 +155,17 @@ def test_an_impact_may_return_what_a_load_gives_within_a_step_and_no_more(bounce
     assert work == pytest.approx(mass * gain**2 * (0.5 + bounce) ** 2 / 2, rel=1e-14)
     gains = gains_energy(bodies, closing, before, free, gained, found, np.array([True]))
     assert gains.tolist() == [makes]
+
+
+def test_each_contact_keeps_the_greatest_share_that_makes_no_energy() -> None:
+    """Energy is made above a share of each: 1 + log2(64) trials find it to 1/64, from below, and
+    one more stands at all of them.  What is left out is tried once, without any."""
+    most, share, trials = np.array([0.0, 0.3, 0.999, 1.0]), Share(4), 1
+    while share.next(share.now > most):
+        trials += 1
+    assert trials <= 8
+    assert (share.now <= most).all()
+    assert (share.now >= np.where(most < 1, most - 1 / 64, 1)).all()
+    share.leave_out()
+    assert not share.now.any()
+    assert not share.next(np.zeros(4, bool))

@@ -204,3 +204,20 @@ def test_a_damaged_result_is_made_again(scene, whole, tmp_path):
         result.write_text(damage, encoding="utf-8")
         goes_on(scene, folder, whole)
         assert json.loads(result.read_text(encoding="utf-8")).keys() == sound.keys()
+
+
+def test_a_folder_that_vanishes_is_not_made_again(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Removed midway: exit code 2 and a sentence."""
+    folder, advance = tmp_path / "run", Simulation.advance
+
+    def remove(run: Simulation, seconds: float) -> None:
+        advance(run, seconds)
+        if run.steps == 20:
+            shutil.rmtree(folder)
+
+    monkeypatch.setattr(Simulation, "advance", remove)
+    assert command.main(run_words(scene, folder)) == 2
+    assert "removed or replaced while the run went on" in capsys.readouterr().err
+    assert not folder.exists()

@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 from rigid_lcp import Disc, HalfSpace, Polygon, Scene, Simulation, box
 from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import NoSolution, NotConverged
+from rigid_lcp.motion.lasting_contacts import find_first_fall
 from rigid_lcp.motion.state import Motion
 from rigid_lcp.scene.simulation import Method
 from tests.rigid_motions import (
@@ -293,3 +294,17 @@ def test_residual_is_judged(monkeypatch: pytest.MonkeyPatch) -> None:
     run = block_on_incline(0.1, 0.5, method="acceleration")
     with pytest.raises(NotConverged, match="residual"):
         run.advance(0.01)
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        ((1.0, -2.0, -1.0, -2.0), 0.5),  # a straight line
+        ((0.75, 0.0, -0.25, -2.0), 0.75**0.5),  # 0.75 - x^2
+        ((-1e-12, 1.0, -1.0, -3.0), 0.5),  # x (1 - 2 x): just left, flies up, comes back
+        ((-0.1, -1.0, -1.1, -1.0), None),  # overlaps all the time
+    ],
+)
+def test_first_fall(values: tuple[float, ...], expected: float | None) -> None:
+    """Roots of cubics that are known."""
+    assert find_first_fall(*values) == pytest.approx(expected, abs=1e-10)

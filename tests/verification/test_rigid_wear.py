@@ -307,6 +307,22 @@ def test_pile_wears_without_overlap_or_a_burst(dim):
     assert run.overlap < 1e-9 * 0.1
 
 
+def test_order_of_the_bodies_does_not_matter():
+    """Two blocks that slide, added in either order: each loses the same, to round-off."""
+    lost = []
+    for order in ((0, 1), (1, 0)):
+        scene = Scene(2, [4.0, -8.0])
+        for k in order:
+            block = Polygon.rectangle(0.2 + 0.1 * k, 0.1)
+            scene.add(block, density=2700.0 * (1 + k), position=[k, 0.05], friction=0.1 + 0.2 * k)
+        scene.add(HalfSpace([0, 1]))
+        run = Simulation(scene, step=1e-2, wear=Wear(1e-6, every=3))
+        run.advance(0.2)
+        lost.append([0.02 + 0.01 * k - run.world.scene.bodies[order[k]].shape.area for k in (0, 1)])
+    assert lost[0] == pytest.approx(lost[1], rel=1e-10)
+    assert min(lost[0]) > 0
+
+
 def test_a_ball_wears_what_it_rubs_and_not_itself():
     """A ball slides on a face: none wears; pressed along an edge, the edge does."""
     scene = Scene(3, [0, 0, 0])
