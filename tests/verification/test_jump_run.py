@@ -243,6 +243,7 @@ def commands(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Commands]:
     server.close()
 
 
+@pytest.mark.long
 def test_killed_at_file_operations(commands: Commands, tmp_path: Path) -> None:
     """Killed at the 17th change of a file, again and again: the same table and decisions.
 

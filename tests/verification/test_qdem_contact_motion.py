@@ -312,6 +312,7 @@ def test_extents_are_those_of_each_body(bodies: list[list[float]]) -> None:
     assert extents(np.concatenate(bodies), first).tolist() == expected
 
 
+@pytest.mark.long
 def test_a_skin_leaves_room_to_the_images_across_the_width() -> None:
     """A cube of 30 mm in a width of 43.6, a reach of 12 mm and the skin: 1.6 mm are left."""
     run = two(gap=0.05, contact={"periodic": q.PeriodicWidth("y", 0.0436)}, step=1.2e-6)

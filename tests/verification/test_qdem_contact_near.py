@@ -91,6 +91,7 @@ def test_contacts_that_are_far_leave_the_elements_their_step() -> None:
     assert three < near < run.elements_critical_step.value
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("share", "steps"), [(0.95, 200), (1.05, 19)])
 def test_a_march_is_stable_below_the_step_and_not_above(share: float, steps: int) -> None:
     """Nine pairs in equilibrium, pressed by what they bear, and trembling: all bear all the time.
@@ -132,6 +133,7 @@ def test_a_march_that_meets_nearer_vertices_than_it_began_with_stops() -> None:
     assert not run.contacts.kernel.force.any()
 
 
+@pytest.mark.long
 def test_it_goes_on_to_the_same_bits(tmp_path: Path) -> None:
     """Saved where vertices have left the skin, so that the state tells another step than the
     march's."""

@@ -282,6 +282,7 @@ def test_another_seed_makes_other_grains() -> None:
     assert not np.array_equal(make_grains(2, 4).nodes, make_grains(2, 3).nodes)
 
 
+@pytest.mark.long
 def test_grains_have_the_sizes_that_were_drawn(some: GrainSet) -> None:
     for grain in (0, 17, 39):
         nodes, _ = some.parts(grain)

@@ -143,6 +143,7 @@ def turned_by(body: q.Body) -> Floats:
     return np.linalg.lstsq(arm, moved - moved.mean(axis=0), rcond=None)[0].T
 
 
+@pytest.mark.long
 def test_torque_free_top_against_the_closed_form() -> None:
     """Euler's asymmetric top in Jacobi's functions; the turn itself against an ODE solver.
 

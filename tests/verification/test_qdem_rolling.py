@@ -177,6 +177,7 @@ def test_wheels_of_a_rail_read_the_same_rail(monkeypatch: pytest.MonkeyPatch) ->
     assert abs(alike(*contact.T)) < 0.5
 
 
+@pytest.mark.long
 def test_load_is_a_seeds_own_linear_and_nothing_without_roughness() -> None:
     def series(*rough: Roughness) -> np.ndarray:
         return make_bogie_series(Train(cars=1), TRACK, 0.4, 1.0, 0.0, 1e4, *rough).values[:, 2]

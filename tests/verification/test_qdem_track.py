@@ -67,6 +67,7 @@ def stacked(rigid: bool) -> q.Simulation:
     return q.Simulation(bodies, gravity=GRAVITY, threads=1, contact=contact)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("rigid", "each"), [(True, True), (True, False), (False, True)])
 def test_cubes_come_to_rest_on_springs_that_bear_their_weight(rigid: bool, each: bool) -> None:
     # The ground bears both; four mirrored springs of 2 k give way by W/(8 k) if the cube is rigid.

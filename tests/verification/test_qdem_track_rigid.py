@@ -55,6 +55,7 @@ def test_rigid_grains_begin_with_the_forces_of_deformable_ones(folder: Path) -> 
     assert hard.step > soft.step
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore::qdem_fem.files.errors.StepWarning")
 def test_a_run_of_rigid_grains_says_what_it_leaves_out_and_stands_for_itself(folder: Path) -> None:
     """The bed is let go once for every kind of grain, and its file keeps all answers."""

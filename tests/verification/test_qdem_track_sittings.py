@@ -127,6 +127,7 @@ def test_what_a_kill_left_of_a_stage_that_is_done_is_not_read(
     assert not [part for part in parts - {place_stage_part(path, "bed")} if part.exists()]
 
 
+@pytest.mark.long
 def test_patience_is_no_part_of_a_bed(whole: Bed, tmp_path: Path) -> None:
     """A bed is read by a recipe of more patience, and with the heights that sleepers had once."""
     recipe, path = recipe_at(tmp_path), tmp_path / "bed.npz"

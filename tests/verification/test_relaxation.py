@@ -180,6 +180,7 @@ def test_a_torn_contact_is_replaced_by_a_pressed_one() -> None:
     np.testing.assert_allclose(found.position[1], [0.097 + carried, 0.07, 0.05], atol=1e-9)
 
 
+@pytest.mark.long
 def test_move_is_the_smallest(bed: Bed) -> None:
     """At the end the move is a combination of contact normals alone: no floppy part is left.
 

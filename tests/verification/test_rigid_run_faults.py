@@ -143,6 +143,7 @@ def test_killed_at_every_file_operation(commands, scene, whole, tmp_path):
         goes_on(scene, folder, whole)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_stopped_by_a_signal(scene, whole, tmp_path, number, capsys):
     """Exit code 130, and what to do next."""

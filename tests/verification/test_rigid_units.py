@@ -67,6 +67,7 @@ METHODS = {
 """A method, and a problem that it has something to do on."""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", METHODS)
 @pytest.mark.parametrize(("force", "velocity"), [(2.0**20, 1.0), (2.0**-10, 2.0**10)])
 def test_units_do_not_matter(name: str, force: float, velocity: float) -> None:

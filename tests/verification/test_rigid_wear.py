@@ -96,6 +96,7 @@ def test_wear_that_is_seen_takes_mass_and_keeps_the_rest_moving(dim, k):
     assert 1.0 < front.sum() / back.sum() < (0.1 + 0.015) / (0.054 - 0.015)
 
 
+@pytest.mark.long
 def test_steps_and_cuts_do_not_matter_in_the_limit():
     """Worn volume against step and against the steps between cuts: differences shrink with both.
 
