@@ -19,7 +19,7 @@ demo-rigid: setup
 		--set run.duration=0.95 --set run.frames=19
 	@echo "now look at demo-pile/report.html and demo-pile/movie.gif"
 
-# What anyone can run in ten minutes, half of it compiling: no long test, no study; what is missing is skipped.
+# What anyone can run in five minutes, half of it compiling: no long test, no study, no engine, no peer.
 test:
 	@./setup.sh test
 	$(bin)/python -m pytest $(two) -m "not (long or engine or peer or studies or validate)"
