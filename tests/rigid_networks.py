@@ -20,13 +20,11 @@ from validation.bench.rigid.friction_problems import read_problem
 GRAVITY, STEP = 9.81, 1e-3
 
 
-def network_bodies(
-    grains: int, seed: int, *, ratio: float = 4.0, kept: float = 0.62
-) -> tuple[BodySpace, Floats]:
+def network_bodies(grains: int, seed: int) -> tuple[BodySpace, Floats]:
     """Grains at random places that touch their neighbours at points between them, on fixed ones.
 
-    Returns J and M^-1, and velocities after a time step of free fall and some shaking.  The more
-    neighbours are kept as contacts, the more the network is hyperstatic.
+    Returns J and M^-1, and velocities after a time step of free fall and some shaking.  So many
+    neighbours are kept as contacts that the network is hyperstatic.
     """
     g = np.random.default_rng(seed)
     side = int(np.ceil(np.sqrt(grains)))
@@ -37,7 +35,7 @@ def network_bodies(
     pairs = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [0, 2]]])
     pairs = np.unique(np.sort(pairs, axis=1), axis=0)
     pairs = pairs[np.linalg.norm(place[pairs[:, 0]] - place[pairs[:, 1]], axis=1) < 1.8]
-    pairs = pairs[g.random(len(pairs)) < kept]
+    pairs = pairs[g.random(len(pairs)) < 0.62]
     fixed = np.arange(grains) < side
     pairs = pairs[~(fixed[pairs].all(axis=1))]
     jacobian = np.zeros((2 * len(pairs), 3 * grains))
@@ -48,7 +46,7 @@ def network_bodies(
             if not fixed[body]:
                 rows = contact_rows(normal, point - place[body])
                 jacobian[2 * c : 2 * c + 2, 3 * body : 3 * body + 3] = sign * rows
-    mass = g.uniform(1.0, ratio, grains)
+    mass = g.uniform(1.0, 4.0, grains)
     inverse = np.repeat(1.0 / mass, 3)
     inverse[2::3] *= 8.0  # discs of radius 1/2
     velocity = 5e-4 * g.normal(size=3 * grains)
@@ -83,13 +81,6 @@ def random_bodies(pairs, bodies, dim, generator, full=False) -> BodySpace:
 def random_pairs(contacts, bodies, generator):
     """Two of so many bodies and the ground, which is -1, for each contact."""
     return [generator.choice(bodies + 1, 2, replace=False) - 1 for _ in range(contacts)]
-
-
-def tower_bodies(boxes: int, top: float = 1.0) -> BodySpace:
-    """Unit boxes on each other, two contacts a face: redundant by one friction force each."""
-    bodies = packings.tower(boxes, 2, top_mass=top).bodies
-    assert bodies is not None
-    return bodies
 
 
 def tower(boxes: int, mu: float, top: float = 1.0) -> FrictionProblem:

@@ -17,7 +17,7 @@ from adapters.files.window import read_contacts
 from adapters.scene.tables import Scene
 from validation.bench.few_grains import RADIUS, Track
 
-SCRIPT = """\
+START = """\
 import os
 import sys
 
@@ -35,6 +35,12 @@ bed.materials_add(parameters)
 bed.grains_add(parameters)
 bed.walls_add(parameters)
 count = parameters["grain_count"]
+"""
+"""How a script begins: grains and walls of the parameters are there."""
+
+SCRIPT = (
+    START
+    + """\
 states = [O.bodies[number].state for number in range(count)]
 for state, velocity in zip(states, few["velocity"]):
     state.vel = Vector3(*velocity)
@@ -65,6 +71,7 @@ record.scene_save()
 force.close()
 print(f"COMPLETE step {O.iter}", flush=True)
 """
+)
 
 
 def track_run(

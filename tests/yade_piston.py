@@ -13,27 +13,15 @@ from adapters.bed.state import FloatArray
 from adapters.engines.yade import PARAMETERS, YadeEngine, cover_piston
 from adapters.scene.file import load_scene
 from adapters.scene.tables import Scene
+from tests.yade_few_grains import START
 from trackbed.scenes import scene_path
 
-SCRIPT = """\
-import os
-import sys
-
-import numpy as np
-from yade import Omega, Vector3
-
-sys.path.insert(0, os.getcwd())
-import bed
-
-O = Omega()
-parameters = bed.parameters_read()
-bed.materials_add(parameters)
-bed.grains_add(parameters)
-bed.walls_add(parameters)
-count = parameters["grain_count"]
+SCRIPT = (
+    START
+    + """\
 piston = bed.Piston(parameters)
 rows = []
-for places in parameters["few"]:
+for places in few:
     for number, place in enumerate(places):
         O.bodies[number].state.pos = Vector3(*place)
     changed = piston.grains_share()
@@ -44,6 +32,7 @@ np.savetxt("force.txt", rows, fmt="%.17g")
 print("COMPLETE step 0", flush=True)
 open("end.restart", "w").write("none")
 """
+)
 
 
 def scene_partial(*settings: str) -> Scene:

@@ -26,18 +26,11 @@ from adapters.files.run_folder import RunFolder
 from adapters.procedure.run import run_scene
 from adapters.scene.file import load_scene
 from tests.engine_sample import AFTER, FIRST, JUMP, QUIET, SECOND, TINY, Sample, at_rest, window_of
-from tests.forked_commands import Commands, processes_in
+from tests.forked_commands import Commands, awaited, gone
 from trackbed.scenes import read_template, scene_path
 
-ROOT = Path(__file__).parents[2]
 HISTORY = 7
 """Columns of ``history.txt``."""
-
-
-def real(sample: Sample) -> None:
-    """Go on only with an engine that has mechanics and a process."""
-    if sample.name == "fake":
-        pytest.skip("the fake engine has no mechanics and no process")
 
 
 def springs(contacts: Contacts) -> dict[tuple[int, ...], np.ndarray]:
@@ -107,7 +100,7 @@ def test_settled_bed_is_in_balance(sample: Sample) -> None:
 
     So forces have the sign, and walls the names, that the contract asks for.
     """
-    real(sample)
+    sample.need_process()
     state = load_state(sample.run / "preparation" / "state.npz")
     force = np.sum(list(state.wall_force.values()), axis=0)
     force[:, 2] -= GRAVITY * state.mass
@@ -138,7 +131,7 @@ def test_cycles(sample: Sample) -> None:
 
 def test_overlaps_are_those_of_the_positions(sample: Sample) -> None:
     """r_i + r_j - distance for every contact, and no overlap without one, at every cycle end."""
-    real(sample)
+    sample.need_process()
     window = sample.window(SECOND)
     for index in range(len(window) + 1):
         state = window.state(index)
@@ -160,7 +153,7 @@ def test_forces_of_contacts_obey_hertz_and_coulomb(sample: Sample) -> None:
     Put back at rest, so that next to no damping is in the forces: LIGGGHTS dumps those of the half
     step behind the instant.  Normals point from j to i.
     """
-    real(sample)
+    sample.need_process()
     state = load_state(sample.run / JUMP / "relaxed.npz")
     after = sample.window(AFTER).state(0)
     assert np.array_equal(after.position, state.position)
@@ -235,7 +228,7 @@ def test_new_contacts_start_without_a_spring(sample: Sample, tmp_path: Path) -> 
 
     Far, since LIGGGHTS keeps the spring of two that parted while they are neighbours.
     """
-    real(sample)
+    sample.need_process()
     before = at_rest(sample.window(SECOND).state(-1))
     position, radius = before.position.copy(), before.radius
     top = int(np.argmax(position[:, 2]))
@@ -448,25 +441,6 @@ def test_example_by_hand(name: str, tmp_path: Path) -> None:
 # --- dies cleanly ---------------------------------------------------------------------------
 
 
-def engine_started(run: Path, stage: str) -> None:
-    """Wait until an engine works on a stage, and has said so."""
-    screen = run / "partial" / stage / "screen.txt"
-    deadline = time.monotonic() + 300
-    while not (screen.exists() and screen.stat().st_size):
-        assert time.monotonic() < deadline, f"no engine came to {stage}"
-        time.sleep(0.002)
-
-
-def gone(folder: Path) -> bool:
-    """Whether, within a minute, no process works below a folder any more."""
-    deadline = time.monotonic() + 60
-    while processes_in(folder):
-        if time.monotonic() > deadline:
-            return False
-        time.sleep(0.02)
-    return True
-
-
 @pytest.mark.parametrize("stage", ["preparation", AFTER])
 @pytest.mark.long
 def test_killed_run_resumes_to_the_identical_table(
@@ -484,7 +458,7 @@ def test_killed_run_resumes_to_the_identical_table(
         assert commands.until(stage.partition("_")[0])
     else:
         commands.start(*sample.words(run))
-        engine_started(run, stage)
+        awaited(run / "partial" / stage / "screen.txt")
         time.sleep(0.2)
     assert commands.kill() == -signal.SIGKILL
     assert gone(run)

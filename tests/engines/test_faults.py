@@ -34,12 +34,6 @@ LOST = {PREPARATION: (PREPARATION, "window_*", "jump_*"), SECOND: (SECOND, AFTER
 KEPT = {PREPARATION: [], SECOND: [PREPARATION, FIRST]}
 
 
-def real(sample: Sample) -> None:
-    """Go on only with an engine that has a program."""
-    if sample.name == "fake":
-        pytest.skip("the fake engine has no program")
-
-
 def check_failure(
     sample: Sample, run: Path, code: int, said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -103,7 +97,7 @@ def test_absurd_time_step_is_not_credible(
     sample: Sample, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Fifty Rayleigh times a step: whatever the engine makes of it ends in a typed error."""
-    real(sample)
+    sample.need_process()
     monkeypatch.setattr(Scene, "time_step", 50 * sample.scene.rayleigh_time)
     monkeypatch.setattr(Scene, "steps_per_cycle", 100)
     with pytest.raises(TrackbedError) as caught:
@@ -124,7 +118,7 @@ def test_engine_killed(
     sample: Sample, tmp_path: Path, capsys: pytest.CaptureFixture[str], number: signal.Signals
 ) -> None:
     """An engine that someone else ends is named; nothing before it is lost, no jump is blamed."""
-    real(sample)
+    sample.need_process()
     run = sample.copy(tmp_path / "run", AFTER)
     sample.fault(run, f'"$@" & {STARTED}; kill -{number.value} $!; wait $!; exit $?')
     check_failure(sample, run, 5, f"was ended by {number.name}", capsys)
@@ -169,42 +163,12 @@ def test_disk_with_too_little_room_for_a_saved_scene(
     assert RunFolder(run).stage_names() == KEPT[SECOND]
 
 
-@pytest.mark.parametrize(
-    ("launcher", "code", "said"),
-    [
-        ("no-such-mpirun -np 2", 4, "cannot start no-such-mpirun"),
-        ("sh -c 'echo not enough slots; exit 1' sh", 5, "not enough slots"),
-        ("sh -c 'exit 0' sh", 5, "no sentinel line"),
-    ],
-)
-@pytest.mark.long
-def test_no_mpi(
-    sample: Sample,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    launcher: str,
-    code: int,
-    said: str,
-) -> None:
-    """A launcher that is missing, refuses, or starts nothing."""
-    real(sample)
-    words = ["run", str(sample.file), "--run-folder", str(tmp_path / "run")]
-    for override in sample.overrides:
-        if "launcher" not in override:
-            words += ["--set", override]
-    assert command.main([*words, "--launcher", launcher]) == code
-    text = capsys.readouterr().err
-    assert said in text
-    assert "\n  -> " in text
-    assert RunFolder(tmp_path / "run").stage_names() == []
-
-
 @pytest.mark.long
 def test_mpi_of_another_kind(
     sample: Sample, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A launcher of another MPI starts two whole runs in one folder: ended as soon as seen."""
-    real(sample)
+    sample.need_process()
     run = sample.copy(tmp_path / "run", *LOST[SECOND])
     sample.fault(run, f"cat {sample.raw}/{SECOND}.said {sample.raw}/{SECOND}.said; sleep 60")
     check_failure(sample, run, 5, "2 runs of the engine started", capsys)

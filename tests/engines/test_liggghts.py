@@ -33,8 +33,7 @@ from tests.engine_sample import (
     start_of,
     window_of,
 )
-from tests.engines.test_engine_contract import engine_started, gone
-from tests.forked_commands import Commands
+from tests.forked_commands import Commands, awaited, gone
 from trackbed import command
 
 pytestmark = pytest.mark.engine("liggghts")
@@ -177,7 +176,7 @@ def test_interrupted_while_the_engine_works(
     """A signal ends the engine too, with exit code 130 and every finished stage in its place."""
     folder = liggghts.copy(tmp_path / "run", AFTER)
     pid = commands.start("resume", folder)
-    engine_started(folder, AFTER)
+    awaited(folder / "partial" / AFTER / "screen.txt")
     os.kill(pid, number)
     assert commands.end() == 130
     assert gone(folder)
@@ -201,7 +200,7 @@ def test_launcher(commands: Commands, liggghts: Sample, tmp_path: Path) -> None:
     more = ("procedure.k_i=1", "procedure.k=2", "procedure.total_cycles=3", softer, launcher)
     asked = [word for override in (*TINY, *more) for word in ("--set", override)]
     commands.start("run", liggghts.file, "--run-folder", folder, *asked)
-    engine_started(folder, FIRST)
+    awaited(folder / "partial" / FIRST / "screen.txt")
     commands.kill()
     assert gone(folder)
     assert commands.run("resume", folder) == 0, commands.output.read_text()

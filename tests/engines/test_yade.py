@@ -18,6 +18,7 @@ from adapters.engines.yade import YadeEngine, damping_ratio
 from adapters.files.window import Window, read_state, read_window
 from adapters.scene.file import load_scene
 from adapters.scene.tables import Scene
+from tests import engine_sample
 from tests.yade_few_grains import track_run
 from trackbed.scenes import read_template
 from validation.bench.few_grains import RADIUS, Track, grain_mass, head_on, table_1
@@ -28,13 +29,7 @@ ALPHA = 0.44
 PAIR_MASS = grain_mass(table_1()) / 2
 """Effective mass of two grains of Table 1 [kg]."""
 ENGINE = YadeEngine()
-TINY = (
-    'engine.name="yade"',
-    "sample.radius=0.018",
-    "sample.count=40",
-    "material.grain.young=2e8",
-    "loading.piston_mass=0.001",
-)
+TINY = ('engine.name="yade"', *engine_sample.TINY[:4])
 """Forty soft grains, about 2,500 steps a cycle."""
 
 

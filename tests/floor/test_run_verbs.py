@@ -82,14 +82,18 @@ def test_report_of_a_finished_run_is_shown(
     assert capsys.readouterr().out == f"{folder}/report.html\n"
 
 
-@pytest.mark.parametrize("content", [None, "", "[]", '{"scene": 3}', '{"scene": {}}'])
+@pytest.mark.parametrize(
+    "content", [None, b"", b"{", b"[]", b"null", b"\xff", b'{"scene": 3}', b'{"scene": {}}']
+)
 @pytest.mark.parametrize("verb", ["status", "report", "resume"])
 def test_other_folders_are_no_run_folders(
-    verb: str, content: str | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    verb: str, content: bytes | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """As before: a sentence of the settlement's verbs."""
+    """As before: a sentence of the settlement's verbs that names the folder; nothing is written."""
     if content is not None:
-        (tmp_path / "manifest.json").write_text(content)
+        (tmp_path / "manifest.json").write_bytes(content)
+    there = sorted(tmp_path.iterdir())
     assert find_kind(tmp_path) is None
     assert main([verb, str(tmp_path)]) == 2
-    assert "this is not a run folder" in capsys.readouterr().err
+    assert f"{tmp_path}: this is not a run folder" in capsys.readouterr().err
+    assert sorted(tmp_path.iterdir()) == there

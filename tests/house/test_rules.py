@@ -141,10 +141,8 @@ def test_weight_counts_what_is_there(tmp_path: Path) -> None:
         "adapters/bed/state.py": "x = 1\n" * 7,
         "validation/studies/laws/record.jsonl": "{}\n",
         "docs/laws.md": "three words here\n",
-    }  # fmt: skip
-    before = weigh(
-        build_house(tmp_path, {"README.md": "", "CHANGELOG.md": "", "CONTRIBUTING.md": ""})
-    )
+    }
+    before = weigh(build_house(tmp_path, empty))
     after = weigh(build_house(tmp_path, files))
     gained = {part: after[part][0] - before[part][0] for part in after}
     assert gained["lines of the product"] == 6

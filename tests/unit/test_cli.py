@@ -72,7 +72,7 @@ def test_help_loads_nothing_heavy() -> None:
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
     )
     heavy = {"numpy", "scipy", "numba", "pydantic", "matplotlib", "rich", "meshio", "pandas"}
-    heavy |= {"dask", "distributed", "pyarrow"}
+    heavy |= {"dask", "distributed", "pyarrow", "skfem"}
     assert not heavy & set(run.stdout.split())
 
 
@@ -106,19 +106,6 @@ def test_wrong_use(words: list[str], sentence: str, tmp_path: Path) -> None:
     assert "Traceback" not in run.stderr
     assert run.stdout == ""
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("content", [b"", b"\x00\xff\x80garbage", b"[sample\n", b"a = 1\n" * 3])
-@pytest.mark.long
-def test_malformed_scene(content: bytes, tmp_path: Path) -> None:
-    """A scene file that is none ends with exit code 3, naming the file, and makes no run."""
-    scene = tmp_path / "scene.toml"
-    scene.write_bytes(content)
-    run = command("run", str(scene))
-    assert run.returncode == 3, run.stderr
-    assert "scene.toml" in run.stderr
-    assert "Traceback" not in run.stderr
-    assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.parametrize(
@@ -208,22 +195,6 @@ def test_run_hands_over_what_was_asked(tmp_path: Path, monkeypatch: pytest.Monke
     ]
 
 
-def test_fit_prints_json_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """``fit --json`` predicts u = 2 + 3 ln N, of which the series is made, exactly."""
-    series = tmp_path / "series.csv"
-    rows = "".join(f"{n},{2 + 3 * math.log(n)!r}\n" for n in range(1, 30))
-    series.write_text("cycle,settlement_mm\n" + rows)
-    assert main(["fit", str(series), "--law", "log", "--to-cycle", "1000", "--json"]) == 0
-    printed = capsys.readouterr()
-    assert printed.err == ""
-    fitted = json.loads(printed.out)
-    assert set(fitted) == {"law", "parameters", "prediction", "band", "unit", "regime", "laws"}
-    assert (fitted["law"], fitted["unit"]) == ("log", "mm")
-    assert fitted["prediction"] == pytest.approx(2 + 3 * math.log(1000), rel=1e-12)
-    low, high = fitted["band"]
-    assert low < fitted["prediction"] < high
-
-
 def test_rows_left_out_before_a_load_change_still_tell_its_zero(tmp_path: Path) -> None:
     """10 m settle up to cycle 100, then 1e-3 N^0.45, whose future is uncertain; leaving out the
     earlier rows is no way round the refusal."""
@@ -250,7 +221,9 @@ def test_fit_starts_anew_where_the_load_changed(
     found = {}
     for flag in ("--load-change", "--from-cycle"):
         assert main([*words, flag, "1000"]) == 0
-        found[flag] = json.loads(capsys.readouterr().out)["prediction"]
+        printed = capsys.readouterr()
+        found[flag] = json.loads(printed.out)["prediction"]
+        assert printed.err == ""
     expected = 20 + 5 * math.log(10000)
     assert found["--load-change"] == pytest.approx(expected, rel=1e-9)
     assert abs(found["--from-cycle"] - expected) > 10

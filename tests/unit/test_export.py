@@ -23,21 +23,13 @@ from adapters.procedure.progress import Progress
 from adapters.procedure.record import read_run_record
 from adapters.procedure.run import run_scene
 from adapters.scene.file import load_scene
+from tests import engine_sample
 from trackbed import command
 from trackbed.scenes import read_template
 
 CYCLES = [0, 1, 2, 3, 4, 5, 7, 8, 9, 10, 11]
 """Instants of the fixture's run, which jumps from 5 to 7."""
-TINY = (
-    'engine.name="fake"',
-    "sample.radius=0.018",
-    "sample.count=40",
-    "procedure.k_i=2",
-    "procedure.k=3",
-    "procedure.h=2",
-    "procedure.healing_cycles=1",
-    "procedure.total_cycles=11",
-)
+TINY = ('engine.name="fake"', *engine_sample.TINY)
 
 
 @pytest.fixture(scope="module")

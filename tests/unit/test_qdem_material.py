@@ -82,12 +82,8 @@ NOT_REAL = [
     True,
     "45e9",
     1j,
-    b"1",
-    {},
-    object(),
     float("nan"),
     float("inf"),
-    -float("inf"),
     10**400,
     np.bool_(True),
     np.complex128(1),
@@ -105,7 +101,7 @@ NOT_REAL = [
 ]
 
 
-@pytest.mark.parametrize("value", NOT_REAL, ids=lambda value: repr(value).partition(" at 0x")[0])
+@pytest.mark.parametrize("value", NOT_REAL, ids=repr)
 @pytest.mark.parametrize(
     "field", ["young", "poisson", "density", "shear_viscosity", "bulk_viscosity"]
 )

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from adapters.errors import UsageError
 from adapters.files.run_folder import RunFolder
 from adapters.procedure.history import list_jumped_spans
 from adapters.procedure.progress import Progress
@@ -362,18 +361,6 @@ def test_scene_without_loading(tmp_path: Path) -> None:
     assert "the scene names none" in page
     assert status(tmp_path / "run").state == "finished"
     assert status(tmp_path / "run").next.startswith("trackbed report ")
-
-
-@pytest.mark.parametrize("content", [None, "{", '{"scene": 1'])
-def test_no_run_folder(content: str | None, tmp_path: Path) -> None:
-    """A folder that is no run is refused, and nothing is written into it."""
-    if content is not None:
-        (tmp_path / "manifest.json").write_text(content)
-    there = sorted(tmp_path.iterdir())
-    for verb in (write_report, status):
-        with pytest.raises(UsageError, match="run folder"):
-            verb(tmp_path)
-    assert sorted(tmp_path.iterdir()) == there
 
 
 def test_status(copy: Path) -> None:

@@ -44,6 +44,7 @@ def at_rest(method: str = "time-stepping", **given: object) -> Simulation:
         lambda: Polygon([(0, 0), (1j, 0), (0, 1)]), lambda: HalfSpace("ab"), lambda: Disc(np.inf),
         lambda: Disc(0.0), lambda: HalfSpace((0, 0)), lambda: HalfSpace((0, 1), np.nan),
         lambda: HalfSpace([0, 1], "a"), lambda: HalfSpace([0, 1, 0, 0]), lambda: HalfSpace(None),
+        lambda: HalfSpace([0, 1], [3.0]), lambda: HalfSpace([0, 0, 1], [1.0, 2.0]),
     ],
 )  # fmt: skip
 def test_shapes_that_are_none_are_named(make):
@@ -191,13 +192,16 @@ def test_a_step_that_is_none_is_named(step):
 
 @METHODS
 @pytest.mark.parametrize(
-    "answer", [np.zeros(3), np.zeros((1, 3)), np.zeros((2, 2)), np.full((2, 3), np.nan), 0.0, "a"]
-)
+    "answer",
+    [np.zeros(3), np.zeros((1, 3)), np.zeros((2, 2)), np.full((2, 3), np.nan), 0.0, "a",
+     np.full((2, 3), 1j), np.ma.masked_equal(np.eye(2, 3), 1.0)],
+)  # fmt: skip
 def test_loads_that_are_none_are_named(method, answer):
-    """NaN made positions of NaN without a word, other shapes an IndexError."""
+    """NaN made positions of NaN without a word, other shapes an IndexError, complex ones a part."""
     run = at_rest(method, loads=lambda time, motion: answer)
     with pytest.raises(SceneError, match="loads at"):
         run.advance(0.01)
+    assert run.time == 0.0
     assert np.isfinite(run.positions).all()
     with pytest.raises(UsageError, match="no function"):
         at_rest(method, loads=answer)

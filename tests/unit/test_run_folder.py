@@ -14,8 +14,6 @@ from hypothesis import strategies as st
 from adapters.errors import UsageError
 from adapters.files.run_folder import COLUMNS, Outcome, RunFolder, place_stage
 
-ROOT = Path(__file__).parents[2]
-
 
 def finish(folder: RunFolder, name: str, first: int, last: int, **more: Any) -> Path:
     """A finished stage with the files a run goes on from, and one it does not need."""
@@ -252,16 +250,3 @@ def test_shared_start(run: RunFolder, tmp_path: Path) -> None:
     other.path.mkdir()
     other.share_start(run, 4)
     assert other.stage_names() == ["preparation"]
-
-
-# --- manifest, lock, disk -------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("content", [None, b"", b"{", b"[]", b"null", b'{"scene": {}}', b"\xff"])
-def test_no_run_folder(tmp_path: Path, content: bytes | None) -> None:
-    """A folder without a whole manifest is named, with what to do."""
-    if content is not None:
-        (tmp_path / "manifest.json").write_bytes(content)
-    with pytest.raises(UsageError, match="not a run folder") as caught:
-        RunFolder(tmp_path).manifest()
-    assert caught.value.where == str(tmp_path)

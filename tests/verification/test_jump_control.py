@@ -239,17 +239,20 @@ def test_a_state_that_drifts_limits_the_jump() -> None:
 # --- verdicts -------------------------------------------------------------------------------
 
 
-def jumped(control: Control, decision: Decision, after: Stretch) -> float:
-    """Settlement at the end of the cycles behind a jump, healing ones first."""
-    return control.settlement + decision.moved + float(after.gain.sum())
+def jumped(rate: float = 1e-6) -> tuple[Control, Decision, Stretch, float]:
+    """A jump on a logarithm, the cycles behind it at such a rate, and the settlement at their end.
+
+    Healing cycles come first.
+    """
+    control = known(of_law(50, 20, 0.0))
+    decision = decide(control, SETTINGS)
+    after = of_law(70 + decision.jump, 25, 0.0, rate)
+    return control, decision, after, control.settlement + decision.moved + float(after.gain.sum())
 
 
 def test_a_jump_that_went_as_forecast_stands() -> None:
     """Log before and behind: no error but the law's, and the next jump may be longer."""
-    control = known(of_law(50, 20, 0.0))
-    decision = decide(control, SETTINGS)
-    after = of_law(70 + decision.jump, 25, 0.0)
-    settlement = jumped(control, decision, after)
+    control, decision, after, settlement = jumped()
     check = judge(control, decision, SETTINGS, after, settlement)
     assert check.accepted
     assert not check.changed
@@ -262,10 +265,7 @@ def test_a_jump_that_went_as_forecast_stands() -> None:
 
 def test_a_rate_that_changed_is_seen_and_the_past_forgotten() -> None:
     """Ten times the rate behind the jump: 0.5 h dv off, taken back where that exceeds 2 tol."""
-    control = known(of_law(50, 20, 0.0))
-    decision = decide(control, SETTINGS)
-    after = of_law(70 + decision.jump, 25, 0.0, rate=1e-5)
-    settlement = jumped(control, decision, after)
+    control, decision, after, settlement = jumped(rate=1e-5)
     check = judge(control, decision, SETTINGS, after, settlement)
     assert check.changed
     assert not check.accepted
@@ -300,10 +300,7 @@ def test_deviations_to_one_side_are_summed() -> None:
 
 def test_a_sum_that_rings_forgets_the_past_and_begins_again() -> None:
     """A rate 1.2 times the forecast: no change alone; with 2.9 summed before, one."""
-    control = known(of_law(50, 20, 0.0))
-    decision = decide(control, SETTINGS)
-    after = of_law(70 + decision.jump, 25, 0.0, rate=1.2e-6)
-    settlement = jumped(control, decision, after)
+    control, decision, after, settlement = jumped(rate=1.2e-6)
     check = judge(control, decision, SETTINGS, after, settlement)
     assert not check.changed
     assert 0 < check.drift[0] == pytest.approx(check.deviation - ALLOWANCE)
@@ -321,10 +318,8 @@ def test_a_sum_that_rings_forgets_the_past_and_begins_again() -> None:
 
 def test_a_shock_behind_the_jump_counts_as_its_error() -> None:
     """The bed drops by 5 % of its total in the healing cycles: the realised error is that."""
-    control = known(of_law(50, 20, 0.0))
-    decision = decide(control, SETTINGS)
-    after = of_law(70 + decision.jump, 25, 0.0)
-    settlement = jumped(control, decision, after) + 0.05 * control.settlement
+    control, decision, after, settlement = jumped()
+    settlement += 0.05 * control.settlement
     check = judge(control, decision, SETTINGS, after, settlement)
     total = settlement - float(after.part(5, 25).gain.sum())
     assert check.error == pytest.approx(0.05 * control.settlement / total, rel=0.1)

@@ -27,11 +27,6 @@ def hold(checks: list[Check]) -> None:
     assert all(check.holds for check in checks), "\n".join(failing)
 
 
-def failing(checks: list[Check]) -> list[str]:
-    """Names of the checks that do not hold."""
-    return [check.name for check in checks if not check.holds]
-
-
 # --- shapes ----------------------------------------------------------------------------------
 
 

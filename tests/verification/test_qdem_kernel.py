@@ -27,7 +27,6 @@ from tests.qdem_reference_forces import Elements
 from validation.bench.qdem.meshes import delaunay_mesh
 
 LAWS: tuple[Strain, ...] = get_args(Strain)
-LAW = pytest.mark.parametrize("law", LAWS)
 PRECISION = pytest.mark.parametrize("precision", ["float64", "float32"])
 VISCOUS = pytest.mark.parametrize("viscous", [False, True], ids=["elastic", "viscous"])
 KERNELS = [

@@ -36,7 +36,6 @@ Floats = NDArray[np.float64]
 STONE = q.Material(30e9, 0.2, 2700.0)
 SIDE, RADIUS = 0.03, 0.006
 BRICK = (0.02, 0.03, 0.05)
-EPS = float(np.finfo(float).eps)
 FAR = q.SphereContact(RADIUS, 1.0, 0.0, skin=1.0)
 """Of bodies that meet nothing: the same compiled loop serves all tests."""
 
@@ -603,6 +602,3 @@ def test_a_scene_names_its_rigid_bodies(tmp_path: Path, capsys: pytest.CaptureFi
     file.write_text(hinge, encoding="utf-8")
     with pytest.raises(SceneError, match=r"body.0: what is held leaves the rigid body a motion"):
         make_simulation(load_scene(file))
-    file.write_text(alone, encoding="utf-8")
-    with pytest.raises(ConditionError, match="double precision"):
-        make_simulation(load_scene(file, ['simulation.precision="float32"']))

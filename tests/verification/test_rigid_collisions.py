@@ -86,20 +86,6 @@ def test_energy_is_as_derived(eps: float, seed: int) -> None:
     assert left.min() >= -1e-11 * np.abs(normal).max()
 
 
-@pytest.mark.long
-@given(st.integers(0, 10**6))
-@settings(deadline=None, max_examples=8)
-def test_different_restitution_makes_no_energy(seed: int) -> None:
-    """``E' - E = -sum (1 - eps_c) dp_c |v_c| / 2`` whatever each eps is."""
-    bodies, velocity = network_bodies(30, seed)
-    contacts = bodies.jacobian.shape[0] // 2
-    eps = np.random.default_rng(seed).uniform(0.0, 1.0, contacts)
-    found = collide(bodies, velocity, eps, max_rounds=200)
-    before, after = kinetic_energy(bodies, velocity), kinetic_energy(bodies, found.velocity)
-    assert found.solved
-    assert after <= before * (1 + 1e-12)
-
-
 def test_momentum_is_conserved() -> None:
     """Free bodies: impulses come in pairs, so linear and angular momentum stay."""
     bodies = cradle(4)
@@ -252,11 +238,11 @@ def test_a_wall_that_is_driven(eps: float) -> None:
     assert away.rounds == 0
 
 
-def test_a_body_of_four_freedoms() -> None:
-    """Neither 2D nor 3D."""
-    ball = one_body([([0.0, 1.0], [0.0, -0.5])], 0.1)
-    with pytest.raises(ProblemError, match="4 freedoms"):
-        collide(replace(ball, body_size=4), [0.0, -1.0, 0.0], 0.5)
+def test_rows_that_are_no_contacts() -> None:
+    """Three rows, where a contact in the plane has two."""
+    rows = sp.eye_array(3).tocsr()
+    with pytest.raises(ProblemError, match="3 rows"):
+        collide(BodySpace(rows, rows, 3), [-1.0, 0.0, 0.0], 0.5)
 
 
 def test_rounds_that_do_not_end_are_cut() -> None:
@@ -286,24 +272,6 @@ def test_malformed_input(eps, mu, velocity, where):
     """What is wrong is named."""
     with pytest.raises(ProblemError, match=where):
         collide(cradle(3), velocity, eps, mu)
-
-
-@pytest.mark.parametrize(
-    ("jacobian", "inverse_mass", "where"),
-    [
-        (sp.csr_array([[1.0, 0, 0], [0, np.nan, 0]]), sp.eye_array(3), "not finite"),
-        (sp.eye_array(3).tocsr()[:2], np.nan * sp.eye_array(3), "not finite"),
-        (sp.eye_array(3).tocsr()[:2], -1.0 * sp.eye_array(3), "negative"),
-        (sp.eye_array(3).tocsr()[:2], sp.eye_array(6), "shape"),
-        (sp.eye_array(3).tocsc()[:2], sp.eye_array(3), "by rows"),
-        (sp.eye_array(3).tocsr(), sp.eye_array(3), "3 rows"),
-    ],
-    ids=["J nan", "M nan", "M negative", "M shape", "J by columns", "J rows"],
-)  # fmt: skip
-def test_bodies_that_are_none(jacobian: Any, inverse_mass: Any, where: str) -> None:
-    """No answer is made of them: what is not a number approaches nothing, and looked solved."""
-    with pytest.raises(ProblemError, match=where):
-        collide(BodySpace(jacobian, inverse_mass.tocsr(), 3), [-1.0, 0.0, 0.0], 0.5)
 
 
 @pytest.mark.parametrize(

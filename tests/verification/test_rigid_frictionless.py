@@ -24,8 +24,6 @@ from rigid_lcp.friction.sweeps.normal_matrices import normal_sweeps
 from tests.rigid_networks import network, network_bodies, stored, tower
 from validation.bench.rigid.packings import packing
 
-TOLERANCE = 1e-12
-
 
 def enumerated(a: Floats, b: Floats) -> Floats:
     """The accelerations of eq. 19 by trying all 2^n sets of contacts that carry."""

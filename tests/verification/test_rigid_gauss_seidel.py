@@ -130,14 +130,6 @@ def test_contacts_without_a_solution_are_counted() -> None:
     assert np.isfinite(found.r).all()
 
 
-def test_no_contacts_and_no_forces() -> None:
-    empty = friction_problem(np.zeros((0, 0)), [], 0.3, 3)
-    assert gauss_seidel(empty).solved
-    parting = friction_problem(np.eye(3), [1.0, 5.0, -2.0], 0.3, 3)
-    assert gauss_seidel(parting).solved
-    assert not gauss_seidel(parting).r.any()
-
-
 def test_factors_that_are_none_of_pairs_fall_back_to_the_matrix() -> None:
     """A joint of three bodies, a mass that couples bodies: solved by the rows of W."""
     jacobian = np.random.default_rng(1).normal(size=(4, 9))
