@@ -27,9 +27,3 @@ CITATIONS = (
 }"""),
 )  # fmt: skip
 """Pairs (what it is cited for, BibTeX entry)."""
-
-
-def format_citations(version: str) -> str:
-    """All entries, each under a comment saying what it is cited for."""
-    entries = "\n\n".join(f"% {purpose}\n{entry}" for purpose, entry in CITATIONS)
-    return entries.replace("VERSION", version)

@@ -59,16 +59,15 @@ class JumpRefused(NotCredible):
         self,
         what: str,
         *,
-        where: str = "",
-        remedy: str = "",
         law: str = "auto",
         regime: str = "",
         parameters: dict[str, float] | None = None,
         laws: dict[str, dict[str, object]] | None = None,
+        **place: str,
     ) -> None:
         self.law, self.regime = law, regime
         self.parameters, self.laws = parameters or {}, laws or {}
-        super().__init__(what, where=where, remedy=remedy)
+        super().__init__(what, **place)
 
     def to_json(self, unit: str) -> dict[str, object]:
         """The keys of ``trackbed fit --json``, without a prediction; ``unit`` of the series."""

@@ -15,6 +15,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from errno import EINVAL
+from functools import partial
 from importlib import import_module
 from math import isfinite
 from pathlib import Path
@@ -111,7 +112,8 @@ class Table:
         """The cells with decimal points and without marks for thousands."""
         every = "".join(map("".join, columns))
         if any(mark in every for mark in MARKS):
-            columns = [[GROUPS.sub(_join_groups, cell.strip()) for cell in one] for one in columns]
+            plain = partial(GROUPS.sub, lambda it: re.sub(r"[^\d+-]", "", it[1]) + it[2])
+            columns = [[plain(cell.strip()) for cell in one] for one in columns]
         if "," not in every:
             return columns
         both = next((c for cells in columns for c in cells if "," in c and "." in c), "")
@@ -235,10 +237,6 @@ def _list_names(title: str, split: str) -> set[str]:
     """Names that a column answers to: its title, with and without its unit."""
     bracketed = BRACKETED.fullmatch(title)
     return {title.lower(), split, *([bracketed[1].lower()] if bracketed else [])}
-
-
-def _join_groups(found: re.Match[str]) -> str:
-    return re.sub(r"[^\d+-]", "", found[1]) + found[2]
 
 
 def _decode_text(data: bytes) -> str:

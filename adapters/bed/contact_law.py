@@ -12,17 +12,8 @@ For k we take the tangent stiffness S_n = dF_n/d delta = 2 E* sqrt(R* delta).
 
 LIGGGHTS uses c = 2 sqrt(5/6) alpha sqrt(m* S_n), smaller by `DAMPING_FACTOR` = 0.913, with alpha
 from its restitution.  The factor makes e = exp(-pi alpha/sqrt(1 - alpha^2)) exact at every speed:
-in x = delta^(5/4) the damped Hertz contact is a linear oscillator of damping ratio alpha.  So:
-
-* alpha of a scene, handed over as e = `restitution_of_alpha(alpha)`, gives the restitution that the
-  paper connects with alpha, and 0.913 of a literal eq. 7's damping (e = 0.2145 for alpha = 0.44);
-* `restitution_literal(alpha)` gives the damping of a literal eq. 7 (e = 0.1776 for alpha = 0.44).
-
-Both end the collision at delta = 0, so a parting contact pulls for an instant, as in eq. 7.  An
-engine that ends it when the force turns to tension (LIGGGHTS' ``limitForce on``) rebounds faster,
-e = 0.335 for alpha = 0.44: `collision` integrates both.  In LIGGGHTS the same alpha damps the
-tangent, and only while it sticks.  Its F_t = k_t delta_t follows k_t down when F_n decreases, as in
-the paper, but also up when F_n increases, which creates energy: docs/contact-law.md.
+in x = delta^(5/4) the damped Hertz contact is a linear oscillator of damping ratio alpha.
+docs/contact-law.md compares the engines' laws term by term.
 """
 
 from __future__ import annotations

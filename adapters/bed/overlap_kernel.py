@@ -18,38 +18,8 @@ _COINCIDENT = 1e-9
 """Centres nearer than this share of the radii have no direction: one is made up."""
 
 
-@njit(cache=True)
-def wall_contact(
-    x: FloatArray,
-    radius: float,
-    point: FloatArray,
-    plane_normal: FloatArray,
-    reach: float,
-    behind: bool,
-    normal: FloatArray,
-) -> float:
-    """Overlap [m] of a grain at ``x`` with one plane; fills ``normal``, its direction at the grain.
-
-    A plane that ends at ``reach`` [m] from the z axis is a thin disc: grains that started
-    ``behind`` it stay behind it, and beyond its rim the nearest point of the rim counts.
-    """
-    height = 0.0
-    for a in range(3):
-        height += (x[a] - point[a]) * plane_normal[a]
-    if reach == np.inf:
-        normal[:] = plane_normal
-        return radius - height
-    from_axis = np.hypot(x[0], x[1])
-    beyond = from_axis - reach
-    if beyond <= 0.0:
-        side = -1.0 if behind else 1.0
-        normal[:] = side * plane_normal
-        return radius - side * height
-    distance = np.hypot(beyond, height)
-    for a in range(3):
-        outward = x[a] / from_axis if a < 2 else 0.0
-        normal[a] = (beyond * outward + height * plane_normal[a]) / distance
-    return radius - distance
+Geometry = tuple[FloatArray, FloatArray, FloatArray, float]
+"""Of `adapters.bed.container.Walls`."""
 
 
 @njit(cache=True)
@@ -65,37 +35,53 @@ def cylinder_contact(x: FloatArray, radius: float, cylinder: float, normal: Floa
 
 
 @njit(cache=True)
+def wall_contact(
+    x: FloatArray, radius: float, wall: int, walls: Geometry, behind: BoolArray, normal: FloatArray
+) -> float:
+    """Overlap [m] of a grain at ``x`` with a wall; fills ``normal``, its direction at the grain.
+
+    A plane that ends at a reach [m] from the z axis is a thin disc: grains that started
+    ``behind`` it (p,) stay behind it, and beyond its rim the nearest point of the rim counts.
+    """
+    points, normals, reaches, cylinder = walls
+    if wall == len(reaches):
+        return cylinder_contact(x, radius, cylinder, normal)
+    point, plane_normal, reach = points[wall], normals[wall], reaches[wall]
+    height = 0.0
+    for a in range(3):
+        height += (x[a] - point[a]) * plane_normal[a]
+    if reach == np.inf:
+        normal[:] = plane_normal
+        return radius - height
+    from_axis = np.hypot(x[0], x[1])
+    beyond = from_axis - reach
+    if beyond <= 0.0:
+        side = -1.0 if behind[wall] else 1.0
+        normal[:] = side * plane_normal
+        return radius - side * height
+    distance = np.hypot(beyond, height)
+    for a in range(3):
+        outward = x[a] / from_axis if a < 2 else 0.0
+        normal[a] = (beyond * outward + height * plane_normal[a]) / distance
+    return radius - distance
+
+
+@njit(cache=True)
 def fill_rows(
     position: FloatArray,
     radius: FloatArray,
     first: IntArray,
     second: IntArray,
-    plane_point: FloatArray,
-    plane_normal: FloatArray,
-    plane_reach: FloatArray,
-    cylinder: float,
+    walls: Geometry,
     behind: BoolArray,
     normal: FloatArray,
     overlap: FloatArray,
 ) -> None:
     """Fill ``normal`` (m, 3) and ``overlap`` [m] (m,) of all rows; ``behind`` is (n, p)."""
-    planes = len(plane_reach)
     for c in range(len(first)):
         i, j = first[c], second[c]
         if j < 0:
-            wall = -1 - j
-            if wall < planes:
-                overlap[c] = wall_contact(
-                    position[i],
-                    radius[i],
-                    plane_point[wall],
-                    plane_normal[wall],
-                    plane_reach[wall],
-                    behind[i, wall],
-                    normal[c],
-                )
-            else:
-                overlap[c] = cylinder_contact(position[i], radius[i], cylinder, normal[c])
+            overlap[c] = wall_contact(position[i], radius[i], -1 - j, walls, behind[i], normal[c])
             continue
         square = 0.0
         for a in range(3):
@@ -118,37 +104,17 @@ def fill_rows(
 
 @njit(cache=True)
 def find_wall_rows(
-    position: FloatArray,
-    radius: FloatArray,
-    plane_point: FloatArray,
-    plane_normal: FloatArray,
-    plane_reach: FloatArray,
-    cylinder: float,
-    behind: BoolArray,
-    gap: float,
+    position: FloatArray, radius: FloatArray, walls: Geometry, behind: BoolArray, gap: float
 ) -> tuple[IntArray, IntArray]:
     """``first`` and ``second`` of all grains nearer than ``gap`` [m] to a wall."""
-    planes = len(plane_reach)
-    walls = planes + (1 if cylinder < np.inf else 0)
-    first = np.empty(len(radius) * walls, np.int64)
-    second = np.empty(len(radius) * walls, np.int64)
+    count = len(walls[2]) + (1 if walls[3] < np.inf else 0)
+    first = np.empty(len(radius) * count, np.int64)
+    second = np.empty(len(radius) * count, np.int64)
     normal = np.empty(3)
     m = 0
     for i in range(len(radius)):
-        for wall in range(walls):
-            if wall < planes:
-                overlap = wall_contact(
-                    position[i],
-                    radius[i],
-                    plane_point[wall],
-                    plane_normal[wall],
-                    plane_reach[wall],
-                    behind[i, wall],
-                    normal,
-                )
-            else:
-                overlap = cylinder_contact(position[i], radius[i], cylinder, normal)
-            if overlap > -gap:
+        for wall in range(count):
+            if wall_contact(position[i], radius[i], wall, walls, behind[i], normal) > -gap:
                 first[m], second[m] = i, -1 - wall
                 m += 1
     return first[:m].copy(), second[:m].copy()

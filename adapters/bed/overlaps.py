@@ -98,7 +98,7 @@ def list_wall_rows(
     """``first`` and ``second`` of all grains nearer than ``gap`` [m] to a wall."""
     from adapters.bed.overlap_kernel import find_wall_rows  # loads the compiler
 
-    first, second = find_wall_rows(position, radius, *walls.geometry, behind, gap)
+    first, second = find_wall_rows(position, radius, walls.geometry, behind, gap)
     return first, second
 
 
@@ -114,7 +114,7 @@ def measure_rows(
     from adapters.bed.overlap_kernel import fill_rows  # loads the compiler
 
     normal, overlap = np.empty((len(first), 3)), np.empty(len(first))
-    fill_rows(position, radius, first, second, *walls.geometry, behind, normal, overlap)
+    fill_rows(position, radius, first, second, walls.geometry, behind, normal, overlap)
     return Neighbours(first, second, normal, overlap)
 
 

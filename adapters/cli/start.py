@@ -19,8 +19,7 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
     elif verb == "new":
         parser.add_argument("name", metavar="NAME", help="; ".join(list_scenes()))
         parser.add_argument("folder", metavar="FOLDER", type=Path, help="made when it is not there")
-    commands = {"doctor": run_doctor, "new": run_new, "cite": run_cite}
-    parser.set_defaults(command=commands[verb])
+    parser.set_defaults(command={"doctor": run_doctor, "new": run_new, "cite": run_cite}[verb])
 
 
 def run_doctor(arguments: argparse.Namespace) -> int:
@@ -68,9 +67,10 @@ def run_new(arguments: argparse.Namespace) -> int:
 
 
 def run_cite(arguments: argparse.Namespace) -> int:
-    """Print BibTeX entries."""
-    from adapters.citations import format_citations
+    """Print BibTeX entries, each under a comment saying what it is cited for."""
+    from adapters.citations import CITATIONS
     from trackbed import __version__
 
-    print(format_citations(__version__))
+    entries = "\n\n".join(f"% {purpose}\n{entry}" for purpose, entry in CITATIONS)
+    print(entries.replace("VERSION", __version__))
     return 0

@@ -15,7 +15,7 @@ Its exit code proves nothing: `adapters.procedure.checks` judges what it left.
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -155,11 +155,9 @@ def find_engine() -> Engine:
     """The first of `list_real_engines` that is installed; raises `EngineMissing` when none is."""
     for name in list_real_engines():
         engine = get_engine(name)
-        try:
+        with suppress(EngineMissing):
             engine.version()
-        except EngineMissing:
-            continue
-        return engine
+            return engine
     raise EngineMissing("no engine is installed, so nothing can be run", remedy=ENGINE_REMEDY)
 
 

@@ -112,8 +112,7 @@ class LammpsEngine(DeckEngine):
     def complete(self, scene: Scene, folder: Path) -> None:
         """Write the contacts as every engine does; see `ProcessEngine.complete`."""
         super().complete(scene, folder)
-        frames = lammps_decks.convert_contact_frames(scene, folder)
-        write_dump(folder / "contacts.dump", frames)
+        write_dump(folder / "contacts.dump", lammps_decks.convert_contact_frames(scene, folder))
         (folder / "pairs.dump").unlink()
 
 

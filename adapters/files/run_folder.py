@@ -15,7 +15,7 @@ import re
 import shutil
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -93,11 +93,9 @@ class RunFolder:
         """Of stages read before: identities of their files, whether their digests were looked at,
         outcome, and rows of the table."""
 
-    @contextmanager
-    def locked(self) -> Iterator[None]:
+    def locked(self) -> AbstractContextManager[object]:
         """Hold the folder's only writer's lock; see `trackbed.run_files.lock_folder`."""
-        with lock_folder(self.path, "lock"):
-            yield
+        return lock_folder(self.path, "lock")
 
     def event(self, what: str, **details: object) -> None:
         """Append one line to ``events.jsonl``."""
@@ -118,10 +116,8 @@ class RunFolder:
         text = path.read_text(encoding="utf-8", errors="replace") if path.exists() else ""
         events = []
         for line in text.splitlines():
-            try:
+            with suppress(json.JSONDecodeError):
                 events.append(json.loads(line))
-            except json.JSONDecodeError:
-                continue
         return events
 
     def outcome(self, name: str, *, verify: bool = True) -> Outcome | None:
@@ -150,7 +146,8 @@ class RunFolder:
         if not whole:
             self._known.pop(name, None)
             return None
-        rows = [",".join(_cell(row.get(column)) for column in COLUMNS) for row in outcome.rows]
+        cells = ([row.get(column) for column in COLUMNS] for row in outcome.rows)
+        rows = (",".join("" if cell is None else str(cell) for cell in row) for row in cells)
         self._known[name] = files, verify, outcome, "".join(f"{row}\n" for row in rows)
         return outcome
 
@@ -316,12 +313,6 @@ def _link(source: str, target: str) -> None:
         os.link(source, target)
     except OSError:  # another file system, or one without hard links
         shutil.copy2(source, target)
-
-
-def _cell(value: object) -> str:
-    if value is None:
-        return ""
-    return repr(value) if isinstance(value, float) else str(value)
 
 
 @contextmanager

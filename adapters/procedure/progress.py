@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 import time
-from typing import TextIO
 
 
 class Progress:
@@ -14,9 +13,8 @@ class Progress:
     report gives the ratio of CPU times.
     """
 
-    def __init__(self, stream: TextIO | None = None, quiet: bool = False) -> None:
-        self.stream = sys.stderr if stream is None else stream
-        self.quiet = quiet
+    def __init__(self, quiet: bool = False) -> None:
+        self.stream, self.quiet = sys.stderr, quiet
         self.terminal = self.stream.isatty()
         self._printed = 0.0
         self._first: tuple[float, int] | None = None

@@ -125,18 +125,14 @@ class Bed:
     """First cycles of that window to keep out of the fit."""
 
 
-def prepare(run: Run, start: tuple[FloatArray, float] | None = None) -> Bed:
-    """Rain of grains under gravity until equilibrium (section 2.3).
-
-    ``start``: centres of the grains [m], shape (n, 3), and the height that they fill [m], instead
-    of the scene's random ones.
-    """
+def prepare(run: Run) -> Bed:
+    """Rain of grains under gravity until equilibrium (section 2.3)."""
     scene, name = run.scene, "preparation"
     if run.folder.outcome(name) is None:
         sample = scene.sample
         run.progress.say(f"rain of {scene.grain_count} grains")
         radius = sample_radii(sample.grain_radius.law, scene.grain_count, sample.seed)
-        position, height = start or draw_sample_start(
+        position, height = draw_sample_start(
             radius, scene.container, sample.relative_density_start, sample.seed
         )
         folder = _begin(run, name)

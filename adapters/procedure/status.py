@@ -6,7 +6,6 @@ import shlex
 from dataclasses import dataclass
 from math import isfinite, nan
 from pathlib import Path
-from typing import Any
 
 from adapters.jumps import BAND_PROBABILITY
 from adapters.procedure.history import History, sum_cost
@@ -68,10 +67,11 @@ def judge_progress(record: Record) -> Status:
     procedure = record.scene.procedure if record.scene.loading is not None else None
     verb = {"running": "status", "stopped": "resume", "finished": "report"}[state]
     last = record.run.events[-1] if record.run.events else {}
+    stopped = state == "stopped" == last.get("event")  # a run that was killed left no reason
     return Status(
         run_folder=str(run_folder),
         state=state,
-        why=_why(last) if state == "stopped" else "",
+        why=str(last.get("why", "")).partition("\n")[0] if stopped else "",
         cycle=cycle,
         total_cycles=procedure.total_cycles if procedure is not None else 0,
         cycles_computed=computed,
@@ -126,12 +126,6 @@ def compare_with_full(own: History, full: History, cycle: int) -> str:
 
 def _millimetres(length: float) -> str:
     return f"{1e3 * length:#.3g} mm"
-
-
-def _why(event: dict[str, Any]) -> str:
-    """The first line of a stop's reason; empty when the run was killed and left none."""
-    words = str(event.get("why", "")) if event.get("event") == "stopped" else ""
-    return words.partition("\n")[0]
 
 
 def _cycle(track: Track) -> int:

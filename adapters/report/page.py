@@ -99,9 +99,12 @@ def _claim(record: Record, numbers: Numbers) -> Iterator[str]:
     if not numbers.finished:
         begun = f"Unfinished, at cycle {numbers.cycle} of {numbers.total_cycles}: {begun}"
     if row is None or full is None:
+        why = "there is no full run beside it (<code>trackbed run … --control</code> adds it)"
+        if record.manifest.get("control"):
+            why = "the full run beside it is not past the first jump yet"
         claim = (
             f"{begun}, computing {numbers.cycles_computed} of them. The error is unknown: "
-            f"{explain_unknown(record)}. Counted in cycles, the speed-up is at most "
+            f"{why}. Counted in cycles, the speed-up is at most "
             f"{plain(numbers.speed_up_of_cycles, '.2f')}."
         )
     else:
@@ -120,13 +123,6 @@ def _claim(record: Record, numbers: Numbers) -> Iterator[str]:
     if numbers.fails:
         fails = bullets(escape(sentence) + "." for sentence in numbers.fails)
         yield f'<div class="fails"><p>Where it fails:</p>{fails}</div>'
-
-
-def explain_unknown(record: Record) -> str:
-    """Why the error is unknown."""
-    if record.manifest.get("control"):
-        return "the full run beside it is not past the first jump yet"
-    return "there is no full run beside it (<code>trackbed run … --control</code> adds it)"
 
 
 def _settlement(numbers: Numbers, figure: Path | None) -> str:

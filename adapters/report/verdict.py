@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from math import nan
 from typing import Any
 
@@ -49,19 +49,15 @@ def split_cost(record: Record, track: Track) -> dict[str, Any]:
     }
     python = sum(parts[purpose] for purpose in ("parse", "fit", "relax", "other"))
     failed = sum(jump.lost_s for jump in track.failed_jumps)
-    total = parts["engine"] + python + failed
     # The engine's count of time steps goes on through jumps.
     ends = [o.notes["time_step"] for o in track.outcomes if o.stage in ("preparation", "window")]
     return dict(
         name=PROCEDURE if track is record.run else FULL,
         engine=parts["engine"] - parts["start_up"],
-        start_up=parts["start_up"],
-        parse=parts["parse"],
-        fit=parts["fit"],
-        relax=parts["relax"],
+        **{purpose: parts[purpose] for purpose in ("start_up", "parse", "fit", "relax")},
         other_python=parts["other"],
         failed_jumps=failed,
-        total=total,
+        total=parts["engine"] + python + failed,
         preparation=nan if track.preparation is None else sum_cost(track.preparation.cost),
         cycles_computed=sum(o.last_cycle - o.first_cycle for o in loading if o.stage == "window"),
         grain_steps=float(record.scene.grain_count * (ends[-1] - ends[0])) if ends else 0.0,
@@ -98,7 +94,7 @@ def list_fails(
         ),
         ("piston's rms force error in its worst cycle after three", force, FORCE_ERROR_GOAL),
     ):
-        worst = find_greatest(values)
+        worst = np.nanmax(np.abs([0.0, *values]))
         if worst > bar:
             yield f"{name} is {100 * worst:.1f} %, above {100 * bar:.0f} %"
     if record.run.failed_jumps:
@@ -108,11 +104,6 @@ def list_fails(
             f"a bed of {record.scene.grain_count} grains settles in bursts: it shows the machinery "
             "and cannot judge a law"
         )
-
-
-def find_greatest(values: Iterable[float]) -> float:
-    """The greatest size of known values; 0 for none."""
-    return float(np.nanmax(np.abs([0.0, *values])))
 
 
 def _beaten(rows: dict[str, Comparison]) -> Iterator[str]:

@@ -7,6 +7,7 @@ itself, so that one wrong key never hides what is wrong elsewhere.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -163,21 +164,20 @@ def _choice(
 
 
 def _engine(scene: Values) -> Iterator[Problem]:
-    yield from _choice(
-        scene, "engine.name", "engine", ("auto", *find_choices(ENGINES, "ENGINE")), {}
-    )
+    known = ("auto", *find_choices(ENGINES, "ENGINE"))
+    return _choice(scene, "engine.name", "engine", known, {})
 
 
 def _law(scene: Values) -> Iterator[Problem]:
     from adapters.laws import RETIRED, list_laws
 
-    yield from _choice(scene, "procedure.law", "law", list_laws(), RETIRED)
+    return _choice(scene, "procedure.law", "law", list_laws(), RETIRED)
 
 
 def _move(scene: Values) -> Iterator[Problem]:
     from adapters.moves import RETIRED, list_moves
 
-    yield from _choice(scene, "procedure.move", "way", list_moves(), RETIRED)
+    return _choice(scene, "procedure.move", "way", list_moves(), RETIRED)
 
 
 def _relaxation(scene: Values) -> Iterator[Problem]:
@@ -211,8 +211,6 @@ def find_warnings(values: Mapping[str, Any]) -> list[Problem]:
 def _found(checks: Iterable[Check], scene: Values) -> list[Problem]:
     problems: list[Problem] = []
     for check in checks:
-        try:
+        with suppress(NotValid):
             problems.extend(check(scene))
-        except NotValid:
-            continue
     return problems

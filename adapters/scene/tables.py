@@ -49,10 +49,6 @@ ViscousAlpha = Annotated[
 Count = Annotated[int, Field(ge=1, le=COUNT_GREATEST)]
 
 
-def _as_schedule(value: object) -> object:
-    return [value] if isinstance(value, int) and not isinstance(value, bool) else value
-
-
 class GrainRadius(Table):
     """Distribution of the grains' radii."""
 
@@ -180,7 +176,7 @@ class Procedure(Table):
     h: (
         Annotated[
             tuple[Annotated[int, Field(ge=0)], ...],
-            BeforeValidator(_as_schedule),
+            BeforeValidator(lambda value: [value] if type(value) is int else value),
             Field(strict=False, min_length=1),
         ]
         | None

@@ -9,7 +9,7 @@ import time
 import warnings
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any
 
 from trackbed.run_files import add_run_arguments, place_run, refuse_both
 
@@ -92,14 +92,7 @@ def _run(prepared: Prepared, path: Path, arguments: argparse.Namespace) -> dict[
     return summary | {"folder": str(path)}
 
 
-def _warning_show(
-    message: Warning | str,
-    category: type[Warning],
-    filename: str,
-    lineno: int,
-    file: TextIO | None = None,
-    line: str | None = None,
-) -> None:
+def _warning_show(message: Warning | str, *_args: Any, **_options: Any) -> None:
     """A warning as a sentence, without the line of code it comes from."""
     print(f"warning: {message}", file=sys.stderr, flush=True)
 
@@ -150,7 +143,7 @@ def _outlook(prepared: Prepared) -> dict[str, Any]:
 def _seconds_a_step(run: Any, most: int) -> float:
     """Time of one step on the clock [s], from a few steps; the first ones compile."""
     run.advance(run.step)
-    steps, spent = 1, 0.0
+    steps = 1
     while True:
         started = time.perf_counter()
         run.advance(steps * run.step)

@@ -85,7 +85,7 @@ def make_grains(
     if count < 1 or seed < 0:
         raise MeshError(
             f"{count} grains of seed {seed}",
-            where="grains_make",
+            where="make_grains",
             remedy="use a seed of 0 or more, and 1 grain or more",
         )
     sizes = draw_sizes(grading, count, np.random.default_rng([seed, count]))
@@ -119,7 +119,7 @@ def save_grains(path: str | os.PathLike[str], grains: GrainSet) -> None:
 def load_grains(path: str | os.PathLike[str]) -> GrainSet:
     """Read what `save_grains` wrote, to the last digit; raises `MeshError` for another file."""
     where = f"grains {os.fspath(path)!r}"
-    remedy = "give a file that grains_save or trackbed grains wrote"
+    remedy = "give a file that save_grains or trackbed grains wrote"
     try:
         with open(path, "rb") as stream, np.load(stream, allow_pickle=False) as file:
             number = int(file["format"])

@@ -7,9 +7,8 @@ from qdem_fem.march.kinetic_damping import Damping, Rest, find_rest
 from qdem_fem.march.options import Contact
 from qdem_fem.march.rigid_motions import check_held
 from qdem_fem.march.simulation import History, Simulation
-from qdem_fem.march.state import State
 
 __all__ = [
-    "Contact", "Damping", "Energy", "History", "Rest", "Simulation", "State", "StaticAnswer",
+    "Contact", "Damping", "Energy", "History", "Rest", "Simulation", "StaticAnswer",
     "check_held", "find_rest", "read_checkpoint", "write_checkpoint",
 ]  # fmt: skip

@@ -141,7 +141,8 @@ class Simulation(ConditionedBodies):
         ends = np.cumsum([len(nodes) for nodes in chosen.values()])
         parts = zip(chosen, np.split(samples.record, ends, axis=1), strict=False)
         values = {name: part.mean(axis=1) for name, part in parts}
-        return History(samples.step_numbers * self.step, values)
+        numbers = samples.first_step + samples.stride * np.arange(len(samples.record), dtype=float)
+        return History(numbers * self.step, values)
 
     def relax(self, tolerance: float = 1e-8, max_steps: int = 100_000) -> StaticAnswer:
         """Bring deformable bodies to rest in equilibrium with the loads of the present time.

@@ -90,11 +90,6 @@ class Samples:
         self.record = np.zeros((count, nodes, 3))
         """(samples, nodes, 3) [m]"""
 
-    @property
-    def step_numbers(self) -> Floats:
-        """(samples,)"""
-        return self.first_step + self.stride * np.arange(len(self.record), dtype=float)
-
     def probes(self, node_at: Integers, steps_done: int) -> Probes:
         """What the kernel writes from step ``steps_done`` on: the samples after it."""
         taken = max(0, (steps_done - self.first_step) // self.stride + 1)

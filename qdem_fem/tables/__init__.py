@@ -9,7 +9,6 @@ from qdem_fem.tables.keys import (
     Nodes,
     Output,
     Periodic,
-    Probe,
     Scene,
     SeriesTable,
     SimulationTable,
@@ -28,7 +27,7 @@ from qdem_fem.tables.types import Cells, Share, WrongKey
 
 __all__ = [
     "BodyTable", "Cells", "Condition", "ContactTable", "MaterialTable", "Mesh", "Nodes",
-    "Output", "Periodic", "PeriodicTable", "Prepared", "Probe", "Scene", "SeriesTable", "Share",
+    "Output", "Periodic", "PeriodicTable", "Prepared", "Scene", "SeriesTable", "Share",
     "SimulationTable", "Step", "WrongKey", "choose_contact", "find_contact_faults",
     "find_named_nodes", "find_output_faults", "list_named_files", "list_tables",
     "make_body_mesh", "make_series", "make_unit_vector", "read_tables",

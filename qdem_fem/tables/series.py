@@ -30,10 +30,8 @@ def make_series(
         if isinstance(table.value, str) or table.value is None or table.ramp is None:
             raise WrongKey(f"{key}.value", "a ramp needs a value in SI units")
         found = ramp(table.ramp, table.value)
-    elif way == "times":
-        found = _tabulated(table, key)
     else:
-        found = _from_csv(table, key, folder)
+        found = _tabulated(table, key) if way == "times" else _from_csv(table, key, folder)
     return _directed(found, table, key, vector)
 
 

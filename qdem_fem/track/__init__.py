@@ -7,10 +7,8 @@ from qdem_fem.track.enter import (
     enter_track,
     foresee_bed,
 )
-from qdem_fem.track.recipe import SLEEPER
 
 __all__ = [
-    "SLEEPER",
     "TrackPrepared",
     "TrackScene",
     "check_track_scene",

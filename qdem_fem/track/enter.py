@@ -23,7 +23,6 @@ from qdem_fem.march import Rest
 from qdem_fem.tables import (
     BodyTable,
     ContactTable,
-    PeriodicTable,
     Prepared,
     Scene,
     Step,
@@ -138,7 +137,9 @@ def _faults(text: SceneText) -> Iterator[Problem]:
             if track.sizes[0] < contact.radius:
                 what = f"{track.sizes[0]:.4g} m is smaller than the radius of a grain's spheres"
                 yield Problem("track.sizes", what)
-        if contact.periodic is not None and not _fits(contact.periodic, track):
+        if (side := contact.periodic) is not None and (
+            side.axis != "y" or side.width != getattr(track, "width", side.width)
+        ):
             yield Problem("contact.periodic", "a track repeats along y by its width")
         if not isinstance(stiffness, dict) or sorted(stiffness) != sorted(names):
             yield Problem("contact.normal_stiffness", "give {ballast = ..., sleeper = ...}")
@@ -152,10 +153,6 @@ def _faults(text: SceneText) -> Iterator[Problem]:
     output = text.tables.get("output")
     if output is not None and output.probes:
         yield Problem("output.probes", "a track names its own points: B1 to B3, S1 to S3, sleeper")
-
-
-def _fits(periodic: PeriodicTable, track: object) -> bool:
-    return periodic.axis == "y" and periodic.width == getattr(track, "width", periodic.width)
 
 
 def make_bed_recipe(scene: TrackScene) -> BedRecipe:

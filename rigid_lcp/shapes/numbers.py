@@ -50,6 +50,16 @@ def require_length(value: float, what: str, where: str) -> float:
     return float(array)
 
 
+def require_size(size: float, where: str) -> None:
+    """Raise `ShapeError` for a shape whose ``size`` [m] can not be computed with; 0 has a sentence
+    of its own."""
+    if size != 0 and not LEAST <= size <= MOST:
+        raise ShapeError(
+            f"it is {size:.1g} m in size", where=where,
+            remedy=f"choose other units: {LEAST:g} to {MOST:g} can be computed with",
+        )  # fmt: skip
+
+
 def require_vector(
     values: ArrayLike, size: int, what: str, where: str, most: float = float_info.max
 ) -> Floats:

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.errors import ShapeError
-from rigid_lcp.shapes.numbers import LEAST, MOST, require_finite_shape, require_length
+from rigid_lcp.shapes.numbers import require_finite_shape, require_length, require_size
 
 STRAIGHT = 1e-12
 """Sine of the turn at a vertex below which three vertices count as one line [-]."""
@@ -125,11 +125,7 @@ def check_outline(vertices: ArrayLike) -> Floats:
             remedy="give at least three vertices of two coordinates",
         )  # fmt: skip
     size = float(np.ptp(outline, axis=0).max())
-    if size != 0 and not LEAST <= size <= MOST:
-        raise ShapeError(
-            f"it is {size:.1g} m in size", where=where,
-            remedy=f"choose other units: {LEAST:g} to {MOST:g} can be computed with",
-        )  # fmt: skip
+    require_size(size, where)
     side = np.roll(outline, -1, axis=0) - outline
     length = np.hypot(side[:, 0], side[:, 1])
     if (length <= STRAIGHT * length.max()).any():

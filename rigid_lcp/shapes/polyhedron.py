@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.errors import ShapeError
-from rigid_lcp.shapes.numbers import LEAST, MOST, require_finite_shape, require_length
+from rigid_lcp.shapes.numbers import require_finite_shape, require_length, require_size
 
 FLATNESS = 1e-9
 """Corners within this share of the size of a plane lie in it: round-off of coordinates is far
@@ -147,11 +147,7 @@ def _hull(points: ArrayLike) -> tuple[Ints, Floats]:
         )  # fmt: skip
     middle = given.mean(axis=0)
     size = float(np.abs(given - middle).max())
-    if size != 0 and not LEAST <= size <= MOST:
-        raise ShapeError(
-            f"it is {size:.1g} m in size", where="Polyhedron",
-            remedy=f"choose other units: {LEAST:g} to {MOST:g} can be computed with",
-        )  # fmt: skip
+    require_size(size, "Polyhedron")
     try:
         hull = ConvexHull((given - middle) / (size or 1.0))
     except QhullError as error:

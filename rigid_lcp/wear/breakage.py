@@ -27,6 +27,7 @@ In 3D: ``F / d^2`` of the greatest pair of opposite forces (Jaeger, Int. J. Rock
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from sys import float_info
 
@@ -243,10 +244,8 @@ def break_scene(scene: Scene, motion: Motion, body: int, line: Break) -> Scene |
     if scene.dim == 3:  # the plane holds the line and, as far as it can, the least inertia's axis
         direction = find_plane_normal(scene.bodies[body], motion.angle[body], direction)
     for point in (line.point, motion.position[body]):
-        try:
+        with suppress(ShapeError):
             return split_body(scene, motion, body, point, direction)
-        except ShapeError:
-            continue
     return None
 
 

@@ -103,9 +103,7 @@ def wear_shape(grain: WornShape) -> tuple[WornShape, Floats] | None:
         gone = find_volume(shape) - find_volume(made[0])
         lost[k], pending[k] = lost[k] + gone, pending[k] - gone
         shape, way = made[0], way + made[1]
-    if shape is grain.shape:
-        return None
-    return WornShape(shape, grain.normal, lost, pending), way
+    return None if shape is grain.shape else (WornShape(shape, grain.normal, lost, pending), way)
 
 
 def cut_shape(shape: Solid, normal: Floats, volume: float) -> tuple[Solid, Floats] | None:

@@ -7,7 +7,6 @@ from trackbed.report.page import (
     bullets,
     folded,
     micrometres,
-    number,
     page,
     paragraph,
     per_cent,
@@ -19,7 +18,7 @@ from trackbed.report.page import (
 )
 
 __all__ = [
-    "MINUS", "STYLE", "TIMES", "bullets", "encode_figure", "folded", "micrometres", "number",
+    "MINUS", "STYLE", "TIMES", "bullets", "encode_figure", "folded", "micrometres",
     "page", "paragraph", "per_cent", "picture", "plain", "save_figure", "section", "table",
     "verdict",
 ]  # fmt: skip

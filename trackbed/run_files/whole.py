@@ -15,8 +15,6 @@ from trackbed.errors import NO_ROOM, DiskFull, UsageError
 
 NO_FOLDER = (EEXIST, ENOTDIR)
 """A file where the folder, or one above it, should be."""
-BLOCK = 1 << 20
-"""Bytes of a file that are read at once."""
 
 
 def open_unlinked(path: Path, mode: str) -> IO[Any]:
@@ -87,23 +85,15 @@ def append_line(path: Path, line: str) -> None:
 def seal_file(path: Path) -> str:
     """Have the system write a file to the disk; its SHA-256.  Raises `OSError`."""
     with path.open("rb") as stream:
-        digest = digest_stream(stream)
+        digest = hashlib.file_digest(stream, "sha256")
         os.fsync(stream.fileno())
-    return digest
+    return digest.hexdigest()
 
 
 def digest_file(path: Path) -> str:
     """SHA-256 of a file.  Raises `OSError`."""
     with path.open("rb") as stream:
-        return digest_stream(stream)
-
-
-def digest_stream(stream: IO[bytes]) -> str:
-    """SHA-256 of all that is left in a stream."""
-    digest = hashlib.sha256()
-    while block := stream.read(BLOCK):
-        digest.update(block)
-    return digest.hexdigest()
+        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def sync_folder(path: Path) -> None:

@@ -103,8 +103,10 @@ class SceneText:
         try:
             model.model_validate(self.data)
         except ValidationError as error:
-            found = [one for one in error.errors(include_url=False) if not _is_echo(one)]
-            self.problems += [_explain(model, one) for one in found]
+            for one in error.errors(include_url=False):
+                short = one["type"] == "too_short"  # maybe only as its entries have faults
+                if not short or len(one["input"]) < one["ctx"]["min_length"]:
+                    self.problems.append(_explain(model, one))
 
     def refuse(self, problems: Iterable[Problem]) -> None:
         """Raise `SceneError` with all problems, in the order of the file, if there are any."""
@@ -226,11 +228,6 @@ def _explain(model: type[BaseModel], error: ErrorDetails) -> Problem:
     else:
         what = error["msg"].replace("Input should", "must") + value
     return Problem(key, what)
-
-
-def _is_echo(error: ErrorDetails) -> bool:
-    """Whether a list only counts as too short because its entries have faults of their own."""
-    return error["type"] == "too_short" and len(error["input"]) >= error["ctx"]["min_length"]
 
 
 def _show(value: object) -> str:

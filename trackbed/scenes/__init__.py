@@ -6,10 +6,9 @@ import tomllib
 from importlib.resources import files
 from pathlib import Path
 
-__all__ = ["find_scene_verb", "list_scenes", "read_template", "scene_path"]
+from trackbed.run_verbs import KINDS
 
-VERB_OF_TABLE = {"sample": "run", "simulation": "qdem", "run": "rigid"}
-"""A table of a scene file, and the verb that reads it."""
+__all__ = ["find_scene_verb", "list_scenes", "read_template", "scene_path"]
 
 
 def list_scenes() -> tuple[str, ...]:
@@ -33,4 +32,4 @@ def scene_path(name: str) -> Path:
 def find_scene_verb(name: str) -> str:
     """The verb of ``trackbed`` that runs the scene ``name``, known by a table only it has."""
     tables = tomllib.loads(read_template(name))
-    return next((verb for table, verb in VERB_OF_TABLE.items() if table in tables), "run")
+    return next((kind.verb for kind in KINDS if kind.table in tables), "run")

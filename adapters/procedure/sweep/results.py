@@ -59,7 +59,7 @@ class Band:
         return _number(self.half[-1])
 
 
-def estimate_mean(values: FloatArray, confidence: float = CONFIDENCE) -> tuple[Any, Any]:
+def estimate_mean(values: FloatArray) -> tuple[Any, Any]:
     """Mean over axis 0 and half the t interval, t_(n-1) s/sqrt(n); nan for one sample.
 
     ``values`` of shape (n, ...), a sample in each row; independent and normal.
@@ -70,7 +70,7 @@ def estimate_mean(values: FloatArray, confidence: float = CONFIDENCE) -> tuple[A
     mean = values.mean(axis=0)
     if n < 2:
         return mean, np.full_like(mean, np.nan)
-    factor = float(stdtrit(n - 1, 0.5 + confidence / 2)) / sqrt(n)
+    factor = float(stdtrit(n - 1, 0.5 + CONFIDENCE / 2)) / sqrt(n)
     return mean, factor * values.std(axis=0, ddof=1)
 
 

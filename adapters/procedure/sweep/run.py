@@ -176,7 +176,7 @@ def choose_engine(
         return []
     name = find_pinned_engine(sweep)
     if name is None:
-        name, version = client.submit(find_worker_engine, "auto", pure=False).result()
+        name, version = client.submit(find_worker_engine, pure=False).result()
         progress.say(f"engine: {name} ({version})")
     return [f'engine.name="{name}"']
 

@@ -4,7 +4,6 @@ from rigid_lcp.friction.problem.checks import (
     check_factors,
     in_range,
     require_finite,
-    require_matrix,
     require_number,
     require_one_a_contact,
     require_start,
@@ -29,6 +28,6 @@ __all__ = [
     "BODY_SIZE", "FORCE_ROUND_OFF", "MOST_FRICTION", "SHARE_LEFT", "BodySpace",
     "FrictionProblem", "FrictionSolution", "Status", "check_factors", "friction_problem",
     "gives_energy", "in_range", "judge_forces", "length", "natural_map", "natural_residual",
-    "prove_forces_insufficient", "require_finite", "require_matrix", "require_number",
+    "prove_forces_insufficient", "require_finite", "require_number",
     "require_one_a_contact", "require_start", "require_whole",
 ]  # fmt: skip
