@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from math import pi
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Protocol
 
 import numpy as np
 
 from adapters.bed import contact_law
 from adapters.bed.contact_law import Collision
 from adapters.bed.state import Contacts, FloatArray
+from adapters.engines.decks import DeckEngine
 from adapters.engines.liggghts import LiggghtsEngine
 from adapters.files.dump_reader import read_frames
 from adapters.files.window import read_contacts
@@ -80,49 +80,40 @@ def shear_modulus(scene: Scene) -> float:
     return contact_law.equivalent_shear_modulus(*grain, *grain)
 
 
-class TrackRun(Protocol):
-    """Runs a few grains on an engine; `track_run` does on LIGGGHTS."""
-
-    def __call__(
-        self,
-        scene: Scene,
-        position: FloatArray,
-        velocity: FloatArray,
-        motion: Sequence[str],
-        *,
-        time_step: float,
-        every: int = 1,
-        materials: Callable[[str], str] = str,
-    ) -> Track:
-        """Arguments as of `track_run`."""
+TrackRun = Callable[..., Track]
+"""Runs a few grains on an engine, with the arguments of `track_run`, which does on LIGGGHTS."""
 
 
 def track_run(
-    scene: Scene,
-    position: FloatArray,
-    velocity: FloatArray,
-    motion: Sequence[str],
-    *,
-    time_step: float,
-    every: int = 1,
-    materials: Callable[[str], str] = str,
-) -> Track:
+    scene: Scene, position: FloatArray, velocity: FloatArray, motion: Sequence[str], *,
+    time_step: float, every: int = 1, materials: Callable[[str], str] = str,
+) -> Track:  # fmt: skip
     """Run LIGGGHTS, without gravity, from ``position`` [m] and ``velocity`` [m/s], shape (n, 3).
 
     ``motion`` are the deck's lines that move the grains, each in a group ``grain_1``, ...;
     ``time_step`` [s]; ``every`` steps between two instants; ``materials`` may change the text of
     ``scene.in``, such as `limit_force`.  Raises as `LiggghtsEngine.run`.
     """
-    engine = LiggghtsEngine()
+    blocks = [[letter + axis for axis in "xyz"] for letter in ("", "v", "omega", "f")]
+    return run_deck(
+        LiggghtsEngine(), DECK, " %.17g" * 12, "grains.dump", blocks, scene, position, velocity,
+        motion, time_step, every, materials,
+    )  # fmt: skip
+
+
+def run_deck(
+    engine: DeckEngine, text: str, columns: str, dump: str, blocks: Sequence[Sequence[str]],
+    scene: Scene, position: FloatArray, velocity: FloatArray, motion: Sequence[str],
+    time_step: float, every: int, materials: Callable[[str], str],
+) -> Track:  # fmt: skip
+    """Run ``text``, an engine's deck, with its ``columns`` in; those of position, velocity, spin
+    and force in ``dump`` are ``blocks``."""
     lines = []
     for number, v in enumerate(velocity, 1):
         lines.append(f"group grain_{number} id {number}")
         lines.append(f"velocity grain_{number} set {v[0]:.17g} {v[1]:.17g} {v[2]:.17g} units box")
-    deck = DECK.format(
-        every=every,
-        time_step=time_step,
-        columns=" %.17g" * 12,
-        lines="\n".join([*lines, *motion]),
+    deck = text.format(
+        every=every, time_step=time_step, columns=columns, lines="\n".join([*lines, *motion])
     )
     with TemporaryDirectory() as temporary:
         folder = Path(temporary)
@@ -133,13 +124,12 @@ def track_run(
         scene_part = folder / "scene.in"
         scene_part.write_text(materials(scene_part.read_text()))
         engine.run(scene, "in.few", folder, lambda: None, digests)
-        frames = list(read_frames(folder / "grains.dump"))
+        frames = list(read_frames(folder / dump))
         contacts = tuple(read_contacts(frame) for frame in read_frames(folder / "contacts.dump"))
-    position, velocity, spin, force = (
-        np.array([frame.block(*(letter + axis for axis in "xyz")) for frame in frames])
-        for letter in ("", "v", "omega", "f")
-    )
     time = time_step * np.array([frame.time_step for frame in frames])
+    position, velocity, spin, force = (
+        np.array([frame.block(*names) for frame in frames]) for names in blocks
+    )
     return Track(time, position, velocity, spin, force, contacts)
 
 

@@ -84,10 +84,10 @@ def sweep_briefly(trial: Trial) -> bool:
     return trial.best.solved
 
 
-def sweep_on(trial: Trial, sweeps: int, points: int) -> bool:
-    """Sweeps from the best point, and so many factorisations of points from their end."""
+def sweep_on(trial: Trial) -> bool:
+    """1,000 sweeps from the best point, and 20 factorisations of points from their end."""
     until = max(trial.coarse, LIMITS.hand_over)
-    return trial.sweep(trial.best.r, sweeps, until=until, factorisations=points)
+    return trial.sweep(trial.best.r, 1000, until=until, factorisations=20)
 
 
 def sweep_yielding(trial: Trial) -> bool:

@@ -172,8 +172,3 @@ def dilatational_speed(young: float, poisson: float, density: float) -> float:
     """c_P = sqrt((lam + 2 mu) / rho) [m/s], plane waves; the fastest signal, so the time step's."""
     shear, bulk = _shear_and_bulk(young, poisson)
     return math.sqrt((bulk + 4 / 3 * shear) / density)
-
-
-def shear_speed(young: float, poisson: float, density: float) -> float:
-    """c_S = sqrt(mu / rho) [m/s]."""
-    return math.sqrt(_shear_and_bulk(young, poisson)[0] / density)
