@@ -56,15 +56,10 @@ class JumpRefused(NotCredible):
     """
 
     def __init__(
-        self,
-        what: str,
-        *,
-        law: str = "auto",
-        regime: str = "",
+        self, what: str, *, law: str = "auto", regime: str = "",
         parameters: dict[str, float] | None = None,
-        laws: dict[str, dict[str, object]] | None = None,
-        **place: str,
-    ) -> None:
+        laws: dict[str, dict[str, object]] | None = None, **place: str,
+    ) -> None:  # fmt: skip
         self.law, self.regime = law, regime
         self.parameters, self.laws = parameters or {}, laws or {}
         super().__init__(what, **place)

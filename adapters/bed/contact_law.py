@@ -196,14 +196,9 @@ def hertz_collision(speed: float, modulus: float, radius: float, mass: float) ->
 
 
 def collision(
-    speed: float,
-    modulus: float,
-    radius: float,
-    mass: float,
-    damping_ratio: float,
-    *,
+    speed: float, modulus: float, radius: float, mass: float, damping_ratio: float, *,
     may_pull: bool = True,
-) -> Collision:
+) -> Collision:  # fmt: skip
     """Integrate m* delta'' = -F_n - 2 a sqrt(m* S_n) delta' through one collision.
 
     ``damping_ratio`` a is alpha for a literal eq. 7, `DAMPING_FACTOR` alpha for LIGGGHTS.

@@ -68,15 +68,9 @@ def wall_contact(
 
 @njit(cache=True)
 def fill_rows(
-    position: FloatArray,
-    radius: FloatArray,
-    first: IntArray,
-    second: IntArray,
-    walls: Geometry,
-    behind: BoolArray,
-    normal: FloatArray,
-    overlap: FloatArray,
-) -> None:
+    position: FloatArray, radius: FloatArray, first: IntArray, second: IntArray, walls: Geometry,
+    behind: BoolArray, normal: FloatArray, overlap: FloatArray,
+) -> None:  # fmt: skip
     """Fill ``normal`` (m, 3) and ``overlap`` [m] (m,) of all rows; ``behind`` is (n, p)."""
     for c in range(len(first)):
         i, j = first[c], second[c]

@@ -103,13 +103,9 @@ def list_wall_rows(
 
 
 def measure_rows(
-    position: FloatArray,
-    radius: FloatArray,
-    first: IntArray,
-    second: IntArray,
-    walls: Walls,
+    position: FloatArray, radius: FloatArray, first: IntArray, second: IntArray, walls: Walls,
     behind: BoolArray,
-) -> Neighbours:
+) -> Neighbours:  # fmt: skip
     """The given rows with normal and overlap at ``position`` [m], (n, 3)."""
     from adapters.bed.overlap_kernel import fill_rows  # loads the compiler
 
@@ -119,12 +115,9 @@ def measure_rows(
 
 
 def neighbours(
-    position: FloatArray,
-    radius: FloatArray,
-    walls: Walls,
-    gap: float = 0.0,
+    position: FloatArray, radius: FloatArray, walls: Walls, gap: float = 0.0,
     behind: BoolArray | None = None,
-) -> Neighbours:
+) -> Neighbours:  # fmt: skip
     """All rows nearer than ``gap`` [m]; with the default, exactly those in contact.
 
     ``position`` (n, 3) and ``radius`` (n,) in metres; ``behind`` from `find_behind_discs`, of these

@@ -105,12 +105,9 @@ def measure_volume_below(position: FloatArray, radius: FloatArray, height: float
 
 
 def relative_density(
-    position: FloatArray,
-    radius: FloatArray,
-    container: Container,
-    height: float,
+    position: FloatArray, radius: FloatArray, container: Container, height: float,
     bottom: float = 0.0,
-) -> float:
+) -> float:  # fmt: skip
     """Share of the container's volume between ``bottom`` and ``height`` [m] that grains fill.
 
     ``position`` [m], shape (n, 3); ``radius`` [m], shape (n,).  Exact for grains within the walls;

@@ -118,13 +118,9 @@ class Engine(Protocol):
         """Write the input of ``cycles`` load cycles; returns the digests of the static decks."""
 
     def run(
-        self,
-        scene: Scene,
-        deck: str,
-        folder: Path,
-        watch: Callable[[], None],
+        self, scene: Scene, deck: str, folder: Path, watch: Callable[[], None],
         digests: dict[str, str],
-    ) -> EngineRun:
+    ) -> EngineRun:  # fmt: skip
         """Run ``deck`` in ``folder``; ``watch`` is called now and then.  Raises `EngineFailed`."""
 
 

@@ -103,13 +103,9 @@ class DeckEngine(ProcessEngine):
         return self._write(scene, folder, PARTS_CYCLES, parameters, piston=True)
 
     def _write(
-        self,
-        scene: Scene,
-        folder: Path,
-        parts: tuple[str, ...],
-        parameters: Parameters,
+        self, scene: Scene, folder: Path, parts: tuple[str, ...], parameters: Parameters,
         piston: bool,
-    ) -> dict[str, str]:
+    ) -> dict[str, str]:  # fmt: skip
         """Static parts and the generated ones of every run; returns the digests of the parts."""
         shared: Parameters = {
             "time_step": scene.time_step,
@@ -125,13 +121,9 @@ class DeckEngine(ProcessEngine):
 
 
 def format_grains_data(
-    position: FloatArray,
-    radius: FloatArray,
-    density: float,
-    container: Container,
-    height: float,
+    position: FloatArray, radius: FloatArray, density: float, container: Container, height: float,
     piston_mass: float | None,
-) -> str:
+) -> str:  # fmt: skip
     """``grains.data``: centres (n, 3) and radii (n,) [m], density [kg/m^3], box to ``height`` [m].
 
     With a piston, one more atom of mass ``piston_mass`` [kg] is parked outside the container;

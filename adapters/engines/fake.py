@@ -106,13 +106,9 @@ class FakeEngine:
         return {}
 
     def run(
-        self,
-        scene: Scene,
-        deck: str,
-        folder: Path,
-        watch: Callable[[], None],
+        self, scene: Scene, deck: str, folder: Path, watch: Callable[[], None],
         digests: dict[str, str],
-    ) -> EngineRun:
+    ) -> EngineRun:  # fmt: skip
         """Write the dumps of a preparation or of a window of load cycles."""
         started = time.process_time()
         watch()

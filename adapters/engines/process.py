@@ -280,13 +280,9 @@ class ProcessEngine(ABC):
             return 0
 
     def run(
-        self,
-        scene: Scene,
-        deck: str,
-        folder: Path,
-        watch: Callable[[], None],
+        self, scene: Scene, deck: str, folder: Path, watch: Callable[[], None],
         digests: dict[str, str],
-    ) -> EngineRun:
+    ) -> EngineRun:  # fmt: skip
         """Run a deck; raises `EngineFailed`, `EngineMissing`, `NotConverged` (not settled)."""
         started, command = time.monotonic(), self.command(scene, deck)
 

@@ -40,13 +40,9 @@ def export_vtu(run: ExportedRun, into: Path, every: int) -> list[Path]:
 
 
 def write_mesh(
-    path: Path,
-    points: FloatArray,
-    kind: str,
-    cells: IntArray,
-    point_data: Mapping[str, Array] | None = None,
-    cell_data: Mapping[str, Array] | None = None,
-) -> None:
+    path: Path, points: FloatArray, kind: str, cells: IntArray,
+    point_data: Mapping[str, Array] | None = None, cell_data: Mapping[str, Array] | None = None,
+) -> None:  # fmt: skip
     """Write points [m], shape (n, 3), and cells of one kind by meshio, binary and not packed."""
     import meshio
 

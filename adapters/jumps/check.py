@@ -204,13 +204,9 @@ def list_sources(
 
 
 def accept(
-    control: Control,
-    decision: Decision,
-    check: Check,
-    settings: Settings,
-    stretch: Stretch,
+    control: Control, decision: Decision, check: Check, settings: Settings, stretch: Stretch,
     settlement: float,
-) -> Control:
+) -> Control:  # fmt: skip
     """The state after a jump that is kept.
 
     The next one may be longer by a step-size controller's factor (proportional and integral),

@@ -273,12 +273,9 @@ def decide(control: Control, settings: Settings, piston: Regime | None = None) -
 
 
 def limit_jump(
-    control: Control,
-    settings: Settings,
-    forecast: Forecast,
-    grid: FloatArray,
+    control: Control, settings: Settings, forecast: Forecast, grid: FloatArray,
     widths: tuple[FloatArray, FloatArray],
-) -> dict[str, float]:
+) -> dict[str, float]:  # fmt: skip
     """Longest jump [cycles] by each rule.
 
     ``grid``: lengths that are tried, ascending, from 1, shape (h,); ``widths``: `estimate_widths`

@@ -29,15 +29,9 @@ class Progress:
             print(("\r\x1b[K" if self.terminal else "") + text, file=self.stream, flush=True)
 
     def cycles(
-        self,
-        *,
-        done: int,
-        total: int,
-        computed: int,
-        settlement: float | None,
-        computed_here: int,
+        self, *, done: int, total: int, computed: int, settlement: float | None, computed_here: int,
         to_compute: int,
-    ) -> None:
+    ) -> None:  # fmt: skip
         """How far the run is.
 
         ``done`` and ``computed`` cycles of ``total``; mean ``settlement`` [m];

@@ -40,15 +40,9 @@ def settle(run: Run) -> Bed:
 
 
 def run_scene(
-    scene_path: Path,
-    run_path: Path,
-    *,
-    control: bool = False,
-    overrides: Sequence[str] = (),
-    dry_run: bool = False,
-    cycle_by_cycle: bool = False,
-    progress: Progress | None = None,
-) -> None:
+    scene_path: Path, run_path: Path, *, control: bool = False, overrides: Sequence[str] = (),
+    dry_run: bool = False, cycle_by_cycle: bool = False, progress: Progress | None = None,
+) -> None:  # fmt: skip
     """Run a scene in the folder ``run_path``; with ``control``, every cycle beside it too.
 
     A folder that holds the same scene is resumed; one that holds another is refused with the
@@ -106,12 +100,9 @@ def _run_all(
 
 
 def run_variant(
-    folder: RunFolder,
-    scene: Scene,
-    variant: Variant,
-    progress: Progress,
+    folder: RunFolder, scene: Scene, variant: Variant, progress: Progress,
     cycle_by_cycle: bool = False,
-) -> RunFolder:
+) -> RunFolder:  # fmt: skip
     """Run one variant of a scene: the procedure in ``folder`` itself, others in a folder inside.
 
     The control shares the stages before the first jump: the same work would give the same bits.

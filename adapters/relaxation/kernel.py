@@ -17,13 +17,9 @@ _PROPORTION = 1.0
 
 @njit(cache=True)
 def add_hertz_energy(
-    first: IntArray,
-    second: IntArray,
-    normal: FloatArray,
-    overlap: FloatArray,
-    stiffness: FloatArray,
-    gradient: FloatArray,
-) -> float:
+    first: IntArray, second: IntArray, normal: FloatArray, overlap: FloatArray,
+    stiffness: FloatArray, gradient: FloatArray,
+) -> float:  # fmt: skip
     """Sum of psi = lambda/(gamma + 1) delta^(gamma + 1), gamma = 3/2 [J]; adds its gradient [N].
 
     ``stiffness`` lambda = 4/3 E* sqrt(R*) [N/m^1.5] of each row, ``gradient`` (n, 3).
@@ -43,13 +39,9 @@ def add_hertz_energy(
 
 @njit(cache=True)
 def fill_moves(
-    first: IntArray,
-    second: IntArray,
-    normal: FloatArray,
-    height_share: float,
-    multiplier: FloatArray,
-    move: FloatArray,
-) -> None:
+    first: IntArray, second: IntArray, normal: FloatArray, height_share: float,
+    multiplier: FloatArray, move: FloatArray,
+) -> None:  # fmt: skip
     """Fill ``move`` = -J^T mu (n, 3); the last multiplier is that of the mean height."""
     move[:, :2], move[:, 2] = 0.0, -height_share * multiplier[-1]
     for c in range(len(first)):
@@ -68,13 +60,9 @@ def fill_moves(
 
 @njit(cache=True)
 def fill_changes(
-    first: IntArray,
-    second: IntArray,
-    normal: FloatArray,
-    height_share: float,
-    move: FloatArray,
+    first: IntArray, second: IntArray, normal: FloatArray, height_share: float, move: FloatArray,
     change: FloatArray,
-) -> None:
+) -> None:  # fmt: skip
     """Fill ``change`` = J move (m + 1,): of the overlaps [m], and of the mean height last."""
     for c in range(len(first)):
         i, j = first[c], second[c]
@@ -134,13 +122,9 @@ def _subtract(a, length, b):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def estimate_norm(
-    first: IntArray,
-    second: IntArray,
-    normal: FloatArray,
-    height_share: float,
-    grains: int,
+    first: IntArray, second: IntArray, normal: FloatArray, height_share: float, grains: int,
     iterations: int,
-) -> float:
+) -> float:  # fmt: skip
     """Estimate of the greatest eigenvalue of J J^T, from below (power iteration)."""
     m = len(first)
     vector = np.empty(m + 1)
@@ -160,19 +144,10 @@ def estimate_norm(
 
 @njit(cache=True)
 def solve_multipliers(
-    first: IntArray,
-    second: IntArray,
-    normal: FloatArray,
-    height_share: float,
-    slack: float,
-    two_sided: BoolArray,
-    right: FloatArray,
-    norm: float,
-    tolerance: float,
-    products_max: int,
-    grains: int,
-    multiplier: FloatArray,
-) -> tuple[int, float]:
+    first: IntArray, second: IntArray, normal: FloatArray, height_share: float, slack: float,
+    two_sided: BoolArray, right: FloatArray, norm: float, tolerance: float, products_max: int,
+    grains: int, multiplier: FloatArray,
+) -> tuple[int, float]:  # fmt: skip
     """Minimise 1/2 mu.(J J^T + slack) mu - right.mu, with mu >= 0 where not ``two_sided``.
 
     Conjugate gradients on the free multipliers, with reduced-gradient projections where a bound

@@ -141,12 +141,9 @@ class Estimated:
 
 
 def estimated(
-    position: FloatArray,
-    before: State,
-    walls: Walls,
-    walls_after: Walls | None,
+    position: FloatArray, before: State, walls: Walls, walls_after: Walls | None,
     stiffness: HertzStiffness,
-) -> Estimated:
+) -> Estimated:  # fmt: skip
     """Arguments of `relax` taken together; raises `UsageError` for what is no bed."""
     position = np.ascontiguousarray(position, float)
     radius = np.ascontiguousarray(before.radius, float)
@@ -167,13 +164,9 @@ def estimated(
 
 
 def measure_relaxation(
-    bed: Estimated,
-    relaxed: FloatArray,
-    method: str,
-    converged: bool,
-    evaluations: int,
+    bed: Estimated, relaxed: FloatArray, method: str, converged: bool, evaluations: int,
     started: float,
-) -> Relaxation:
+) -> Relaxation:  # fmt: skip
     """What a relaxation to ``relaxed`` (n, 3) [m] changed, ``started`` at a CPU time [s]."""
     before, scene = bed.before, bed.scene
     move = np.linalg.norm(relaxed - bed.position, axis=1)

@@ -56,19 +56,11 @@ GAP_FACTOR = 5.0
 
 
 def relax(
-    position: FloatArray,
-    before: State,
-    walls: Walls,
-    stiffness: HertzStiffness,
-    *,
-    walls_after: Walls | None = None,
-    method: str = "smallest-move",
-    frontier: BoolArray | None = None,
-    keep_height: bool = True,
-    overlap_cap: float = np.inf,
-    tolerance: float = 0.01,
-    evaluations_max: int = 40_000,
-) -> Relaxation:
+    position: FloatArray, before: State, walls: Walls, stiffness: HertzStiffness, *,
+    walls_after: Walls | None = None, method: str = "smallest-move",
+    frontier: BoolArray | None = None, keep_height: bool = True, overlap_cap: float = np.inf,
+    tolerance: float = 0.01, evaluations_max: int = 40_000,
+) -> Relaxation:  # fmt: skip
     """Relax the estimated ``position`` (n, 3) [m] of the grains of ``before``.
 
     ``walls`` are those that ``before`` touches, ``walls_after`` the same with the piston where it
@@ -118,13 +110,9 @@ def relax(
 
 
 def relax_bare(
-    state: State,
-    walls: Walls,
-    stiffness: HertzStiffness,
-    *,
-    method: str = "smallest-move",
+    state: State, walls: Walls, stiffness: HertzStiffness, *, method: str = "smallest-move",
     load: float = 0.0,
-) -> Relaxation:
+) -> Relaxation:  # fmt: skip
     """Relax a state of which no earlier one is known; arguments and errors as `relax`.
 
     Overlaps up to what a bed in equilibrium under its weight and ``load`` [N] can show are taken

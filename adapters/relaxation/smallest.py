@@ -63,19 +63,10 @@ class _Rows:
 
 
 def find_smallest_move(
-    estimate: FloatArray,
-    start: FloatArray,
-    scene: Surroundings,
-    network: Neighbours,
-    overlap_cap: float,
-    bound: float,
-    gap: float,
-    *,
-    keep_height: bool,
-    tolerance: float,
-    accepted: float,
-    evaluations_max: int,
-) -> tuple[FloatArray, bool, int]:
+    estimate: FloatArray, start: FloatArray, scene: Surroundings, network: Neighbours,
+    overlap_cap: float, bound: float, gap: float, *, keep_height: bool, tolerance: float,
+    accepted: float, evaluations_max: int,
+) -> tuple[FloatArray, bool, int]:  # fmt: skip
     """Move grains from ``estimate`` (n, 3) [m] as little as the network allows.
 
     Returns their centres (n, 3) [m], whether all demands are met, and the evaluations of all

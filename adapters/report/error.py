@@ -65,14 +65,9 @@ class Comparison:
 
 
 def comparison(
-    name: str,
-    own: History,
-    own_cycle: int,
-    full: History,
-    full_cycle: int,
-    preparation_s: float,
+    name: str, own: History, own_cycle: int, full: History, full_cycle: int, preparation_s: float,
     beds: tuple[FloatArray | None, FloatArray, FloatArray] | None = None,
-) -> Comparison:
+) -> Comparison:  # fmt: skip
     """``own`` at its cycle ``own_cycle`` taken for the bed of ``full`` at ``full_cycle``.
 
     The two cycles differ for "jump and move nothing", which is the full run cut short.

@@ -63,14 +63,9 @@ class Assembly:
     """Element-steps to do before coming back: about a second."""
 
     def __init__(
-        self,
-        bodies: Sequence[Body],
-        master: Integers,
-        strain: Strain,
-        dtype: DTypeLike,
-        threads: int | None,
-        density_factor: Floats | None = None,
-    ) -> None:
+        self, bodies: Sequence[Body], master: Integers, strain: Strain, dtype: DTypeLike,
+        threads: int | None, density_factor: Floats | None = None,
+    ) -> None:  # fmt: skip
         self.n_nodes = len(master)
         kind: Any = np.dtype(dtype)
         self.dtype = kind

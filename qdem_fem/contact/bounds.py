@@ -38,12 +38,9 @@ from qdem_fem.files import Floats, Integers
 
 
 def bound_spring_network(
-    ends: Integers,
-    stiffness: Floats,
-    wall: Floats,
-    inverse_mass: Floats,
+    ends: Integers, stiffness: Floats, wall: Floats, inverse_mass: Floats,
     rigid: Callable[[Floats], Floats] = np.zeros_like,
-) -> float:
+) -> float:  # fmt: skip
     """Bound on omega^2 [1/s^2] of springs between nodes, and of nodes to walls.
 
     ``ends`` (p, 2) nodes of each spring, ``stiffness`` (p,) [N/m], ``wall`` (c,) [N/m] of each
@@ -88,13 +85,9 @@ def shorten_step_by_contact(step: float, stiffness: float, *, viscous: bool) -> 
 
 
 def find_near_step(
-    run: System,
-    near: tuple[Integers, Floats, Floats],
-    nodes: Integers,
-    inverse_mass: Floats,
-    rigid: Callable[[Floats], Floats],
-    elements: float,
-) -> float:
+    run: System, near: tuple[Integers, Floats, Floats], nodes: Integers, inverse_mass: Floats,
+    rigid: Callable[[Floats], Floats], elements: float,
+) -> float:  # fmt: skip
     """Critical step [s] for any contacts there can be before pairs are looked for again.
 
     ``near``: ends (p, 2) and stiffness (p,) of springs between vertices, stiffness (c,) of those

@@ -29,13 +29,9 @@ class ConditionedBodies(State):
         return self._add(self.conditions.held, Held(self._nodes(body, nodes, "fix"), chosen))
 
     def prescribe(
-        self,
-        body: Body,
-        nodes: Any,
-        component: str,
-        displacement: Value,
+        self, body: Body, nodes: Any, component: str, displacement: Value,
         profile: ArrayLike | None = None,
-    ) -> Held:
+    ) -> Held:  # fmt: skip
         """Give one component of the displacement [m], constant or changing with time.
 
         ``profile`` (n,) [-], one number for every node of the body, multiplies it.

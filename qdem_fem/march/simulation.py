@@ -70,19 +70,12 @@ class Simulation(ConditionedBodies):
     """
 
     def __init__(
-        self,
-        bodies: Sequence[Body],
-        *,
-        strain: Strain = "finger",
-        precision: Literal["float64", "float32"] = "float64",
-        step: float | None = None,
-        safety: float = STEP_SAFETY,
-        gravity: ArrayLike | None = None,
-        threads: int | None = None,
-        mass_scaling: float | None = None,
-        device: Literal["cpu", "cuda"] = "cpu",
+        self, bodies: Sequence[Body], *, strain: Strain = "finger",
+        precision: Literal["float64", "float32"] = "float64", step: float | None = None,
+        safety: float = STEP_SAFETY, gravity: ArrayLike | None = None, threads: int | None = None,
+        mass_scaling: float | None = None, device: Literal["cpu", "cuda"] = "cpu",
         contact: Contact | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         own = list_bodies(bodies)
         check_options(
             strain=strain, precision=precision, device=device, step=step, safety=safety,
@@ -110,12 +103,9 @@ class Simulation(ConditionedBodies):
         return added
 
     def advance(
-        self,
-        duration: float,
-        probes: Mapping[str, Any] | None = None,
-        sampling: float | None = None,
-        progress: Callable[[float], None] | None = None,
-    ) -> History:
+        self, duration: float, probes: Mapping[str, Any] | None = None,
+        sampling: float | None = None, progress: Callable[[float], None] | None = None,
+    ) -> History:  # fmt: skip
         """March on by ``duration`` [s], rounded up to whole steps.
 
         ``probes``: selections of nodes of the only body, or pairs ``(body, selection)``; their

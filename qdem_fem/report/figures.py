@@ -33,14 +33,9 @@ LINES = {"lines.linewidth": 1.3}
 
 
 def draw_history(
-    path: Path,
-    curves: Mapping[str, Curve],
-    *,
-    quantity: str = "displacement",
-    unit: str = "m",
-    against: str = "time (s)",
-    logarithmic: bool = False,
-) -> None:
+    path: Path, curves: Mapping[str, Curve], *, quantity: str = "displacement", unit: str = "m",
+    against: str = "time (s)", logarithmic: bool = False,
+) -> None:  # fmt: skip
     """Draw histories by name against time, or spectra.
 
     ``against``: what the first of each curve's arrays is; ``logarithmic``: of the values."""

@@ -115,14 +115,9 @@ class Done:
 
 
 def run_dynamic(
-    prepared: Prepared,
-    run: Any,
-    bodies: dict[str, Any],
-    folder: RunFolder,
-    *,
-    resume: bool,
+    prepared: Prepared, run: Any, bodies: dict[str, Any], folder: RunFolder, *, resume: bool,
     progress: Any,
-) -> Done:
+) -> Done:  # fmt: skip
     """Advance a scene to its duration, from its start or from the last checkpoint.
 
     ``run`` and ``bodies`` are those of `make_simulation`, ``progress`` is a

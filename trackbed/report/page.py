@@ -127,12 +127,9 @@ def bullets(items: Iterable[str]) -> str:
 
 
 def table(
-    caption: str,
-    header: Sequence[str],
-    rows: Iterable[Sequence[str]],
-    marked: str = "",
+    caption: str, header: Sequence[str], rows: Iterable[Sequence[str]], marked: str = "",
     words: frozenset[int] = frozenset(),
-) -> str:
+) -> str:  # fmt: skip
     """A table of HTML cells; the row whose first cell is ``marked`` stands out.
 
     ``words``: columns of text, set flush left.

@@ -158,12 +158,9 @@ def estimate_held_out_error(
 
 
 def estimate_tail_error(
-    cycle: FloatArray,
-    displacement: FloatArray,
-    exponent: FloatArray,
-    to_cycle: float,
+    cycle: FloatArray, displacement: FloatArray, exponent: FloatArray, to_cycle: float,
     probability: float,
-) -> tuple[FloatArray, FloatArray]:
+) -> tuple[FloatArray, FloatArray]:  # fmt: skip
     """Half-widths of one reading, and of the reading and the tail's increment, (n,) each.
 
     The tail is c + a phi(N) with ``exponent`` beta (n,), cut to [-1, 1]; its residuals have the

@@ -54,12 +54,9 @@ class Prediction:
 
 
 def fit_series(
-    series: Series,
-    law: Law,
-    to_cycle: float,
-    probability: float = 0.9,
+    series: Series, law: Law, to_cycle: float, probability: float = 0.9,
     fail_at: float | None = None,
-) -> Prediction:
+) -> Prediction:  # fmt: skip
     """Fit ``law`` to all of ``series`` and predict the settlement at ``to_cycle``.
 
     ``to_cycle`` counts as ``series.cycle`` does; errors name cycles as the user counts them, from

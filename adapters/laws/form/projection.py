@@ -124,12 +124,9 @@ def _projected(values: FloatArray, target: FloatArray) -> tuple[FloatArray, Floa
 
 
 def _search(
-    column: Column,
-    shapes: tuple[Shape, ...],
-    cycle: FloatArray,
-    target: FloatArray,
+    column: Column, shapes: tuple[Shape, ...], cycle: FloatArray, target: FloatArray,
     start: FloatArray,
-) -> FloatArray:
+) -> FloatArray:  # fmt: skip
     """Levenberg-Marquardt steps on the projected residual inside the bounds, all series at once.
 
     ``start`` and the result: searched variables, shape (m, n).  A step is taken only where it

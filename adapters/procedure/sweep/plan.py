@@ -132,12 +132,9 @@ def name_member(settings: Mapping[str, str], seed: int) -> str:
 
 
 def plan_sweep(
-    scene_path: Path,
-    folder: Path,
-    assignments: Sequence[str],
-    seeds: int | None,
+    scene_path: Path, folder: Path, assignments: Sequence[str], seeds: int | None,
     fixed: Sequence[str] = (),
-) -> Sweep:
+) -> Sweep:  # fmt: skip
     """The members: the product of all values of ``assignments``, each with ``seeds`` seeds.
 
     Seeds count up from the scene's own; ``fixed`` overrides hold for every member and are no part

@@ -119,12 +119,9 @@ def _run_pending(sweep: Sweep, cluster: Cluster, progress: Progress) -> list[Res
 
 
 def _run(
-    sweep: Sweep,
-    cluster: Cluster,
-    pending: Sequence[Member],
-    results: dict[str, Result],
+    sweep: Sweep, cluster: Cluster, pending: Sequence[Member], results: dict[str, Result],
     progress: Progress,
-) -> None:
+) -> None:  # fmt: skip
     """Hand the members to the cluster, and take the results in as they come."""
     with open_client(cluster.scheduler, cluster.config, cluster.workers, len(pending)) as client:
         from distributed import as_completed, wait

@@ -69,12 +69,9 @@ class Packed:
 
 
 def build_layout(
-    elements: Integers,
-    n_nodes: int,
-    element_rows: Floats,
-    dtype: DTypeLike,
+    elements: Integers, n_nodes: int, element_rows: Floats, dtype: DTypeLike,
     loose: Integers | None = None,
-) -> Packed:
+) -> Packed:  # fmt: skip
     """Order a mesh for locality and lay its data out in blocks of lanes.
 
     ``loose``: nodes of no element that forces act on all the same, in a window of their own

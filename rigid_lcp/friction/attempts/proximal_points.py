@@ -113,14 +113,10 @@ PROXIMAL, POINTS = ProximalNumbers(), ExtrapolatedNumbers()
 
 
 def proximal_newton(
-    problem: FrictionProblem,
-    start: Floats,
-    tolerance: float = 1e-12,
-    *,
-    linear: Factorisation | None = None,
-    factorisations: int = PROXIMAL.factorisations,
+    problem: FrictionProblem, start: Floats, tolerance: float = 1e-12, *,
+    linear: Factorisation | None = None, factorisations: int = PROXIMAL.factorisations,
     first_shift: float | None = None,
-) -> FrictionSolution:
+) -> FrictionSolution:  # fmt: skip
     """Proximal points from ``start`` r (nc * dim,) until the residual is small enough.
 
     ``linear``: factorisations of this problem's W, made if not given; at most ``factorisations``
@@ -160,14 +156,10 @@ def proximal_newton(
 
 
 def extrapolated_points(
-    problem: FrictionProblem,
-    start: Floats,
-    tolerance: float = 1e-12,
-    *,
-    linear: Factorisation | None = None,
-    factorisations: int = POINTS.factorisations,
+    problem: FrictionProblem, start: Floats, tolerance: float = 1e-12, *,
+    linear: Factorisation | None = None, factorisations: int = POINTS.factorisations,
     patience: int = POINTS.factorisations,
-) -> FrictionSolution:
+) -> FrictionSolution:  # fmt: skip
     """Points whose centre runs ahead, from ``start`` r (nc * dim,), as `proximal_newton`.
 
     At most ``factorisations`` are spent, and ``patience`` of them without halving the residual.

@@ -85,13 +85,9 @@ SMOOTHED = SmoothedNumbers()
 
 
 def smoothed_path(
-    problem: FrictionProblem,
-    begin: tuple[Floats, float] | None = None,
-    tolerance: float = 1e-12,
-    *,
-    linear: Factorisation | None = None,
-    factorisations: int = SMOOTHED.factorisations,
-) -> FrictionSolution:
+    problem: FrictionProblem, begin: tuple[Floats, float] | None = None, tolerance: float = 1e-12,
+    *, linear: Factorisation | None = None, factorisations: int = SMOOTHED.factorisations,
+) -> FrictionSolution:  # fmt: skip
     """Follow the path from a great sigma until the residual is at or below ``tolerance``.
 
     ``begin``: forces r (nc * dim,) and sigma [N^2] of a point near the path, as another method left

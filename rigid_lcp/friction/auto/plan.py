@@ -51,12 +51,9 @@ def run_plan(trial: Trial, plan: tuple[Stage, ...]) -> bool:
 
 
 def attempts(
-    problem: FrictionProblem,
-    start: Floats | None,
-    tolerance: float,
-    accept: float = 0.0,
+    problem: FrictionProblem, start: Floats | None, tolerance: float, accept: float = 0.0,
     plan: tuple[Stage, ...] | None = None,
-) -> Trial:
+) -> Trial:  # fmt: skip
     """`PLAN`, or another, until a stage reaches ``tolerance``, or ``accept`` where the problem is
     large; the trial holds the best point."""
     trial = Trial(problem, start, tolerance, accept)
@@ -111,8 +108,6 @@ FIRST = (
           lambda t: t.sweep(t.start, 100, until=t.coarse, factorisations=20)),
     Stage("from path", lambda t: t.path_point is not None, FROM_PATH),
     Stage("deep sweeps", lambda t: t.moving and not t.rough and not t.dear, by.sweep_deep),
-    Stage("accept, moving", lambda t: t.very_large and t.moving and not t.rough and not t.dear,
-          Trial.accepts),
     Stage("sweeps, yielding", lambda t: t.rough and t.moving, by.sweep_yielding),
     Stage("sweeps, rough", lambda t: t.rough and not t.moving,
           lambda t: t.sweep(None, 1000, factorisations=0)),

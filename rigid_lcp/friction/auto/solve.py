@@ -49,15 +49,10 @@ ENERGY_GIVEN = (
 
 
 def solve_friction(
-    W: ArrayLike | sp.sparray | sp.spmatrix | BodySpace,
-    q: ArrayLike,
-    mu: ArrayLike,
-    dim: int,
-    start: ArrayLike | None = None,
-    tolerance: float = 1e-12,
-    method: str = "auto",
+    W: ArrayLike | sp.sparray | sp.spmatrix | BodySpace, q: ArrayLike, mu: ArrayLike, dim: int,
+    start: ArrayLike | None = None, tolerance: float = 1e-12, method: str = "auto",
     accept: float = 0.0,
-) -> FrictionSolution:
+) -> FrictionSolution:  # fmt: skip
     """Forces r and velocities u with ``u = W r + q`` under unilateral contact and Coulomb friction.
 
     ``W`` (nc * dim, nc * dim): dense, sparse, or its factors as a `BodySpace`; may be singular

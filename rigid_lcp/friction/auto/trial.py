@@ -29,7 +29,7 @@ from rigid_lcp.friction.problem import (
     judge_forces,
     length,
 )
-from rigid_lcp.friction.sweeps import MANY_CONTACTS, SweepBlocks
+from rigid_lcp.friction.sweeps import SweepBlocks
 
 ENDLESS = 1e6
 """Forces over ``rho |q|`` [-] that look endless."""
@@ -102,8 +102,6 @@ class Trial:
         """Of these forces: whether much seems loose, and what heavy bodies ask for (`sticking`)."""
         self.small = problem.contacts <= LIMITS.few_contacts
         """Whether it costs less to factor than to sweep."""
-        self.very_large = problem.contacts >= MANY_CONTACTS
-        """Whether the next step of a bed in motion is due before dear methods are tried."""
         self.rough = not self.small and tolerance >= LIMITS.hand_over
         """Whether a rough answer is asked for of a large problem, which needs few factorisations or
         none."""

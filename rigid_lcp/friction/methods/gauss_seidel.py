@@ -40,15 +40,10 @@ from rigid_lcp.friction.sweeps import (
 
 
 def gauss_seidel(
-    problem: FrictionProblem,
-    start: Floats | None = None,
-    tolerance: float = 1e-6,
-    sweeps: int = 1000,
-    *,
-    blocks: SweepBlocks | None = None,
-    last: bool = False,
+    problem: FrictionProblem, start: Floats | None = None, tolerance: float = 1e-6,
+    sweeps: int = 1000, *, blocks: SweepBlocks | None = None, last: bool = False,
     slow: tuple[int, float] = (0, np.inf),
-) -> FrictionSolution:
+) -> FrictionSolution:  # fmt: skip
     """Sweep until the residual is at or below ``tolerance``, or ``sweeps`` are done.
 
     ``start``: forces r (nc * dim,), zero if None.  ``blocks``: the same problem laid out earlier.

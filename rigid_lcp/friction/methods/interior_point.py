@@ -97,15 +97,10 @@ class Path:
 
 
 def interior_point(
-    problem: FrictionProblem,
-    start: Floats | None = None,
-    tolerance: float = 1e-8,
-    path: Path = Path(),
-    *,
-    linear: Factorisation | None = None,
-    iterations: int = INTERIOR.iterations,
-    begun: PathStep | None = None,
-) -> FrictionSolution:
+    problem: FrictionProblem, start: Floats | None = None, tolerance: float = 1e-8,
+    path: Path = Path(), *, linear: Factorisation | None = None,
+    iterations: int = INTERIOR.iterations, begun: PathStep | None = None,
+) -> FrictionSolution:  # fmt: skip
     """Follow the path until the residual is at or below ``tolerance``.
 
     ``start`` is not used: a point on the boundary is a bad one for this method.  ``linear``:

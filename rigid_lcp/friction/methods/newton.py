@@ -109,14 +109,10 @@ def alart_curnier(
 
 
 def newton(
-    problem: FrictionProblem,
-    start: Floats | None = None,
-    tolerance: float = 1e-12,
-    *,
-    linear: Factorisation | None = None,
-    iterations: int = NEWTON.iterations,
+    problem: FrictionProblem, start: Floats | None = None, tolerance: float = 1e-12, *,
+    linear: Factorisation | None = None, iterations: int = NEWTON.iterations,
     patience: int = NEWTON.patience,
-) -> FrictionSolution:
+) -> FrictionSolution:  # fmt: skip
     """Newton steps from ``start`` (zero forces if None) until the residual is small enough.
 
     Converges fast near a solution, and may go anywhere from a poor start: give it the point of

@@ -75,13 +75,9 @@ PIVOTING = PivotingNumbers()
 
 
 def pivoting(
-    problem: FrictionProblem,
-    start: Floats | None = None,
-    tolerance: float = 1e-12,
-    *,
-    sweeps: int = PIVOTING.sweeps,
-    tangential_velocity: Floats | None = None,
-) -> FrictionSolution:
+    problem: FrictionProblem, start: Floats | None = None, tolerance: float = 1e-12, *,
+    sweeps: int = PIVOTING.sweeps, tangential_velocity: Floats | None = None,
+) -> FrictionSolution:  # fmt: skip
     """Solve a 2D friction problem, or a frictionless one, exactly by following a path of pivots.
 
     ``start`` r (nc * dim,): forces near the solution; the nearer, the fewer pivots.  Without it

@@ -237,16 +237,10 @@ class FrictionSolution:
 
 
 def judge_forces(
-    problem: FrictionProblem,
-    force: Floats,
-    tolerance: float,
-    method: str,
-    work: dict[str, float] | None = None,
-    *,
-    status: Status = "not converged",
-    message: str = "",
+    problem: FrictionProblem, force: Floats, tolerance: float, method: str,
+    work: dict[str, float] | None = None, *, status: Status = "not converged", message: str = "",
     velocity: Floats | None = None,
-) -> FrictionSolution:
+) -> FrictionSolution:  # fmt: skip
     """Judge forces by their residual: ``solved`` at or below ``tolerance``, else ``status``.
 
     Forces that grow without bound in a problem that has no solution make the residual, which is

@@ -3,7 +3,6 @@
 from rigid_lcp.friction.sweeps.blocks import add_impulses, lay_out_bodies, lay_out_matrix
 from rigid_lcp.friction.sweeps.body_kernel import pack_contacts
 from rigid_lcp.friction.sweeps.contact_kernel import (
-    MANY_CONTACTS,
     Momentum,
     SweepBlocks,
     sweep_until_small,
@@ -17,7 +16,7 @@ from rigid_lcp.friction.sweeps.normal_matrices import (
 )
 
 __all__ = [
-    "MANY_CONTACTS", "NONE", "Momentum", "SweepBlocks", "add_impulses", "face_band",
+    "NONE", "Momentum", "SweepBlocks", "add_impulses", "face_band",
     "face_bandwidth", "lay_out_bodies", "lay_out_matrix", "normal_products", "normal_sweeps",
     "pack_contacts", "solve_contacts_apart", "sweep_until_small",
 ]  # fmt: skip
