@@ -1,5 +1,5 @@
 """One tiny run an engine, shared with ``tests/engines``."""
 
-from tests.engines.conftest import sample
+from tests.engines.conftest import sample, samples
 
-__all__ = ["sample"]
+__all__ = ["sample", "samples"]

@@ -14,8 +14,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 from rigid_lcp.arrays import Floats
+from rigid_lcp.friction.attempts import PROXIMAL
 from rigid_lcp.friction.auto import paths as along
 from rigid_lcp.friction.auto import sweeps as by
 from rigid_lcp.friction.auto.trial import ENDLESS, Trial
@@ -114,7 +116,10 @@ FIRST = (
     Stage("sweeps, dear", lambda t: not t.small and t.dear,
           lambda t: t.sweep(t.start, 6000, factorisations=0)),
     Stage("paths, dear", lambda t: not t.small and t.cold and t.dear, ALL_PATHS),
-    Stage("sweeps and points", lambda t: not t.small and t.start is None, by.sweep_on),
+    Stage("sweeps and points, small", lambda t: t.small,
+          partial(by.sweep_on, points=PROXIMAL.factorisations)),
+    Stage("sweeps and points", lambda t: not t.small and t.start is None,
+          partial(by.sweep_on, points=20)),
     Stage("accept", lambda t: not t.small, Trial.accepts),
 )  # fmt: skip
 """What solves nearly all: what sticks, the convex path, Gauss-Seidel with momentum and proximal
