@@ -212,7 +212,10 @@ class ProcessEngine(ABC):
         """Command line that runs ``deck`` in its folder."""
 
     def complete(self, scene: Scene, folder: Path) -> None:
-        """Raise `EngineFailed` when a finished run left no restart file, as on a full disk."""
+        """Look at what a finished run left, and convert what others read in another form.
+
+        Raises `EngineFailed` where there is no restart file, as on a full disk.
+        """
         path = folder / "end.restart"
         if not path.exists() or path.stat().st_size == 0:
             raise EngineFailed(

@@ -35,7 +35,7 @@ PURPOSES = {
     "cycles_computed": ("load cycles computed", "d"),
     "grain_steps": ("grain-steps", ".3g"),
 }
-"""What `split_cost` tells, as ``report.json`` has it, with its name and format on the page: CPU
+"""What `split_cost` returns, as ``report.json`` has it, with its name and format on the page: CPU
 time from the start of loading [s] (start-up is reading, building neighbour lists, writing), cycles,
 and work that no machine changes, grains times time steps computed."""
 

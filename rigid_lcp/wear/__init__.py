@@ -9,7 +9,8 @@ from rigid_lcp.wear.abrasion import (
     wear_on_after_break,
 )
 from rigid_lcp.wear.breakage import Breakage, Broken, break_scene, breaks, refuse_dust
-from rigid_lcp.wear.cuts import WornShape, split_body
+from rigid_lcp.wear.cuts import WornShape
+from rigid_lcp.wear.fragmentation import split_body
 
 __all__ = [
     "Breakage", "Broken", "Wear", "WearState", "WornShape", "break_scene", "breaks",

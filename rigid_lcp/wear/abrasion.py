@@ -33,11 +33,10 @@ from rigid_lcp.shapes import Polygon, Polyhedron, rotate_back
 from rigid_lcp.wear.cuts import (
     WornShape,
     rub_corners,
-    scene_at,
-    take_on_motion,
     unworn,
     wear_shape,
 )
+from rigid_lcp.wear.fragmentation import scene_at, take_on_motion
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,8 @@
 """Breakage in a run: grains whose contact forces pull them apart are split, and the run goes on.
 
 Every so many steps each polygon (polyhedron) that moves is judged; what is above its strength is
-split (`rigid_lcp.wear.cuts`) along the line, or in 3D by a plane through it, that joins its
-greatest pair of opposite forces.
+split (`rigid_lcp.wear.fragmentation`) along the line, or in 3D by a plane through it, that joins
+its greatest pair of opposite forces.
 
 Forces are the means over the last step.  In an impact they grow as 1 / h: with breakage, h is the
 duration of impacts.  Where forces are not unique they are those that the solver found, and boxes
@@ -38,7 +38,8 @@ from rigid_lcp.contact import ContactForces
 from rigid_lcp.errors import SceneError, ShapeError
 from rigid_lcp.motion import Body, Motion, Scene, require_number_in, require_whole_in
 from rigid_lcp.shapes import rotation_matrix
-from rigid_lcp.wear.cuts import find_volume, split_body
+from rigid_lcp.wear.cuts import find_volume
+from rigid_lcp.wear.fragmentation import split_body
 
 
 @dataclass(frozen=True)

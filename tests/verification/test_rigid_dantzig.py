@@ -12,7 +12,8 @@ from rigid_lcp.errors import ProblemError
 from rigid_lcp.friction.auto.islands import cut_out_island
 from rigid_lcp.friction.methods.dantzig import dantzig
 from rigid_lcp.friction.pivots.drive import move_contact
-from rigid_lcp.friction.pivots.state import Pivots, change_shift, start_pivots
+from rigid_lcp.friction.pivots.shift import change_shift
+from rigid_lcp.friction.pivots.state import Pivots, start_pivots
 from rigid_lcp.friction.pivots.updates import (
     BREAKING,
     SLIDING_DOWN,

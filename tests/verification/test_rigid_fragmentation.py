@@ -15,7 +15,8 @@ from rigid_lcp.contact import shapes_3d
 from rigid_lcp.errors import ShapeError
 from rigid_lcp.motion import make_world
 from rigid_lcp.shapes import rotate, rotate_back
-from rigid_lcp.wear.cuts import find_volume, split_body
+from rigid_lcp.wear.cuts import find_volume
+from rigid_lcp.wear.fragmentation import split_body
 from tests.rigid_solids import ballast_stone
 
 SQUARE = Polygon([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])

@@ -1,7 +1,7 @@
 """No method of friction problems knows units: the same steps, to the same forces in other units.
 
-Lengths, times and masses in units that are powers of two apart: ``u = W r + q`` with forces
-``f / v`` times, velocities v times as great has W times ``v / f``, and no round-off tells.
+Units of length, time and mass are powers of two apart, so that no number is rounded.  Forces are f
+times and velocities v times as great, so W of ``u = W r + q`` is ``v / f`` times what it was.
 """
 
 from __future__ import annotations

@@ -2,12 +2,11 @@
 
 from rigid_lcp.friction.pivots.covering import follow_from_forces, follow_from_nothing
 from rigid_lcp.friction.pivots.drive import DONE, consider_contacts
+from rigid_lcp.friction.pivots.shift import SHIFT, remove_shift
 from rigid_lcp.friction.pivots.state import (
-    SHIFT,
     drive_offset,
     judge_pivots,
     read_pivots_force,
-    remove_shift,
     start_pivots,
 )
 

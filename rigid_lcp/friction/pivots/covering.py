@@ -8,7 +8,8 @@ from numba import njit
 
 from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.friction.pivots.drive import DONE, TOO_MANY
-from rigid_lcp.friction.pivots.state import Pivots, drive_offset, set_lists
+from rigid_lcp.friction.pivots.shift import set_lists
+from rigid_lcp.friction.pivots.state import Pivots, drive_offset
 from rigid_lcp.friction.pivots.updates import (
     BREAKING,
     SLIDING_DOWN,
