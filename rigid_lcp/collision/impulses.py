@@ -33,7 +33,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigid_lcp.arrays import Floats, Ints
-from rigid_lcp.collision.passing import SPEED_ROUND_OFF, Share
+from rigid_lcp.collision.passing import SPEED_ROUND_OFF
+from rigid_lcp.collision.restitution_scale import Share
 from rigid_lcp.errors import ProblemError, UsageError
 from rigid_lcp.friction.attempts import frictionless
 from rigid_lcp.friction.auto import solve_friction

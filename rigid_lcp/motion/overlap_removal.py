@@ -18,15 +18,6 @@ out again if it hands its velocity on to a disc above it.  It is then lifted, at
 lift costs is in the disc above.  Both got their velocities from impulses with restitution; so much
 less of it acts among the bodies that push each other as makes the energy that of the start.  That
 keeps momentum, and lets no pair approach that would not without restitution.
-
-Contacts of a step are looked for as far as bodies get within it by the velocities that they begin
-it with (`moreau_margin`).  A body at rest that is struck gets further.  What it then meets shows as
-an overlap, at a pair that had no contact in the step (`find_missed_collisions`).  A pair without
-restitution is moved apart and comes to rest in the next step.  With restitution the step is made
-again, with more contacts (`find_contacts_of_struck`): a body of mass m_a at speed v leaves one at
-rest, of mass m_b, at most with ``(1 + e) m_a / (m_a + m_b) v``, and that the next one.  In a ring
-of bodies the product of these factors is at most 1 (each is at most ``m_a / sqrt(m_a m_b)``), so
-speeds passed on come to an end.
 """
 
 from __future__ import annotations
@@ -41,7 +32,7 @@ from scipy.sparse.csgraph import connected_components
 from rigid_lcp.arrays import Bools, Floats, Ints
 from rigid_lcp.contact import Contacts
 from rigid_lcp.friction.auto import solve_friction
-from rigid_lcp.motion.equations import body_space, find_response, relative_velocity
+from rigid_lcp.motion.equations import body_space, find_response
 from rigid_lcp.motion.state import Motion, displace_motion, replace_rates
 from rigid_lcp.motion.world import World
 from rigid_lcp.shapes import quaternion_of_rotation, rotate
@@ -185,68 +176,3 @@ def measure_energy_taken(
     root = slope**2 - 4.0 * square * owed
     part = 2.0 * owed / (root**0.5 - slope) if root > 0.0 else -slope / (2.0 * square)
     return replace_rates(motion, rates + min(part, 1.0) * change)
-
-
-FASTER = 1e-6
-"""Part by which a speed has to be greater than one that was taken into account [-]."""
-
-
-def moreau_margin(world: World, motion: Motion, accelerations: Floats, h: float) -> Floats:
-    """How far each body's points can get within a step that nothing strikes them in [m], (n,)."""
-    rates = np.abs(motion.rates) + h * np.abs(accelerations)
-    return h * world.speeds(rates) + OVERLAP_ALLOWED * world.length
-
-
-def find_missed_collisions(
-    world: World, contacts: Contacts, end: Motion, touching: Contacts, slow: float
-) -> Bools:
-    """Bodies (n,) of pairs that overlap at the ``end`` of a step, have restitution, approach faster
-    than ``slow`` [m/s], and were no ``contacts`` of the step.
-
-    ``touching``: contacts of ``end`` without margin.
-    """
-    missed = np.zeros(len(world.mass), dtype=bool)
-    found = touching[
-        (touching.gap < -OVERLAP_ALLOWED * world.length) & (touching.restitution > 0.0)
-    ]
-    if len(found) == 0:
-        return missed
-    known = np.isin(_pairs(world, found), _pairs(world, contacts))
-    found = found[~known]
-    if len(found):
-        found = found[relative_velocity(found, end)[:, 0] < -slow]
-        missed[found.body_a] = missed[found.body_b] = True
-    return missed
-
-
-def find_contacts_of_struck(
-    world: World, middle: Motion, margin: Floats, struck: Bools, end: Motion, h: float
-) -> tuple[Contacts, Floats]:
-    """Contacts at the midpoint of a step, and their margins (n,) [m], with those that ``struck``
-    bodies (n,) may get to by their velocities at its ``end``, and so on to what they strike."""
-    reaching = np.where(struck, np.maximum(margin, h * world.speeds(end.rates)), margin)
-    while True:
-        contacts = world.contacts(middle, reaching)
-        further = _pass_on(world, contacts, reaching, struck)
-        faster = further > reaching * (1.0 + FASTER)
-        if not faster.any():
-            return contacts, reaching
-        reaching, struck = np.where(faster, further, reaching), struck | faster
-
-
-def _pass_on(world: World, contacts: Contacts, margin: Floats, struck: Bools) -> Floats:
-    """Margins (n,) [m] with those that ``struck`` bodies pass on to bodies that they may hit."""
-    further = margin.copy()
-    bounces = contacts.restitution > 0.0
-    for a, b in ((contacts.body_a, contacts.body_b), (contacts.body_b, contacts.body_a)):
-        hits = bounces & struck[a] & world.movable[b]
-        lighter = 1.0 / (1.0 + world.mass[b[hits]] / world.mass[a[hits]])
-        passed = (1.0 + contacts.restitution[hits]) * lighter * margin[a[hits]]
-        np.maximum.at(further, b[hits], passed)
-    return further
-
-
-def _pairs(world: World, contacts: Contacts) -> Ints:
-    """One number for the two bodies of each contact, (nc,)."""
-    a, b = contacts.body_a, contacts.body_b
-    return np.minimum(a, b) * len(world.mass) + np.maximum(a, b)

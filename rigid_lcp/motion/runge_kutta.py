@@ -83,7 +83,7 @@ class Pace:
     a stage had no forces."""
     collisions: int = 0
     scaled: int = 0
-    """Collisions whose restitution was scaled down (`rigid_lcp.collision.passing`)."""
+    """Collisions whose restitution was scaled down (`rigid_lcp.collision.restitution_scale`)."""
     cut_off: int = 0
     """Collisions that ran out of rounds (`rigid_lcp.collision.impulses`)."""
     worst_residual: float = 0.0

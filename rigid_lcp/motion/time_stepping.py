@@ -52,15 +52,13 @@ from rigid_lcp.motion.equations import (
     inertial_acceleration,
     relative_velocity,
 )
-from rigid_lcp.motion.overlap_removal import (
-    OVERLAP_ALLOWED,
-    Restitution,
+from rigid_lcp.motion.overlap_removal import OVERLAP_ALLOWED, Restitution, part_bodies
+from rigid_lcp.motion.state import Motion, replace_rates
+from rigid_lcp.motion.struck_bodies import (
     find_contacts_of_struck,
     find_missed_collisions,
     moreau_margin,
-    part_bodies,
 )
-from rigid_lcp.motion.state import Motion, replace_rates
 from rigid_lcp.motion.world import World
 
 SolveFrom = Callable[..., tuple[FrictionSolution, float]]

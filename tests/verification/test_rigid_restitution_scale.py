@@ -7,7 +7,8 @@ import pytest
 import scipy.sparse as sp
 
 from rigid_lcp import BodySpace, Disc, HalfSpace, Polygon, Scene, Simulation, Sphere, box
-from rigid_lcp.collision.passing import Closing, Impulses, Share, gains_energy
+from rigid_lcp.collision.passing import Closing, Impulses
+from rigid_lcp.collision.restitution_scale import Share, gains_energy
 from rigid_lcp.errors import NotConverged
 from rigid_lcp.motion.acceleration_forces import find_forces
 from rigid_lcp.scene.simulation import Method

@@ -117,9 +117,9 @@ FIRST = (
           lambda t: t.sweep(t.start, 6000, factorisations=0)),
     Stage("paths, dear", lambda t: not t.small and t.cold and t.dear, ALL_PATHS),
     Stage("sweeps and points, small", lambda t: t.small,
-          partial(by.sweep_on, points=PROXIMAL.factorisations)),
+          partial(by.sweep_on, sweeps=1000, points=PROXIMAL.factorisations)),
     Stage("sweeps and points", lambda t: not t.small and t.start is None,
-          partial(by.sweep_on, points=20)),
+          partial(by.sweep_on, sweeps=1000, points=20)),
     Stage("accept", lambda t: not t.small, Trial.accepts),
 )  # fmt: skip
 """What solves nearly all: what sticks, the convex path, Gauss-Seidel with momentum and proximal

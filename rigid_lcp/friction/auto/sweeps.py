@@ -84,11 +84,13 @@ def sweep_briefly(trial: Trial) -> bool:
     return trial.best.solved
 
 
-def sweep_on(trial: Trial, points: int) -> bool:
-    """1,000 sweeps from the best point, and so many factorisations of points from their end.
-    Where there is no solution forces grow without end here, and a proof is looked for at once."""
+def sweep_on(trial: Trial, sweeps: int, points: int) -> bool:
+    """Sweeps from the best point, and so many factorisations of points from their end.
+
+    Where there is no solution forces grow without end here, and a proof is looked for at once.
+    """
     until = max(trial.coarse, LIMITS.hand_over)
-    return trial.sweep(trial.best.r, 1000, until=until, factorisations=points)
+    return trial.sweep(trial.best.r, sweeps, until=until, factorisations=points)
 
 
 def sweep_yielding(trial: Trial) -> bool:

@@ -20,7 +20,7 @@ length zero, as with sliding columns the matrix of eq. 28 need not have positive
 
 Redundant contacts make eq. 28 singular, ties (b = 0, symmetric piles) make lists cycle: a shift of
 A and a perturbation of b, in the range of A, prevent that, and are driven out at the end
-(`rigid_lcp.friction.pivots.state`).  A pivot costs O(k^2) for k unknown forces, the paper's way
+(`rigid_lcp.friction.pivots.shift`).  A pivot costs O(k^2) for k unknown forces, the paper's way
 O(k^3).
 """
 
