@@ -36,8 +36,7 @@ from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.collision.passing import SPEED_ROUND_OFF
 from rigid_lcp.collision.restitution_scale import Share
 from rigid_lcp.errors import ProblemError, UsageError
-from rigid_lcp.friction.attempts import frictionless
-from rigid_lcp.friction.auto import solve_friction
+from rigid_lcp.friction.auto import solve_auto
 from rigid_lcp.friction.methods import pivoting
 from rigid_lcp.friction.problem import (
     FORCE_ROUND_OFF,
@@ -243,16 +242,11 @@ def find_round_impulses(problem: FrictionProblem, tolerance: float) -> FrictionS
 
 
 def _find_impulses_at(problem: FrictionProblem, tolerance: float) -> FrictionSolution:
-    if not problem.friction.any():
-        return frictionless(problem, None, tolerance)
-    if problem.dim == 2 and problem.contacts <= 300:
+    if problem.friction.any() and problem.dim == 2 and problem.contacts <= 300:
         found = pivoting(problem, None, tolerance)
         if found.solved:
             return found
-    assert problem.bodies is not None
-    return solve_friction(
-        problem.bodies, problem.offset, problem.friction, problem.dim, tolerance=tolerance
-    )
+    return solve_auto(problem, None, tolerance)
 
 
 Law = Literal["newton", "moreau"]
