@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
+from numba import njit
 
-from rigid_lcp.arrays import Floats, Ints
+from rigid_lcp.arrays import Bools, Floats, Ints
 from rigid_lcp.friction.problem import BodySpace, FrictionProblem, FrictionSolution, judge_forces
 from rigid_lcp.friction.sweeps import NONE, solve_contacts_apart
 from rigid_lcp.sparse import csr_arrays, diagonal_blocks
@@ -30,22 +30,43 @@ ISLAND_ROUNDS = 4
 
 def islands(problem: FrictionProblem) -> list[Ints]:
     """Contacts of every island, (contacts of it,) each, by W's pattern or by shared bodies."""
-    contacts, dim = problem.contacts, problem.dim
-    if contacts == 0:
+    if problem.contacts == 0:
         return []
     if problem.bodies is not None:
         first, body, block = problem.body_jacobians
         mass = diagonal_blocks(*csr_arrays(problem.bodies.inverse_mass), problem.bodies.body_size)
         joins = np.asarray(mass.any(axis=(1, 2)))[body] & block.any(axis=(1, 2))
-        one = np.repeat(np.arange(contacts), np.diff(first))[joins]
-        other, count = contacts + body[joins], contacts + len(mass)
+        label = label_islands(first, problem.contacts + body, joins, problem.contacts + len(mass))
     else:
-        w = problem.delassus.tocoo()
-        one, other, count = (w.row // dim)[w.data != 0.0], (w.col // dim)[w.data != 0.0], contacts
-    graph = sp.coo_array((np.ones(len(one), dtype=np.int8), (one, other)), shape=(count, count))
-    label = connected_components(graph, directed=False)[1][:contacts]  # in order of first contacts
+        w, dim = problem.delassus, problem.dim  # the rows of a contact stand one after another
+        first, other = w.indptr[::dim].astype(np.int64), w.indices.astype(np.int64) // dim
+        label = label_islands(first, other, w.data != 0.0, problem.contacts)
+    if not label.any():
+        return [np.arange(problem.contacts)]
     order = np.argsort(label, kind="stable")
     return np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
+
+
+@njit(cache=True)
+def label_islands(first: Ints, other: Ints, joins: Bools, count: int) -> Ints:
+    """The least contact that each is joined to, (nc,), where k in first[c]:first[c + 1] joins c to
+    other[k] < count: trees whose root is their least node, paths halved (Galler and Fischer 1964).
+    """
+    parent = np.arange(count)
+    for c in range(len(first) - 1):
+        for k in range(first[c], first[c + 1]):
+            if joins[k]:
+                a, b = c, other[k]
+                while parent[a] != a:
+                    parent[a] = parent[parent[a]]
+                    a = parent[a]
+                while parent[b] != b:
+                    parent[b] = parent[parent[b]]
+                    b = parent[b]
+                parent[max(a, b)] = min(a, b)
+    for c in range(len(first) - 1):
+        parent[c] = parent[parent[c]]  # a parent is less than its child: already a root
+    return parent[: len(first) - 1]
 
 
 def cut_out_island(problem: FrictionProblem, contacts: Ints) -> FrictionProblem:
