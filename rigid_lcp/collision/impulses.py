@@ -33,7 +33,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigid_lcp.arrays import Floats, Ints
-from rigid_lcp.collision.passing import SPEED_ROUND_OFF
+from rigid_lcp.collision.passing import PASSING
 from rigid_lcp.collision.restitution_scale import Share
 from rigid_lcp.errors import ProblemError, UsageError
 from rigid_lcp.friction.auto import solve_auto
@@ -55,14 +55,22 @@ from rigid_lcp.friction.problem import (
     require_whole,
 )
 
-COLLISION_ROUNDS, COLLISION_ROUNDS_ROUGH = 500, 50
-"""Rounds of a collision until the rest ends without restitution: without friction, where masses of
-a factor of 1e3 that touch anywhere take some hundred; with it, where one in five of those has no
-end, and energy is lost anyway."""
-LEAST_TOLERANCE = 1e-16
-"""The smallest residual that is asked for [-]."""
-ROUGH = 1e-6
-"""Impulses with a greater error (`round_error`) are none, and change no velocity [-]."""
+
+@dataclass(frozen=True)
+class CollisionNumbers:
+    """Rounds of a collision, and how well their impulses have to be found."""
+
+    rounds: int = 500
+    """Until the rest ends without restitution [-]: masses of a factor of 1e3 that touch anywhere
+    take some hundred;"""
+    rounds_with_friction: int = 50
+    """with it one in five of those has no end, and energy is lost anyway [-]."""
+    least_tolerance: float = 1e-16  # the smallest residual that is asked for [-]
+    most_error: float = 1e-6  # (`round_error`) of impulses that change velocities [-]
+    pivoting_contacts: int = 300  # up to so many in 2D are solved by pivoting first [-]
+
+
+COLLISION = CollisionNumbers()
 
 
 @dataclass(frozen=True)
@@ -84,8 +92,7 @@ class Collision:
     """Smallest factor eps had to be multiplied by for impulses to exist and energy not to grow; 1
     without friction."""
     message: str = ""
-    cut_off: bool = False
-    """Whether rounds ran out, and the rest was taken without restitution."""
+    cut_off: bool = False  # whether rounds ran out, and the rest was taken without restitution
 
     @property
     def solved(self) -> bool:
@@ -118,7 +125,7 @@ def collide(
     eps = require_one_a_contact(restitution, "restitution", 1.0, nc)
     mu = require_one_a_contact(friction, "friction", MOST_FRICTION, nc)
     if max_rounds is None:
-        max_rounds = COLLISION_ROUNDS_ROUGH if mu.any() else COLLISION_ROUNDS
+        max_rounds = COLLISION.rounds_with_friction if mu.any() else COLLISION.rounds
     if law not in get_args(Law):
         remedy = "give one of " + ", ".join(get_args(Law))
         raise UsageError(f"law is {law!r}", where="law", remedy=remedy)
@@ -130,7 +137,7 @@ def collide(
     if drive is not None:
         moved = numbers_of("drive", drive, nc * dim, "one number a row of J")
     first = bodies.jacobian @ before + moved
-    none = max(still, SPEED_ROUND_OFF * float(np.abs(first).max(initial=0.0)))
+    none = max(still, PASSING.speed_round_off * float(np.abs(first).max(initial=0.0)))
     after, impulse = before.copy(), np.zeros(nc * dim)
     worst, rounds, factor = 0.0, 0, 1.0
     notes: list[str] = []
@@ -147,13 +154,13 @@ def collide(
             bodies, now, taking, bounce, mu, dim, law, tolerance
         )
         worst, rounds, factor = max(worst, error), rounds + 1, min(factor, used)
-        if not solution.solved or error > ROUGH:
+        if not solution.solved or error > COLLISION.most_error:
             status = "not converged" if solution.solved else solution.status
             notes.append(
                 solution.message or f"impulses of {np.abs(part).max():.1g} N s were found, which"
                 f" leave velocities wrong by {error:.1g} of them"
             )  # fmt: skip
-        if error > ROUGH:
+        if error > COLLISION.most_error:
             break
         impulse += part
         after = after + bodies.inverse_mass @ (bodies.jacobian.T @ part)
@@ -199,7 +206,8 @@ def run_collision_round(
         if not (used.any() and problem.friction.any()):
             break  # without friction energy can not grow
         change = 0.5 * float(p @ (2.0 * v + part.product(p)))
-        if not share.next(np.array([error > ROUGH or change > work_round_off(part, p, v)])):
+        grows = error > COLLISION.most_error or change > work_round_off(part, p, v)
+        if not share.next(np.array([grows])):
             break
     impulse = np.zeros(bodies.jacobian.shape[0])
     impulse[rows] = p
@@ -208,10 +216,10 @@ def run_collision_round(
 
 def round_error(problem: FrictionProblem, solution: FrictionSolution) -> float:
     """Residual of a round's impulses, or the share of the velocities that they leave wrong, where
-    that is more than `ROUGH`: impulses without bound make any residual small [-]."""
+    that is more than `COLLISION`'s: impulses without bound make any residual small [-]."""
     speed = length(problem.offset)
     left = max(solution.residual, FORCE_ROUND_OFF) * length(solution.r) / problem.rho
-    return left / speed if left > ROUGH * speed else solution.residual
+    return left / speed if left > COLLISION.most_error * speed else solution.residual
 
 
 def work_round_off(bodies: BodySpace, impulse: Floats, velocity: Floats) -> float:
@@ -222,7 +230,7 @@ def work_round_off(bodies: BodySpace, impulse: Floats, velocity: Floats) -> floa
     the size ``p_c^2 W_cc``.
     """
     own = FORCE_ROUND_OFF * float(impulse**2 @ bodies.diagonal)
-    return SPEED_ROUND_OFF * float(np.abs(impulse) @ np.abs(velocity)) + own
+    return PASSING.speed_round_off * float(np.abs(impulse) @ np.abs(velocity)) + own
 
 
 def find_round_impulses(problem: FrictionProblem, tolerance: float) -> FrictionSolution:
@@ -234,7 +242,7 @@ def find_round_impulses(problem: FrictionProblem, tolerance: float) -> FrictionS
     found = _find_impulses_at(problem, tolerance)
     error = found.residual * length(found.r) / problem.rho
     if found.solved and error > (most := tolerance * length(problem.offset)):
-        finer = max(found.residual * most / error, LEAST_TOLERANCE)
+        finer = max(found.residual * most / error, COLLISION.least_tolerance)
         again = _find_impulses_at(problem, finer)
         if again.residual < found.residual:
             found = judge_forces(problem, again.r, tolerance, again.method, again.work)
@@ -242,7 +250,8 @@ def find_round_impulses(problem: FrictionProblem, tolerance: float) -> FrictionS
 
 
 def _find_impulses_at(problem: FrictionProblem, tolerance: float) -> FrictionSolution:
-    if problem.friction.any() and problem.dim == 2 and problem.contacts <= 300:
+    few = problem.contacts <= COLLISION.pivoting_contacts
+    if problem.friction.any() and problem.dim == 2 and few:
         found = pivoting(problem, None, tolerance)
         if found.solved:
             return found

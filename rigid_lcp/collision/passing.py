@@ -15,8 +15,8 @@ the order in time; no time passes between them.
 
 How many there are depends on the masses: a light disc between a wall and a heavy one takes
 ``pi sqrt(M / m)``.  At restitution 1 without friction they come to an end, and are awaited
-(`PASSING_ROUNDS`).  With losses they need not (inelastic collapse, Zeno), and what a collapse has
-left goes in its end: there `LOSSY_ROUNDS` and `LOSSY_WORK` bound the work, and what still
+(`PassingNumbers`).  With losses they need not (inelastic collapse, Zeno), and what a collapse
+has left goes in its end: there ``lossy_rounds`` and ``lossy_work`` bound the work, and what still
 approaches is closed without restitution.  `Impulses.cut_off` tells where either bound was met.
 """
 
@@ -34,14 +34,20 @@ Solve = Callable[[BodySpace, Floats, Floats], tuple[FrictionSolution, float]]
 """Impulses of the contacts of J with relative velocities q (nc, dim) and friction (nc,), and their
 error [-]."""
 
-PASSING_ROUNDS = 20_000
-"""Most rounds of a step, about 1 ms each where few bodies collide: a light disc between a wall and
-a heavy one takes as many at a mass ratio of 4e7."""
-LOSSY_ROUNDS, LOSSY_WORK = 50, 1_000
-"""Rounds that contacts with friction or a restitution below 1 always have, and the sum of contacts
-over the rounds [-] until which they have more."""
-SPEED_ROUND_OFF = 1e-12
-"""Velocities this small against the largest of a collision are no approach; works likewise [-]."""
+
+@dataclass(frozen=True)
+class PassingNumbers:
+    """Rounds of a step, and round-off."""
+
+    rounds: int = 20_000
+    """At most [-], about 1 ms each where few bodies collide: a light disc between a wall and a
+    heavy one takes as many at a mass ratio of 4e7."""
+    lossy_rounds: int = 50  # of contacts with friction or a restitution below 1, always [-]
+    lossy_work: int = 1_000  # contacts, summed over the rounds, until which they have more [-]
+    speed_round_off: float = 1e-12  # over the largest velocity of a collision; of works too [-]
+
+
+PASSING = PassingNumbers()
 
 
 @dataclass(frozen=True)
@@ -132,21 +138,22 @@ def find_impulses_in_turn(bodies: BodySpace, closing: Closing, solve: Solve) -> 
     impulses of earlier rounds, and not yet what loads and turning add within the step.
     """
     within = closing.offset[:, 0] - closing.before
-    least = SPEED_ROUND_OFF * float(np.abs(closing.offset).max(initial=0.0))
+    least = PASSING.speed_round_off * float(np.abs(closing.offset).max(initial=0.0))
     now = replace(closing, slow=max(closing.slow, least))
     lossy = (closing.restitution < 1.0) | (closing.friction > 0.0)
     impulse = np.zeros_like(now.offset)
     worst, message, cut_off, work = 0.0, "", False, 0
-    for turn in range(PASSING_ROUNDS + 1):
+    for turn in range(PASSING.rounds + 1):
         bounce = find_bouncing(now)
         if turn > 0:
             bounce &= needs_impulse(now, least)
-            if turn >= LOSSY_ROUNDS and work >= LOSSY_WORK and (bounce & lossy).any():
+            spent = turn >= PASSING.lossy_rounds and work >= PASSING.lossy_work
+            if spent and (bounce & lossy).any():
                 now = replace(now, restitution=np.where(lossy, 0.0, now.restitution))
                 bounce &= ~lossy
                 cut_off = True
-        cut_off |= turn == PASSING_ROUNDS and bool(bounce.any())
-        last = turn > 0 and (turn == PASSING_ROUNDS or not bounce.any())
+        cut_off |= turn == PASSING.rounds and bool(bounce.any())
+        last = turn > 0 and (turn == PASSING.rounds or not bounce.any())
         bounce &= not last
         resting = ((now.gap <= now.touching) | (now.restitution == 0.0)) & (now.offset[:, 0] <= 0.0)
         taking = np.flatnonzero(bounce | resting | last)

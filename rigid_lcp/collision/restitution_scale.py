@@ -16,9 +16,12 @@ from __future__ import annotations
 import numpy as np
 
 from rigid_lcp.arrays import Bools, Floats
-from rigid_lcp.collision.passing import SPEED_ROUND_OFF, Closing, Impulses
+from rigid_lcp.collision.passing import PASSING, Closing, Impulses
 from rigid_lcp.friction.auto import islands
 from rigid_lcp.friction.problem import BodySpace, FrictionProblem
+
+SHARE_RESOLUTION = 1 / 64
+"""To which a share is found [-]; a smaller one is none."""
 
 
 def gains_energy(
@@ -38,7 +41,7 @@ def gains_energy(
     after = free + bodies.product(impulse.ravel()).reshape(impulse.shape)
     parts = 0.5 * (np.abs(impulse) * (np.abs(before) + np.abs(after))).sum(axis=1)
     work = 0.5 * (impulse * (before + after)).sum(axis=1)
-    if not (work > SPEED_ROUND_OFF * parts.sum()).any():
+    if not (work > PASSING.speed_round_off * parts.sum()).any():
         return gains
     allowed = 0.125 * np.einsum("bi,bij,bj->b", gained, bodies.mass_blocks, gained)
     dim = impulse.shape[1]
@@ -46,13 +49,9 @@ def gains_energy(
     first, body, _ = problem.body_jacobians
     for island in islands(problem):
         touched = np.unique(np.concatenate([body[first[c] : first[c + 1]] for c in island]))
-        most = allowed[touched].sum() + SPEED_ROUND_OFF * parts[island].sum()
+        most = allowed[touched].sum() + PASSING.speed_round_off * parts[island].sum()
         gains[island] = bounce[island].any() and work[island].sum() > most
     return gains
-
-
-SHARE_RESOLUTION = 1 / 64
-"""To which a share is found [-]; a smaller one is none."""
 
 
 class Share:

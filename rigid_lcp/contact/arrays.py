@@ -10,6 +10,12 @@ from numpy.typing import NDArray
 
 from rigid_lcp.arrays import Bools, Floats, Ints
 
+FEATURE_BITS, BODY_BITS = 10, 21
+"""Digits of the names of contacts that tell features and bodies."""
+LENGTH_TIE = 1e-9
+"""Share of the smaller reach of two bodies [-] below which lengths are equal: then the body or the
+feature of the smaller number is taken, so that round-off never renames a contact."""
+
 
 @dataclass(frozen=True)
 class Contacts:

@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from rigid_lcp.arrays import Bools, Floats, Ints
-from rigid_lcp.contact.arrays import Contacts
+from rigid_lcp.contact.arrays import BODY_BITS, FEATURE_BITS, LENGTH_TIE, Contacts
 from rigid_lcp.contact.near_pairs import (
     DISC,
     HALF_SPACE,
@@ -26,11 +26,6 @@ from rigid_lcp.contact.near_pairs import (
 )
 from rigid_lcp.errors import SceneError
 from rigid_lcp.shapes import Disc, HalfSpace, Polygon
-
-TIE_IN_PLANE = 1e-9
-"""Separations that differ by less than this share of a grain's reach are equal: then the face of
-the body with the smaller number is taken, so that round-off does not change a contact's name."""
-FACE_BITS, BODY_BITS = 10, 21
 
 
 @dataclass(frozen=True)
@@ -73,10 +68,10 @@ def shapes_2d(
                 f"it is no shape of the plane ({type(shape).__name__})", where=called(number),
                 remedy="use Polygon, Disc or HalfSpace with a normal of two numbers",
             )  # fmt: skip
-        if len(corners) >= 1 << FACE_BITS:
+        if len(corners) >= 1 << FEATURE_BITS:
             raise SceneError(
                 f"it has {len(corners)} vertices", where=called(number),
-                remedy=f"use fewer than {1 << FACE_BITS}, or a disc",
+                remedy=f"use fewer than {1 << FEATURE_BITS}, or a disc",
             )  # fmt: skip
         vertices.append(corners)
         normals.append(outward)
@@ -117,7 +112,7 @@ def detect_2d(
 @njit(cache=True)
 def contact_key(a: int, b: int, vertex: int, face: int) -> int:
     """One number for a vertex of a on a face of b."""
-    return ((((a << BODY_BITS) | b) << FACE_BITS) | vertex) << FACE_BITS | face
+    return ((((a << BODY_BITS) | b) << FEATURE_BITS) | vertex) << FEATURE_BITS | face
 
 
 @njit(cache=True)
@@ -245,7 +240,7 @@ def pair_contacts(
             face_j, gap_j = widest_face(vj, nj, vi)
             if gap_j > margin:
                 continue
-            tie = TIE_IN_PLANE * min(radius[i], radius[j])
+            tie = LENGTH_TIE * min(radius[i], radius[j])
             if gap_i >= gap_j - tie:
                 upper, lower = j, i
                 count = find_face_contacts(vi, ni, face_i, vj, nj, margin, tie, found)

@@ -10,23 +10,20 @@ import numpy as np
 from numba import njit
 
 from rigid_lcp.arrays import Floats, Ints
-from rigid_lcp.contact.arrays import Contacts
+from rigid_lcp.contact.arrays import BODY_BITS, FEATURE_BITS, LENGTH_TIE, Contacts
 from rigid_lcp.contact.manifold import (
     CANDIDATE_COLUMNS,
     CORNER_FACE,
     EDGES,
     FACE_CORNER,
-    MOST,
+    MOST_KEPT,
     ROOM,
-    TIE_IN_SPACE,
     add_candidate,
     keep_outer,
     within_face,
 )
 from rigid_lcp.contact.near_pairs import HALF_SPACE, ZERO, bound_shapes, near_pairs
 from rigid_lcp.contact.placed_solids import (
-    BODY_BITS,
-    FEATURE_BITS,
     MOST_EDGES,
     POLYHEDRON,
     SPHERE,
@@ -189,7 +186,7 @@ def pair_contacts(
 
     A row of numbers: point (3), normal (3), gap, radii of curvature of a and b.
     """
-    room = MOST * len(pairs)
+    room = MOST_KEPT * len(pairs)
     bodies, numbers = np.empty((room, 2), np.int64), np.empty((room, 9))
     key = np.empty(room, np.int64)
     found = np.empty((ROOM, CANDIDATE_COLUMNS))
@@ -250,6 +247,6 @@ def find_corners_on_plane(
         gap = dot(n, x) - level
         if gap <= margin:
             count = add_candidate(
-                found, count, kind, v - first, int(ZERO), gap, n, 1.0, x, TIE_IN_SPACE * size
+                found, count, kind, v - first, int(ZERO), gap, n, 1.0, x, LENGTH_TIE * size
             )
     return keep_outer(found, count, size)

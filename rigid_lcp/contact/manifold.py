@@ -11,26 +11,18 @@ import numpy as np
 from numba import njit
 
 from rigid_lcp.arrays import Floats, Ints
+from rigid_lcp.contact.arrays import LENGTH_TIE
 from rigid_lcp.contact.near_pairs import ZERO
-from rigid_lcp.contact.separation import NEARLY_OPPOSITE, Solids, cross, cross_edges, dot
+from rigid_lcp.contact.separation import NEARLY_OPPOSITE, POLYHEDRA, Solids, cross, cross_edges, dot
 
-TIE_IN_SPACE = 1e-9
-"""Share of a body's reach below which lengths are equal: round-off never renames a contact."""
-SAME_CONTACT = 1e-6
-"""Contacts of a pair nearer than this share of the reach are one."""
 CORNER_FACE, FACE_CORNER, EDGES = 0, 1, 2
 """Corner of a on a face of b; corner of b on a face of a; an edge of a across one of b."""
-STEEP = 10.0
-"""How much farther out [m] a contact must be for each metre of gap; faces that share contacts are
-tilted by less than its inverse, see `rigid_lcp.contact.separation.NEARLY_OPPOSITE`."""
-OUTSIDE_HULL = 1e-2
-"""Share of the reach by which a contact must lie outside of those kept to be kept as well."""
-MOST = 12
-"""Contacts kept of a pair."""
 ROOM = 256
 """Candidates looked at for one pair; there are a few dozen for grains of a hundred corners."""
 CANDIDATE_COLUMNS = 10
 """Row of a candidate: kind, feature of a, feature of b, gap, normal from b to a (3), point (3)."""
+SAME_CONTACT, SLOPE = POLYHEDRA.same_contact, POLYHEDRA.slope
+OUTSIDE_HULL, MOST_KEPT = POLYHEDRA.outside_hull, POLYHEDRA.most_kept
 
 
 @njit(cache=True)
@@ -92,7 +84,7 @@ def find_face_candidates(
     for v in range(first_other, solids.first_vertex[other + 1]):
         x = solids.vertex[v]
         gap = dot(n, x) - level
-        if gap <= margin and within_face(solids, own, face, x, TIE_IN_SPACE * size):
+        if gap <= margin and within_face(solids, own, face, x, LENGTH_TIE * size):
             here, there = v - first_other, face - solids.first_face[own]
             kind, first, second = int(CORNER_FACE), here, there
             if not own_is_b:
@@ -109,7 +101,7 @@ def find_face_candidates(
         for k in range(start, stop):
             x = solids.vertex[first_own + solids.loop[k]]
             gap = dot(m, x) - solids.offset[g]
-            if gap <= margin and within_face(solids, other, g, x, TIE_IN_SPACE * size):
+            if gap <= margin and within_face(solids, other, g, x, LENGTH_TIE * size):
                 here, there = g - solids.first_face[other], solids.loop[k]
                 kind, first, second = int(FACE_CORNER), here, there
                 if not own_is_b:
@@ -163,13 +155,13 @@ def least_gap(found: Floats, count: int) -> float:
 
 @njit(cache=True)
 def find_farthest_from(found: Floats, count: int, x: float, y: float, z: float, tie: float) -> int:
-    """Row of the candidate farthest from a point, less `STEEP` gaps; the first within ``tie``."""
+    """Row of the candidate farthest from a point, less `SLOPE` gaps; the first within ``tie``."""
     best, most = 0, -np.inf
     for k in range(count):
         away = np.sqrt(
             (found[k, 7] - x) ** 2 + (found[k, 8] - y) ** 2 + (found[k, 9] - z) ** 2
         )  # fmt: skip
-        away -= STEEP * found[k, 3]
+        away -= SLOPE * found[k, 3]
         if away > most + tie:
             best, most = k, away
     return best
@@ -179,7 +171,7 @@ def find_farthest_from(found: Floats, count: int, x: float, y: float, z: float, 
 def find_farthest_along(
     found: Floats, count: int, start: int, d0: float, d1: float, d2: float, tie: float
 ) -> int:
-    """Row of the candidate farthest from row ``start`` along d, less `STEEP` gaps; -1 if none is
+    """Row of the candidate farthest from row ``start`` along d, less `SLOPE` gaps; -1 if none is
     beyond ``tie`` [m]."""
     best, most = -1, -np.inf
     length = np.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
@@ -190,7 +182,7 @@ def find_farthest_along(
             + d1 * (found[k, 8] - found[start, 8])
             + d2 * (found[k, 9] - found[start, 9])
         )
-        worth = along - STEEP * length * (found[k, 3] - found[start, 3])
+        worth = along - SLOPE * length * (found[k, 3] - found[start, 3])
         if along > step and worth > most + step:
             best, most = k, worth
     return best
@@ -203,7 +195,7 @@ def keep_outer_rows(found: Floats, count: int, size: float, kept: Ints, number: 
     Edge by edge of the hull, the candidate farthest beyond it by more than `OUTSIDE_HULL`: as a
     stone on a face of five corners may stand on any three of them.  Returns the number of rows.
     """
-    ring = np.empty(MOST, np.int64)
+    ring = np.empty(MOST_KEPT, np.int64)
     corners = 0
     for row in (kept[0], kept[3], kept[1], kept[2]):  # anticlockwise about the normal
         if row >= 0:
@@ -212,9 +204,9 @@ def keep_outer_rows(found: Floats, count: int, size: float, kept: Ints, number: 
     normal = found[kept[0], 4:7]
     least = OUTSIDE_HULL * size
     added = True
-    while added and 2 < corners < MOST:  # every edge once a round: what is too much goes evenly
+    while added and 2 < corners < MOST_KEPT:  # every edge once a round: what is too much is spread
         added, place = False, 0
-        while place < corners < MOST:
+        while place < corners < MOST_KEPT:
             start, end = found[ring[place]], found[ring[(place + 1) % corners]]
             u0, u1, u2 = end[7] - start[7], end[8] - start[8], end[9] - start[9]
             o0, o1, o2 = cross(u0, u1, u2, normal[0], normal[1], normal[2])
@@ -226,10 +218,10 @@ def keep_outer_rows(found: Floats, count: int, size: float, kept: Ints, number: 
                     o0 * (found[k, 7] - start[7])
                     + o1 * (found[k, 8] - start[8])
                     + o2 * (found[k, 9] - start[9])
-                    - STEEP * length * max(found[k, 3] - higher, 0.0)
+                    - SLOPE * length * max(found[k, 3] - higher, 0.0)
                 )
                 if worth > most:
-                    best, most = k, worth + TIE_IN_SPACE * size * length
+                    best, most = k, worth + LENGTH_TIE * size * length
             place += 1
             if best < 0:
                 continue
@@ -245,15 +237,15 @@ def keep_outer(found: Floats, count: int, size: float) -> int:
     """Keep the candidates that bear in the first rows of ``found``: returns how many.
 
     The farthest from the middle, the farthest from that, and on either side of the line through
-    both the farthest; then what lies outside of these (`keep_outer_rows`), at most `MOST` in all;
+    both the farthest; then what lies outside of these (`keep_outer_rows`), `MOST_KEPT` in all;
     the deepest of all takes the place of the nearest of them if it is deeper.  One that is higher
-    by g must be `STEEP` g farther out to be taken: of a worn corner the ends that touch, not the
-    one beside them.  Lengths within `TIE_IN_SPACE` of each other count as equal: the first is
+    by g must be `SLOPE` g farther out to be taken: of a worn corner the ends that touch, not the
+    one beside them.  Lengths within `LENGTH_TIE` of each other count as equal: the first is
     taken.
     """
     if count <= 4:
         return count
-    tie = TIE_IN_SPACE * size
+    tie = LENGTH_TIE * size
     middle = np.zeros(3)
     deepest = 0
     for k in range(count):
@@ -265,7 +257,7 @@ def keep_outer(found: Floats, count: int, size: float) -> int:
     q = find_farthest_from(found, count, found[p, 7], found[p, 8], found[p, 9], tie)
     u0, u1, u2 = found[q, 7] - found[p, 7], found[q, 8] - found[p, 8], found[q, 9] - found[p, 9]
     d0, d1, d2 = cross(found[p, 4], found[p, 5], found[p, 6], u0, u1, u2)
-    rows = np.empty(MOST + 4, np.int64)
+    rows = np.empty(MOST_KEPT + 4, np.int64)
     rows[0], rows[1] = p, q
     rows[2] = find_farthest_along(found, count, p, d0, d1, d2, tie)
     rows[3] = find_farthest_along(found, count, p, -d0, -d1, -d2, tie)

@@ -8,15 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigid_lcp.arrays import Bools, Floats, Ints
+from rigid_lcp.contact.arrays import FEATURE_BITS
 from rigid_lcp.contact.near_pairs import HALF_SPACE
-from rigid_lcp.contact.separation import NEARLY_OPPOSITE, TILT, Solids
+from rigid_lcp.contact.separation import POLYHEDRA, Solids
 from rigid_lcp.errors import SceneError, ShapeError
 from rigid_lcp.shapes import HalfSpace, Polyhedron, Sphere, rotation_matrix
 
 POLYHEDRON, SPHERE = 0, 1
 """Kinds of shapes as the kernels know them, with `HALF_SPACE`."""
-FEATURE_BITS, BODY_BITS = 10, 21
-"""Digits of the names of contacts that tell features and bodies."""
 MOST_EDGES = 1 << (FEATURE_BITS - 1)
 """Edges a polyhedron may have, so that the names of its contacts stay apart."""
 
@@ -99,7 +98,7 @@ def _solid(shape: Polyhedron) -> Solids:
         np.array([0, len(shape.faces)]), shape.normals, shape.distances,
         np.cumsum([len(loop) for loop in shape.faces]), np.concatenate(shape.faces),
         np.array([0, len(edges)]), np.ascontiguousarray(edges[:, :2]), bisector,
-        np.cos(opening + TILT), np.cos(opening + NEARLY_OPPOSITE),
+        np.cos(opening + POLYHEDRA.tilt), np.cos(opening + POLYHEDRA.nearly_opposite),
     )  # fmt: skip
 
 

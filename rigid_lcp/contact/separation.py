@@ -8,6 +8,7 @@ eq. 9 wants them, so normals and gaps are exact to round-off, which those of GJK
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -15,13 +16,26 @@ from numba import njit
 
 from rigid_lcp.arrays import Floats, Ints
 
-TILT = 1e-9
-"""Round-off allowed where a normal lies just between two face normals [rad]."""
-NEARLY_OPPOSITE = 0.1
-"""Faces whose normals are opposite within this angle [rad] may lie upon each other: they share
-every point contact that lies within both of them."""
-PARALLEL_EDGES = 1e-6
-"""Edges with a smaller sine of the angle between them have no common normal of their own [-]."""
+
+@dataclass(frozen=True)
+class PolyhedronNumbers:
+    """Angles of faces and edges; which contacts of a pair are kept, by shares of its reach."""
+
+    tilt: float = 1e-9  # round-off where a normal lies just between two face normals [rad]
+    nearly_opposite: float = 0.1
+    """Faces whose normals are opposite within this angle [rad] may lie upon each other: they share
+    every point contact that lies within both of them."""
+    parallel_edges: float = 1e-6  # least sine of the angle of edges that have a common normal [-]
+    same_contact: float = 1e-6  # distance below which two contacts are one [-]
+    slope: float = 10.0
+    """How much farther out a contact must be for its gap [m/m] to be kept; faces that share
+    contacts are tilted by less than its inverse, see `nearly_opposite`."""
+    outside_hull: float = 1e-2  # distance of one more from the hull of those kept, at least [-]
+    most_kept: int = 12  # contacts [-]
+
+
+POLYHEDRA = PolyhedronNumbers()
+NEARLY_OPPOSITE, PARALLEL_EDGES = POLYHEDRA.nearly_opposite, POLYHEDRA.parallel_edges
 
 
 class Solids(NamedTuple):

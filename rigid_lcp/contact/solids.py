@@ -6,7 +6,7 @@ less than the distance, no candidate is as near as it says, and the nearest corn
 Where the nearest features are a corner and an edge, or two corners, no face and no pair of crossing
 edges names the normal: it lies along the line of nearest points, as between two spheres of radius
 zero.  The plane across it through either point parts the two bodies, so bodies that do not approach
-along it can not meet by translation.  At touch (within `rigid_lcp.contact.manifold.TIE_IN_SPACE`)
+along it can not meet by translation.  At touch (within `rigid_lcp.contact.arrays.LENGTH_TIE`)
 the normal is that of the face that keeps the bodies farthest apart, which it also is once they
 overlap: the gap is continuous there; a normal, as that of the distance to a point, can not be.
 """
@@ -17,10 +17,10 @@ import numpy as np
 from numba import njit
 
 from rigid_lcp.arrays import Floats, Ints
+from rigid_lcp.contact.arrays import LENGTH_TIE
 from rigid_lcp.contact.manifold import (
     EDGES,
     SAME_CONTACT,
-    TIE_IN_SPACE,
     add_candidate,
     find_face_candidates,
     keep_outer,
@@ -105,10 +105,10 @@ def find_corner_candidates(
     """Add the nearest corner-edge pair no farther than ``within`` [m], and those beside it.
 
     ``near_a``, ``near_b``: edges of each body near the other; ``touching`` (3,): normal where the
-    points are less than `TIE_IN_SPACE` of ``size`` [m] apart.  Rows of ``found`` as
+    points are less than `LENGTH_TIE` of ``size`` [m] apart.  Rows of ``found`` as
     `rigid_lcp.contact.manifold.CANDIDATE_COLUMNS` says; returns how many there are.
     """
-    tie = TIE_IN_SPACE * size
+    tie = LENGTH_TIE * size
     pairs = np.empty((PAIRS, PAIR_COLUMNS))
     many = list_corner_edge_pairs(solids, a, b, near_b, 1.0, within, tie, pairs, int(ZERO))
     many = list_corner_edge_pairs(solids, b, a, near_a, -1.0, within, tie, pairs, many)
@@ -160,7 +160,7 @@ def find_solid_contacts(
     edge_a, edge_b, gap_edges = separate_edges(solids, a, b, near_a, near_b, margin)
     if gap_edges > margin:
         return 0
-    own_is_b = gap_b >= gap_a - TIE_IN_SPACE * size
+    own_is_b = gap_b >= gap_a - LENGTH_TIE * size
     face, own, other = (face_b, b, a) if own_is_b else (face_a, a, b)
     crossing = np.empty(9)
     towards = solids.normal[face] * (1.0 if own_is_b else -1.0)
@@ -169,13 +169,13 @@ def find_solid_contacts(
     crosses = (
         edge_a >= 0
         and cross_edges(solids, a, edge_a, b, edge_b, solids.bisector[edge_b], crossing)
-        and -TIE_IN_SPACE <= crossing[0] <= 1.0 + TIE_IN_SPACE
-        and -TIE_IN_SPACE <= crossing[1] <= 1.0 + TIE_IN_SPACE
+        and -LENGTH_TIE <= crossing[0] <= 1.0 + LENGTH_TIE
+        and -LENGTH_TIE <= crossing[1] <= 1.0 + LENGTH_TIE
     )
     faces = max(gap_a, gap_b)
     alone = (
         crosses
-        and gap_edges > faces + TIE_IN_SPACE * size
+        and gap_edges > faces + LENGTH_TIE * size
         and dot(crossing[3:6], towards) < np.cos(NEARLY_OPPOSITE)
     )
     count = int(ZERO)
@@ -183,8 +183,8 @@ def find_solid_contacts(
         near = near_a if own_is_b else near_b
         count = find_face_candidates(solids, face, own, other, own_is_b, near, margin, size, found)
     least = least_gap(found, count)
-    apart, missing = max(faces, gap_edges), least > gap_edges + TIE_IN_SPACE * size
-    deep = count == 0 and apart < -TIE_IN_SPACE * size
+    apart, missing = max(faces, gap_edges), least > gap_edges + LENGTH_TIE * size
+    deep = count == 0 and apart < -LENGTH_TIE * size
     if alone or (crosses and missing and (gap_edges == apart or deep)):
         count = add_candidate(
             found, count, int(EDGES), edge_a - solids.first_edge[a],
@@ -192,8 +192,8 @@ def find_solid_contacts(
             SAME_CONTACT * size,
         )  # fmt: skip
         least = least_gap(found, count)
-    if apart > -TIE_IN_SPACE * size and least > apart + TIE_IN_SPACE * size:
-        within = min(margin, least - TIE_IN_SPACE * size)
+    if apart > -LENGTH_TIE * size and least > apart + LENGTH_TIE * size:
+        within = min(margin, least - LENGTH_TIE * size)
         count = find_corner_candidates(
             solids, a, b, near_a, near_b, within, size, towards, found, count
         )

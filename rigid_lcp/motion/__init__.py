@@ -1,7 +1,7 @@
 """Bodies in motion: equations, time stepping, Runge-Kutta."""
 
 from rigid_lcp.motion.checks import (
-    MOST_STEPS,
+    BOUNDS,
     Loads,
     check_loads,
     require_line,
@@ -23,7 +23,7 @@ from rigid_lcp.motion.time_stepping import contact_forces, step_moreau
 from rigid_lcp.motion.world import Body, Scene, World, make_world
 
 __all__ = [
-    "MOST_STEPS", "Body", "Loads", "Motion", "Pace", "Scene", "World", "advance_runge_kutta",
+    "BOUNDS", "Body", "Loads", "Motion", "Pace", "Scene", "World", "advance_runge_kutta",
     "body_space", "check_loads", "contact_forces", "find_contact_offset", "is_finite",
     "make_world", "relative_velocity", "replace_rates", "require_line", "require_number_in",
     "require_seconds", "require_whole_in", "step_moreau", "too_many_steps", "too_much", "turn_arm",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -14,10 +14,17 @@ from rigid_lcp.friction.methods import dantzig, pivoting
 from rigid_lcp.friction.problem import BodySpace, FrictionSolution, friction_problem
 from rigid_lcp.motion.time_stepping import forces_error
 
-LASTING_MOST = 200
-"""Contacts above which a dense solve is no short cut."""
-ACCEPTED = 1e-8
-"""Residual of forces or impulses above which a step is not made."""
+
+@dataclass(frozen=True)
+class LastingNumbers:
+    """Forces that go on as they were, and what is accepted."""
+
+    contacts: int = 200  # above which a dense solve is no short cut [-]
+    rank: float = 1e-13  # singular values are zero below this part of the greatest [-]
+    most_error: float = 1e-8  # of forces or impulses with which a step is made [-]
+
+
+LASTING = LastingNumbers()
 
 
 def find_forces(
@@ -49,7 +56,7 @@ def find_forces(
         )  # fmt: skip
     error = forces_error(bodies, solution, gravity)
     endless = not solution.solved and solution.residual <= tolerance  # so small only beside them
-    if endless or not error <= ACCEPTED:
+    if endless or not error <= LASTING.most_error:
         raise NotConverged(
             f"the contact forces have a residual of {error:.2g}, and are"
             f" {np.abs(solution.r).max():.2g} N at most",
@@ -69,7 +76,7 @@ def try_lasting_forces(
     no more.  None where a contact would pull, or grip by more than its friction.
     """
     dim, count = 1 + slip.shape[1], len(friction)
-    if count > LASTING_MOST:
+    if count > LASTING.contacts:
         return None
     known = np.zeros((count, dim), dtype=bool)
     known[:, 1:] = (slip.any(axis=1) | (friction == 0))[:, None]
@@ -82,9 +89,9 @@ def try_lasting_forces(
     jacobian = bodies.jacobian.toarray()
     w = jacobian @ (bodies.inverse_mass @ jacobian.T)
     mixed = (w @ mixing)[free][:, free]
-    force = mixing[:, free] @ np.linalg.lstsq(mixed, -offset[free], rcond=1e-13)[0]
+    force = mixing[:, free] @ np.linalg.lstsq(mixed, -offset[free], rcond=LASTING.rank)[0]
     error = offset + w @ force
-    force -= mixing[:, free] @ np.linalg.lstsq(mixed, error[free], rcond=1e-13)[0]
+    force -= mixing[:, free] @ np.linalg.lstsq(mixed, error[free], rcond=LASTING.rank)[0]
     found = force.reshape(count, dim)
     grip = np.linalg.norm(found[:, 1:], axis=1) * (speed == 0.0)
     size = float(np.linalg.norm(force))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from math import inf, nan
 from numbers import Integral, Real
 from typing import Any
@@ -18,25 +19,31 @@ from rigid_lcp.shapes import HalfSpace, real_numbers, require_vector
 Loads = Callable[[float, Motion], ArrayLike | None]
 """Forces and torques (n, 3) in 2D, (n, 6) in 3D [N, N m] at a time [s] and state."""
 
-MOST_DENSITY = 1e50
-"""Densities above it [kg/m^3] have masses that can not be computed with."""
-MOST_OF_A_STATE = 1e50
-"""Places, velocities, spins and gravity above it [SI] have energies that are no numbers, with
-lengths as great as shapes may have."""
-MOST_STEPS = 1e10
-"""Steps of a run, more than any machine makes."""
+
+@dataclass(frozen=True)
+class InputBounds:
+    """The greatest numbers that a scene and its run may be given."""
+
+    density: float = 1e50  # [kg/m^3]: above it masses can not be computed with
+    state: float = 1e50
+    """Of places, velocities, spins and gravity [SI]: above it energies are no numbers, with lengths
+    as great as shapes may have."""
+    steps: float = 1e10  # of a run [-], more than any machine makes
+
+
+BOUNDS = InputBounds()
 
 
 def too_many_steps(what: str, steps: float) -> str:
     """Sentence on a span of time, ``what``, of more steps than can be made."""
-    return f"{what} is {steps:.3g} steps: at most {MOST_STEPS:.0e} can be made"
+    return f"{what} is {steps:.3g} steps: at most {BOUNDS.steps:.0e} can be made"
 
 
 def require_density(value: Any, where: str) -> float:
     """A density [kg/m^3], in 2D [kg/m^2]; `SceneError` for all else."""
-    remedy = f"give a density above zero, {MOST_DENSITY:g} at most, or fixed=True for a body that"
+    remedy = f"give a density above zero, {BOUNDS.density:g} at most, or fixed=True for a body that"
     return require_number_in(
-        value, 0.0, MOST_DENSITY, "the density", where, f"{remedy} does not move", above=True
+        value, 0.0, BOUNDS.density, "the density", where, f"{remedy} does not move", above=True
     )
 
 

@@ -14,7 +14,7 @@ from rigid_lcp.errors import ProblemError, SceneError
 from rigid_lcp.motion.state import Motion
 from rigid_lcp.motion.world import World
 
-SAFE = 1e300
+FINITE_ENERGY = 1e300
 """An energy [J] that is bounded by this need not be computed to be known as finite."""
 
 
@@ -25,7 +25,7 @@ def is_finite(world: World, motion: Motion) -> bool:
     with np.errstate(all="ignore"):
         squares = np.vdot(place, place) + np.vdot(velocity, velocity) + np.vdot(spin, spin)
         squares += len(place) * np.vdot(gravity, gravity)  # as 2 |g| |x| <= g^2 + x^2
-        if world.heaviest * squares < SAFE:
+        if world.heaviest * squares < FINITE_ENERGY:
             return bool(np.isfinite(motion.angle).all())
         numbers = (place, motion.angle, velocity, spin, world.energy(motion))
         return all(bool(np.isfinite(each).all()) for each in numbers)

@@ -13,23 +13,25 @@ from rigid_lcp.arrays import Bools, Floats, Ints
 from rigid_lcp.collision import Collision, collide
 from rigid_lcp.contact import Contacts, choose_tangents, contact_rows
 from rigid_lcp.errors import NotConverged
-from rigid_lcp.motion.acceleration_forces import ACCEPTED
+from rigid_lcp.motion.acceleration_forces import LASTING
 from rigid_lcp.motion.equations import body_space, find_response, relative_velocity
 from rigid_lcp.motion.state import Motion, displace_motion, replace_rates
 from rigid_lcp.motion.world import World
 
-TOUCH = 1e-9
-"""Gap below which two bodies touch, as a share of the smallest body's size."""
-AIM = 0.25
-"""Gap at which a step that would end in an overlap is to end, in touches."""
-LASTING_OVERLAP = 1e-11
-"""Overlap that makes a step too long, likewise."""
-PRESSED_OVERLAP = 1e-3
-"""Overlap that contacts which press all the time may have before it is removed, likewise."""
-REST_SPEED = 1e-4
-"""Approach that ends without a bounce, as a share of ``sqrt(g size)``."""
-STILL = 1e-9
-"""Relative velocity that counts as none, normal or tangential, likewise."""
+
+@dataclass(frozen=True)
+class TouchNumbers:
+    """What touches, overlaps and rests, in the measures of the module's head."""
+
+    gap: float = 1e-9  # below which two bodies touch [-]
+    aimed_gap: float = 0.25  # where a step that would end in an overlap is to end, in touches [-]
+    overlap: float = 1e-11  # that makes a step too long [-]
+    pressed_overlap: float = 1e-3  # that contacts which press all the time may have [-]
+    rest_speed: float = 1e-4  # of an approach that ends without a bounce [-]
+    no_speed: float = 1e-9  # normal or tangential velocity that counts as none [-]
+
+
+TOUCHING = TouchNumbers()
 
 
 @dataclass(frozen=True)
@@ -55,10 +57,10 @@ def speed_scale(world: World, motion: Motion) -> float:
 
 
 def lasting_contacts(world: World, motion: Motion) -> Lasting:
-    """Contacts that touch and neither approach nor part; sliding above ``STILL`` is a slip."""
-    contacts = world.contacts(motion, 0.5 * TOUCH * world.length)
+    """Contacts that touch and neither approach nor part; sliding above `TOUCHING`'s is a slip."""
+    contacts = world.contacts(motion, 0.5 * TOUCHING.gap * world.length)
     velocity = relative_velocity(contacts, motion)
-    still = STILL * speed_scale(world, motion)
+    still = TOUCHING.no_speed * speed_scale(world, motion)
     stay = velocity[:, 0] <= still
     slip = velocity[stay, 1:]
     slip[np.linalg.norm(slip, axis=1) <= still] = 0.0
@@ -71,11 +73,13 @@ def redetect_contacts(
     """The lasting contacts at a stage of the step, and the slip that directs their friction."""
     if len(lasting.contacts) == 0:
         return lasting.contacts, lasting.slip
-    found = world.contacts(motion, h * world.speeds(motion.rates) + 10 * TOUCH * world.length)
+    way = h * world.speeds(motion.rates)
+    found = world.contacts(motion, way + 10 * TOUCHING.gap * world.length)
     rows, there = contact_rows(found.key, lasting.contacts.key)
     now, before = rows[there], np.flatnonzero(there)
     if not there.all():
-        taken, lost = successors(found, lasting.contacts, there, PRESSED_OVERLAP * world.length)
+        within = TOUCHING.pressed_overlap * world.length
+        taken, lost = successors(found, lasting.contacts, there, within)
         now, before = np.concatenate([now, taken]), np.concatenate([before, lost])
     contacts = found[now]
     slip = carry_slip(lasting, before, contacts)
@@ -122,20 +126,21 @@ def collided(world: World, motion: Motion, tolerance: float) -> tuple[Motion, Co
     `rigid_lcp.collision.collide`, restitution on normal velocities, as time stepping has it, but
     scaled down where energy would grow.  Raises `NotConverged`.
     """
-    contacts = world.contacts(motion, 0.5 * TOUCH * world.length)
+    contacts = world.contacts(motion, 0.5 * TOUCHING.gap * world.length)
     if len(contacts) == 0:
         return motion, None
     scale, velocity = speed_scale(world, motion), relative_velocity(contacts, motion)
-    if velocity[:, 0].min() >= -STILL * scale:
+    still = TOUCHING.no_speed * scale
+    if velocity[:, 0].min() >= -still:
         return motion, None
     bodies = body_space(contacts, motion.position, world.columns, world.inverse_mass(motion))
     moving = motion.rates[world.movable].ravel()
     found = collide(
         bodies, moving, contacts.restitution, contacts.friction, law="newton",
-        tolerance=tolerance, still=STILL * scale, rest_speed=REST_SPEED * scale,
+        tolerance=tolerance, still=still, rest_speed=TOUCHING.rest_speed * scale,
         drive=velocity.ravel() - bodies.jacobian @ moving,
     )  # fmt: skip
-    if not (found.solved or found.residual <= ACCEPTED):
+    if not (found.solved or found.residual <= LASTING.most_error):
         raise NotConverged(
             f"the impulses of a collision have a residual of {found.residual:.2g}",
             where=f"{len(contacts)} contacts", remedy=found.message,
@@ -157,7 +162,7 @@ def find_share_until_rest(
     if not lasting.sliding.any():
         return 1.0
     way = h * world.speeds(motion.rates) + h * world.speeds(after.rates)
-    found = world.contacts(after, way + PRESSED_OVERLAP * world.length)
+    found = world.contacts(after, way + TOUCHING.pressed_overlap * world.length)
     rows, there = contact_rows(found.key, lasting.contacts.key)
     there &= lasting.sliding & (lasting.contacts.friction > 0)
     if not there.any():
@@ -165,7 +170,7 @@ def find_share_until_rest(
     contacts = found[rows[there]]
     now, then = relative_velocity(contacts, after)[:, 1:], carry_slip(lasting, there, contacts)
     along, before = (now * then).sum(axis=1), (then * then).sum(axis=1)
-    still = STILL * speed_scale(world, after)
+    still = TOUCHING.no_speed * speed_scale(world, after)
     turned = (along < 0) & (np.linalg.norm(now, axis=1) > still)
     return float((before[turned] / (before[turned] - along[turned])).min(initial=1.0))
 
@@ -174,12 +179,12 @@ def overlap_beyond(world: World, motion: Motion, pressed: Ints) -> float:
     """Overlap that makes the step too long [m]: of contacts not ``pressed`` all the time (keys).
 
     That of lasting contacts is an error of the integration, which `remove_drift` takes out; it
-    counts above ``PRESSED_OVERLAP`` only.
+    counts above ``pressed_overlap`` only.
     """
     found = world.contacts(motion, 0.0)
     lasting = np.isin(found.key, pressed)
     overlap = -found.gap
-    overlap[lasting & (overlap < PRESSED_OVERLAP * world.length)] = 0.0
+    overlap[lasting & (overlap < TOUCHING.pressed_overlap * world.length)] = 0.0
     return float(overlap.max(initial=0.0))
 
 
@@ -189,15 +194,15 @@ def find_share_until_touch(
     """Share of a step of ``h`` [s], from ``motion`` to ``after``, at which a first gap closes.
 
     By the cubic through gap and normal velocity at both ends, of every contact not ``pressed``
-    (keys) that overlaps in the end; closed is a gap of ``AIM`` touches, as a touch is what the
-    collision needs.  None where none of these contacts was in sight at the start.
+    (keys) that overlaps in the end; closed is ``aimed_gap``, as a touch is what the collision
+    needs.  None where none of these contacts was in sight at the start.
     """
     found = world.contacts(after, 0.0)
-    found = found[(found.gap < -LASTING_OVERLAP * world.length) & ~np.isin(found.key, pressed)]
+    found = found[(found.gap < -TOUCHING.overlap * world.length) & ~np.isin(found.key, pressed)]
     start = world.contacts(motion, h * world.speeds(motion.rates) + h * world.speeds(after.rates))
     rows, there = contact_rows(start.key, found.key)
     found, start = found[there], start[rows[there]]
-    aim = AIM * TOUCH * world.length
+    aim = TOUCHING.aimed_gap * TOUCHING.gap * world.length
     ends = zip(
         start.gap - aim, h * relative_velocity(start, motion)[:, 0], found.gap - aim,
         h * relative_velocity(found, after)[:, 0], strict=True,
@@ -226,7 +231,7 @@ def remove_drift(world: World, motion: Motion, pressed: Ints, stuck: Ints) -> Mo
     """
     if len(pressed) == 0:
         return motion
-    found = world.contacts(motion, PRESSED_OVERLAP * world.length)
+    found = world.contacts(motion, TOUCHING.pressed_overlap * world.length)
     contacts = found[np.isin(found.key, pressed)]
     if len(contacts) == 0:
         return motion

@@ -37,20 +37,24 @@ from rigid_lcp.motion.state import Motion, displace_motion, replace_rates
 from rigid_lcp.motion.world import World
 from rigid_lcp.shapes import quaternion_of_rotation, rotate
 
-OVERLAP_ALLOWED = 1e-12
-"""Overlap that is left alone, as a share of the smallest body's size."""
-PROJECTION_TOLERANCE = 1e-9
-"""Residual of the displacements that take overlaps out; what is left is seen in the next step."""
-PROJECTIONS, OVERLAP_LEFT = 20, 1e-9
-"""Most times that overlaps are taken out after a step, and the share of the smallest body's size
-below which what a first time left (of second order) is left to the next step."""
-GREATEST_TURN = 0.1
-"""Turn of a body in one of these [rad]: beyond it the first order of a move means little."""
-TURNING, STIFF = 6, 1e-6
-"""After so many, turning costs ``1 / STIFF`` times as much: small grains between large ones may
-turn to and fro for ever, where the large ones must give way."""
-LEAST_COST = 1e-15
-"""Lifts that cost no more than this part of the energy are none [-]."""
+
+@dataclass(frozen=True)
+class OverlapNumbers:
+    """Moves that take overlaps out, which are measured by the size of the smallest body."""
+
+    allowed: float = 1e-12  # overlap that is left alone [-]
+    tolerance: float = 1e-9  # residual of a move [-]; what is left is seen in the next step
+    moves: int = 20  # after a step, at most [-]
+    left: float = 1e-9  # overlap (of second order) that moves leave to the next step [-]
+    turn_of_a_move: float = 0.1  # of a body [rad]: beyond it the first order means little
+    turning_moves: int = 6
+    """Moves after which turning is dear [-]: small grains between large ones may turn to and fro
+    for ever, where the large ones must give way."""
+    turning_ease: float = 1e-6  # after these, over that before [-]
+    least_cost: float = 1e-15  # part of the energy up to which a lift costs nothing [-]
+
+
+OVERLAPS = OverlapNumbers()
 
 
 @dataclass(frozen=True)
@@ -68,28 +72,28 @@ def remove_overlap(world: World, motion: Motion, touching: Contacts | None = Non
     """Bodies moved apart until no two overlap: what turning, and impacts of more speed than the
     contacts were looked for with, leave at the end of a step.  No velocity changes, but that spins
     in space turn along with their bodies.  ``touching``: contacts without margin, where known."""
-    for done in range(PROJECTIONS):
+    for done in range(OVERLAPS.moves):
         if touching is None or done:
             touching = world.contacts(motion, 0.0)
         deepest = -float(touching.gap.min(initial=0.0))
-        if deepest <= (OVERLAP_LEFT if done else OVERLAP_ALLOWED) * world.length:
+        if deepest <= (OVERLAPS.left if done else OVERLAPS.allowed) * world.length:
             break
         found = world.contacts(motion, deepest)  # neighbours that the move may reach stay clear
         inverse_mass = world.inverse_mass(motion)
-        if done >= TURNING:
-            weight = np.where(np.arange(world.size) < motion.dim, 1.0, STIFF**0.5)
+        if done >= OVERLAPS.turning_moves:
+            weight = np.where(np.arange(world.size) < motion.dim, 1.0, OVERLAPS.turning_ease**0.5)
             scale = sp.diags_array(np.tile(weight, inverse_mass.shape[0] // world.size))
             inverse_mass = sp.csr_array(scale @ inverse_mass @ scale)
         bodies = body_space(found, motion.position, world.columns, inverse_mass)
         offset = np.zeros((len(found), motion.dim))
         offset[:, 0] = found.gap
         apart = solve_friction(
-            bodies, offset.ravel(), 0.0, dim=motion.dim, tolerance=PROJECTION_TOLERANCE
+            bodies, offset.ravel(), 0.0, dim=motion.dim, tolerance=OVERLAPS.tolerance
         )
         move = np.zeros_like(motion.rates)
         move[world.movable] = find_response(bodies, apart.r)
         turn = float(np.abs(move[:, motion.dim :]).max())
-        move *= min(1.0, GREATEST_TURN / max(turn, 1e-300))
+        move *= min(1.0, OVERLAPS.turn_of_a_move / max(turn, 1e-300))
         motion = displace_motion(motion, move)
         if motion.dim == 3:  # spins turn along: so they, and kinetic energies, stay in the bodies
             turned = rotate(quaternion_of_rotation(move[:, 3:]), motion.spin)
@@ -132,7 +136,7 @@ def pay_lift(
         return parted
     energy = world.energy(parted)
     owed = min(energy - world.energy(end), energy - budget)
-    none = LEAST_COST * abs(energy)
+    none = OVERLAPS.least_cost * abs(energy)
     if owed <= none:
         return parted
     moved = world.movable & (parted.position != end.position).any(axis=1)

@@ -10,7 +10,7 @@ one.  Four things are added to the paper:
   gap closes, by the cubic through gap and approach at its two ends; the half is tried where these
   are not known (`find_share_until_touch`).
 * Bounces that get shorter without end (Zeno) are cut off: an approach slower than 1e-4 of
-  the free-fall speed over a body's size (``REST_SPEED``) is a collision without restitution.
+  the free-fall speed over a body's size (``rest_speed``) is a collision without restitution.
   Collisions are those of `rigid_lcp.collision.collide`.
 * A sliding contact keeps the direction of its friction during a step.  A step in which it comes
   to rest is taken back and shortened to end there; from then on it may stick.
@@ -36,7 +36,7 @@ from rigid_lcp.motion.checks import Loads
 from rigid_lcp.motion.equations import body_space, find_contact_offset, find_response
 from rigid_lcp.motion.finite_states import is_finite, too_much
 from rigid_lcp.motion.lasting_contacts import (
-    LASTING_OVERLAP,
+    TOUCHING,
     Lasting,
     collided,
     find_share_until_rest,
@@ -47,22 +47,24 @@ from rigid_lcp.motion.lasting_contacts import (
     remove_drift,
 )
 from rigid_lcp.motion.state import Motion, replace_rates
-from rigid_lcp.motion.time_stepping import contact_forces
+from rigid_lcp.motion.time_stepping import MOREAU, contact_forces
 from rigid_lcp.motion.world import World
 from rigid_lcp.shapes import quaternion_rate
 
-CLEAN_STEPS = 3
-"""Steps without an overlap before the step is doubled (section 9)."""
-SHORTEST = 1e-12
-"""Shortest step as a share of the longest one."""
-MOST_STEPS_OF_A_CALL = 10_000_000
-"""Steps that one call may take: what moves too fast for its size would never end."""
-LOCATED = 8
-"""Times that the end of one step is located; then it is halved as in section 9."""
-NO_FORCES = 1e-6
-"""Step, as a share of the longest one, at which a state without finite forces is taken for one."""
-TRAVEL = 0.25
-"""Way a body may go in one step, in sizes of the smallest body: nothing jumps over another."""
+
+@dataclass(frozen=True)
+class RungeKuttaNumbers:
+    """Control of the step; its lengths are shares of the longest one."""
+
+    steps_before_doubling: int = 3  # without an overlap [-] (section 9)
+    shortest_step: float = 1e-12  # below which a step is not taken back any more [-]
+    steps_of_a_call: int = 10_000_000  # at most [-]: too fast a motion would never end
+    located_ends: int = 8  # of a step that overlaps [-]; then it is halved as in section 9
+    step_without_forces: float = 1e-6  # at which a state without forces is taken for one [-]
+    way_of_a_step: float = 0.25  # in sizes of the smallest body [-]: none jumps over another
+
+
+RUNGE_KUTTA = RungeKuttaNumbers()
 
 
 @dataclass
@@ -119,13 +121,13 @@ def advance_runge_kutta(
     end, forces = time + seconds, None
     loads = loads or (lambda *_: None)
     fastest = _travel_limit(world, motion)
-    if seconds > MOST_STEPS_OF_A_CALL * fastest:
+    if seconds > RUNGE_KUTTA.steps_of_a_call * fastest:
         raise NotConverged(
-            f"{seconds:g} s take more than {MOST_STEPS_OF_A_CALL:.0e} steps,"
+            f"{seconds:g} s take more than {RUNGE_KUTTA.steps_of_a_call:.0e} steps,"
             " so fast do bodies go or turn",
             where=f"time {time:.9g} s", remedy="use method='time-stepping'",
         )  # fmt: skip
-    while end - time > SHORTEST * pace.longest or forces is None:
+    while end - time > RUNGE_KUTTA.shortest_step * pace.longest or forces is None:
         motion, collision = collided(world, motion, tolerance)
         pace.collisions += collision is not None
         pace.scaled += collision is not None and collision.restitution_scale < 1.0
@@ -137,7 +139,7 @@ def advance_runge_kutta(
             try:
                 rates, after = step_runge_kutta(world, motion, time, h, lasting, loads, tolerance)
             except NoSolution:  # of a stage, perhaps, that the motion does not come to
-                if h < NO_FORCES * pace.longest:
+                if h < RUNGE_KUTTA.step_without_forces * pace.longest:
                     raise
                 tried = h / 2
                 pace.shortened += 1
@@ -151,9 +153,9 @@ def advance_runge_kutta(
             overlap = overlap_beyond(world, after, pressed)
             stop = find_share_until_rest(world, motion, after, h, lasting)
             far = _travel_limit(world, after)
-            if overlap > LASTING_OVERLAP * world.length:
+            if overlap > TOUCHING.overlap * world.length:
                 share = None
-                if located < LOCATED:
+                if located < RUNGE_KUTTA.located_ends:
                     share = find_share_until_touch(world, motion, after, h, pressed)
                 if share is None or located == 0:
                     pace.step, pace.clean = h / 2, 0
@@ -167,7 +169,7 @@ def advance_runge_kutta(
                 pace.shortened += 1
             else:
                 break
-            if tried < SHORTEST * pace.longest:
+            if tried < RUNGE_KUTTA.shortest_step * pace.longest:
                 raise _no_step(world, after, overlap, time)
         time += h
         pace.accepted += 1
@@ -175,7 +177,7 @@ def advance_runge_kutta(
         residual = max(rate.residual for rate in rates)
         pace.worst_residual = max(pace.worst_residual, residual)
         pace.steps_above += residual > tolerance
-        if pace.clean >= CLEAN_STEPS:
+        if pace.clean >= RUNGE_KUTTA.steps_before_doubling:
             pace.step, pace.clean = min(2 * pace.step, pace.longest), 0
         forces = contact_forces(first.contacts, first.force, first.acceleration, 1.0)
         motion = remove_drift(world, after, pressed, stuck)
@@ -238,7 +240,7 @@ def find_state_rate(
 def _no_step(world: World, motion: Motion, overlap: float, time: float) -> RigidError:
     """What is wrong with the end ``motion`` of the shortest step, which may have an ``overlap``."""
     where, remedy = f"time {time:.9g} s", "use method='time-stepping'"
-    if overlap > LASTING_OVERLAP * world.length:
+    if overlap > TOUCHING.overlap * world.length:
         return Overlapping(
             f"bodies overlap by {overlap:.2g} m after the shortest step", where=where,
             remedy=f"{remedy}, which removes overlaps",
@@ -254,7 +256,7 @@ def _no_step(world: World, motion: Motion, overlap: float, time: float) -> Rigid
 
 def _travel_limit(world: World, motion: Motion) -> float:
     fastest = float(world.speeds(motion.rates).max())
-    return TRAVEL * world.length / fastest if fastest > 0 else np.inf
+    return RUNGE_KUTTA.way_of_a_step * world.length / fastest if fastest > 0 else np.inf
 
 
 def lasting_keys(first: Rate, last: Rate) -> tuple[Ints, Ints]:
@@ -265,7 +267,7 @@ def lasting_keys(first: Rate, last: Rate) -> tuple[Ints, Ints]:
     pressed, stuck = [], []
     for rate in (first, last):
         normal, tangential = rate.force[:, 0], np.linalg.norm(rate.force[:, 1:], axis=1)
-        below = tangential < rate.contacts.friction * normal * (1 - 1e-9)
+        below = tangential < rate.contacts.friction * normal * (1 - MOREAU.at_limit)
         pressed.append(rate.contacts.key[normal > 0])
         stuck.append(rate.contacts.key[(normal > 0) & below])
     new = np.setdiff1d(last.contacts.key, first.contacts.key)

@@ -19,18 +19,18 @@ import numpy as np
 from rigid_lcp.arrays import Bools, Floats, Ints
 from rigid_lcp.contact import Contacts
 from rigid_lcp.motion.equations import relative_velocity
-from rigid_lcp.motion.overlap_removal import OVERLAP_ALLOWED
+from rigid_lcp.motion.overlap_removal import OVERLAPS
 from rigid_lcp.motion.state import Motion
 from rigid_lcp.motion.world import World
 
-FASTER = 1e-6
+LEAST_GAIN = 1e-6
 """Part by which a speed has to be greater than one that was taken into account [-]."""
 
 
 def moreau_margin(world: World, motion: Motion, accelerations: Floats, h: float) -> Floats:
     """How far each body's points can get within a step that nothing strikes them in [m], (n,)."""
     rates = np.abs(motion.rates) + h * np.abs(accelerations)
-    return h * world.speeds(rates) + OVERLAP_ALLOWED * world.length
+    return h * world.speeds(rates) + OVERLAPS.allowed * world.length
 
 
 def find_missed_collisions(
@@ -42,9 +42,8 @@ def find_missed_collisions(
     ``touching``: contacts of ``end`` without margin.
     """
     missed = np.zeros(len(world.mass), dtype=bool)
-    found = touching[
-        (touching.gap < -OVERLAP_ALLOWED * world.length) & (touching.restitution > 0.0)
-    ]
+    deep = touching.gap < -OVERLAPS.allowed * world.length
+    found = touching[deep & (touching.restitution > 0.0)]
     if len(found) == 0:
         return missed
     known = np.isin(_pairs(world, found), _pairs(world, contacts))
@@ -64,7 +63,7 @@ def find_contacts_of_struck(
     while True:
         contacts = world.contacts(middle, reaching)
         further = _pass_on(world, contacts, reaching, struck)
-        faster = further > reaching * (1.0 + FASTER)
+        faster = further > reaching * (1.0 + LEAST_GAIN)
         if not faster.any():
             return contacts, reaching
         reaching, struck = np.where(faster, further, reaching), struck | faster

@@ -52,7 +52,7 @@ from rigid_lcp.motion.equations import (
     inertial_acceleration,
     relative_velocity,
 )
-from rigid_lcp.motion.overlap_removal import OVERLAP_ALLOWED, Restitution, part_bodies
+from rigid_lcp.motion.overlap_removal import OVERLAPS, Restitution, part_bodies
 from rigid_lcp.motion.state import Motion, replace_rates
 from rigid_lcp.motion.struck_bodies import (
     find_contacts_of_struck,
@@ -65,14 +65,24 @@ SolveFrom = Callable[..., tuple[FrictionSolution, float]]
 """Impulses and their error [-] from the contacts' `BodySpace`, q (nc, dim), friction (nc,) and, if
 known, a start (nc * dim,)."""
 
-START_AGAIN = 1e-4
-"""Error of the forces above which they are looked for once more, from nothing, and without the
-inertial terms that ask bodies to part: those are of the velocities before the step."""
-WIDENINGS = 10
-"""Most times that a step is made again as bodies were struck that then struck others; what is left
-are overlaps, taken out, and collisions of the next step."""
-GREATEST_TURN = np.pi
-"""Angle [rad] that a body may turn within a step: beyond it midpoint geometry means nothing."""
+
+@dataclass(frozen=True)
+class MoreauNumbers:
+    """When a step is made again, and what it takes for sliding."""
+
+    retried_error: float = 1e-4
+    """Of forces [-] that are looked for once more, from nothing, and without the inertial terms
+    that ask bodies to part: those are of the velocities before the step."""
+    widenings: int = 10
+    """Most times that a step is made again [-] as bodies were struck that then struck others; what
+    is left are overlaps, taken out, and collisions of the next step."""
+    turn_of_a_step: float = np.pi
+    """Of a body [rad], at most: beyond it midpoint geometry means nothing."""
+    at_limit: float = 1e-9  # part of its limit by which friction below it still slides [-]
+    no_slip: float = 1e-9  # sliding velocity over the greatest that is none [-]
+
+
+MOREAU = MoreauNumbers()
 
 
 @dataclass(frozen=True)
@@ -114,14 +124,14 @@ def step_moreau(
         return Step(end, contact_forces(contacts, np.zeros((0, motion.dim)), None, h), 0.0)
     slow = float(np.linalg.norm(world.scene.gravity)) * h
     solve = partial(judge_impulses, slow=slow, tolerance=tolerance, accept=accept)
-    for turn in range(WIDENINGS + 1):
+    for turn in range(MOREAU.widenings + 1):
         found, after, scaled, restitution = detect_step_contacts(
             world, contacts, middle, free, h, solve, known
         )
         end = world.drifted(after, 0.5 * h)
         touching = world.contacts(end, 0.0)
         struck = find_missed_collisions(world, contacts, end, touching, slow)
-        if turn == WIDENINGS or not struck.any():
+        if turn == MOREAU.widenings or not struck.any():
             break
         wider, margin = find_contacts_of_struck(world, middle, margin, struck, end, h)
         if len(wider) == len(contacts):
@@ -147,7 +157,7 @@ def detect_step_contacts(
     gained = (free.rates - middle.rates)[world.movable]
     share, full = Share(len(contacts)), closing.restitution
     while (bounce := find_bouncing(closing)).any():
-        if found.error > START_AGAIN:  # wedged bodies may have no impulses to bounce with
+        if found.error > MOREAU.retried_error:  # wedged bodies may have no impulses to bounce with
             share.leave_out()
         elif not share.next(gains_energy(bodies, closing, *velocities, gained, found, bounce)):
             break
@@ -197,7 +207,7 @@ def find_closing_contacts(
         turning=turning[:, 0],
         slow=float(np.linalg.norm(world.scene.gravity)) * h,
         h=h,
-        touching=OVERLAP_ALLOWED * world.length,
+        touching=OVERLAPS.allowed * world.length,
     )
 
 
@@ -221,7 +231,7 @@ def find_impulses_at_once(
     bounce = find_bouncing(closing)
     shift = find_contact_shift(closing, bounce)
     solution, error = solve(bodies, closing.offset + shift, closing.friction, start)
-    if error > START_AGAIN:  # jammed bodies may have no forces that part them as they turned
+    if error > MOREAU.retried_error:  # jammed bodies may have no forces to part them as they turned
         shift = find_contact_shift(closing, bounce, closing.turning)
         solution, error = solve(bodies, closing.offset + shift, closing.friction)
     velocity = solution.u.reshape(shift.shape) - shift
@@ -295,10 +305,10 @@ def contact_forces(
     force = impulse / h
     normal, tangential = force[:, 0], force[:, 1:]
     amount = np.linalg.norm(tangential, axis=1)
-    sliding = amount >= contacts.friction * normal * (1 - 1e-9)
+    sliding = amount >= contacts.friction * normal * (1 - MOREAU.at_limit)
     if velocity is not None:
         slip = np.linalg.norm(velocity[:, 1:], axis=1)
-        sliding &= slip > 1e-9 * np.abs(velocity).max(initial=0.0)
+        sliding &= slip > MOREAU.no_slip * np.abs(velocity).max(initial=0.0)
     status = np.where(normal <= 0, "open", np.where(sliding, "slide", "stick"))
     if contacts.dim == 3:
         frames = contact_frames(contacts.normal)
@@ -312,9 +322,9 @@ def contact_forces(
 
 def _refuse_fast_spin(world: World, motion: Motion, h: float) -> None:
     spin = np.abs(motion.spin) if motion.dim == 2 else np.linalg.norm(motion.spin, axis=1)
-    if (h * spin > GREATEST_TURN).any():
+    if (h * spin > MOREAU.turn_of_a_step).any():
         worst = int(np.argmax(spin))
         raise NotConverged(
             f"it turns by {h * spin[worst]:.3g} rad within a step", where=world.scene.called(worst),
-            remedy=f"take a step shorter than {GREATEST_TURN / spin[worst]:.3g} s",
+            remedy=f"take a step shorter than {MOREAU.turn_of_a_step / spin[worst]:.3g} s",
         )  # fmt: skip

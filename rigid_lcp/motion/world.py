@@ -17,7 +17,7 @@ from rigid_lcp.contact import Contacts, detect_2d, detect_3d, shapes_2d, shapes_
 from rigid_lcp.errors import SceneError
 from rigid_lcp.friction.problem import MOST_FRICTION
 from rigid_lcp.motion.checks import (
-    MOST_OF_A_STATE,
+    BOUNDS,
     check_half_space,
     require_density,
     require_number_in,
@@ -65,7 +65,7 @@ class Scene:
         default = np.zeros(dim)
         default[-1] = -9.81
         given = default if gravity is None else gravity
-        self.gravity = require_vector(given, dim, "gravity", "scene", MOST_OF_A_STATE)
+        self.gravity = require_vector(given, dim, "gravity", "scene", BOUNDS.state)
         self.bodies: list[Body] = []
 
     def called(self, body: int) -> str:
@@ -111,7 +111,7 @@ class Scene:
 
         def state(values: ArrayLike | None, default: Floats | list[float], what: str) -> Floats:
             given = default if values is None else values
-            return require_vector(given, len(default), what, where, MOST_OF_A_STATE)
+            return require_vector(given, len(default), what, where, BOUNDS.state)
 
         origin = getattr(shape, "centroid", np.zeros(self.dim))
         turn, upright = (3, [1.0, 0.0, 0.0, 0.0]) if self.dim == 3 else (1, [0.0])

@@ -15,7 +15,7 @@ from rigid_lcp.errors import UsageError
 from rigid_lcp.motion import Scene
 from rigid_lcp.scene.file import SceneFile, loads_of, scene_build
 from rigid_lcp.scene.run_folder import FRAME, RunFolder, read_frame, restore_frame
-from rigid_lcp.scene.simulation import NO_STEP, Simulation
+from rigid_lcp.scene.simulation import SIMULATION, Simulation
 from rigid_lcp.wear import Breakage, Wear
 from trackbed.run_files import write_whole
 
@@ -88,7 +88,7 @@ def plan_steps(file: SceneFile) -> tuple[int, float]:
     the scene's, that end at every frame.  At acceleration level the fewest and the longest."""
     table = file.tables.run
     span = table.duration / table.frames
-    count = max(ceil(span / table.step - NO_STEP), 1)
+    count = max(ceil(span / table.step - SIMULATION.time_round_off), 1)
     return count * table.frames, span / count
 
 

@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import partial
 from math import ceil, inf, nan
 from typing import Any, Literal, get_args
@@ -24,7 +25,7 @@ from rigid_lcp.errors import (
     UsageError,
 )
 from rigid_lcp.motion import (
-    MOST_STEPS,
+    BOUNDS,
     Loads,
     Motion,
     Pace,
@@ -57,15 +58,21 @@ from rigid_lcp.wear import (
     wear_on_after_break,
 )
 
-OVERLAP_AT_START = 1e-6
-"""Overlap that a start may have, as a share of the smallest body's size."""
-NO_STEP = 1e-9
-"""Part of a step that is round-off of a sum of times [-]."""
-SHORTEST_STEP = 1e-100
-"""Shorter steps [s] have squares that are no numbers."""
-ACCEPT, GIVE_UP = 1e-5, 1e-3
-"""Residuals [-]: a step of many contacts is left at the first where its tolerance would take the
-dearest methods; above the second it is no step, and the run stops."""
+
+@dataclass(frozen=True)
+class SimulationNumbers:
+    """What a start and a step of a run have to keep."""
+
+    overlap_at_start: float = 1e-6  # at most, over the smallest body's size [-]
+    time_round_off: float = 1e-9  # of a sum of times, in steps [-]
+    shortest_step: float = 1e-100  # [s]: shorter ones have squares that are no numbers
+    accept: float = 1e-5
+    """Residual [-] at which a step of many contacts is left where its tolerance would take the
+    dearest methods;"""
+    most_residual: float = 1e-3  # above it [-] it is no step, and the run stops
+
+
+SIMULATION = SimulationNumbers()
 
 
 class Simulation:
@@ -85,7 +92,7 @@ class Simulation:
         breakage: Breakage | None = None,
     ) -> None:  # fmt: skip
         check_run(scene, method, loads, wear, breakage)
-        step = require_seconds(step, "step", least=SHORTEST_STEP)
+        step = require_seconds(step, "step", least=SIMULATION.shortest_step)
         remedy = "give a positive number, say 1e-9"
         tolerance = require_number_in(
             tolerance, 0.0, inf, "tolerance", "Simulation", remedy, above=True
@@ -133,18 +140,18 @@ class Simulation:
         break without end.
         """
         seconds = require_seconds(seconds, "the time to go on")
-        if seconds / self.step > MOST_STEPS:
+        if seconds / self.step > BOUNDS.steps:
             raise UsageError(
                 too_many_steps("the time to go on", seconds / self.step),
                 remedy="go on for less, or give a longer step",
             )
-        if seconds <= NO_STEP * self.step:
+        if seconds <= SIMULATION.time_round_off * self.step:
             return
         with np.errstate(over="ignore"):  # a step that ends beyond numbers is reported as that
             if self.method == "acceleration":
                 self._integrate(seconds)
                 return
-            count = max(ceil(seconds / self.step - NO_STEP), 1)
+            count = max(ceil(seconds / self.step - SIMULATION.time_round_off), 1)
             for _ in range(count):
                 self._time_step(seconds / count)
 
@@ -220,7 +227,7 @@ class Simulation:
             loads = self.loads(self.time + h / 2, middle)
         try:
             made = step_moreau(
-                self.world, self.motion, loads, h, self.contacts, self.tolerance, ACCEPT
+                self.world, self.motion, loads, h, self.contacts, self.tolerance, SIMULATION.accept
             )
         except ProblemError as error:
             raise too_much(self.world, self.motion, loads, h, self.time, error) from error
@@ -272,7 +279,7 @@ class Simulation:
     def _judge(self, residual: float, message: str) -> None:
         self.worst_residual = max(self.worst_residual, residual)
         self.steps_above += not residual <= self.tolerance
-        if not residual <= GIVE_UP:
+        if not residual <= SIMULATION.most_residual:
             raise NotConverged(
                 f"the contact forces have a residual of {residual:.2g}",
                 where=f"step {self.steps}, {self.time:.6g} s",
@@ -281,7 +288,7 @@ class Simulation:
 
     def _refuse_overlap(self) -> None:
         found = self.world.contacts(self.motion, 0.0)
-        if len(found) and found.gap.min() < -OVERLAP_AT_START * self.world.length:
+        if len(found) and found.gap.min() < -SIMULATION.overlap_at_start * self.world.length:
             worst = int(np.argmin(found.gap))
             pair = int(found.body_a[worst]), int(found.body_b[worst])
             names = (self.world.scene.called(k) for k in pair)

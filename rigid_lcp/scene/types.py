@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from rigid_lcp.motion import MOST_STEPS, too_many_steps
+from rigid_lcp.motion import BOUNDS, too_many_steps
 from trackbed.choices import find_choices
 from trackbed.scene_files import Name, NonNegative, Positive, Problem, Real, Table, suggest_word
 
@@ -51,7 +51,7 @@ class Run(Table):
     @model_validator(mode="after")
     def _comes_to_an_end(self) -> Run:
         steps = self.duration / self.step
-        if not LEAST_OF_A_STEP * self.frames <= steps <= MOST_STEPS:
+        if not LEAST_OF_A_STEP * self.frames <= steps <= BOUNDS.steps:
             raise ValueError(
                 f"{too_many_steps('duration', steps)}, and the time between two frames must be"
                 f" at least {LEAST_OF_A_STEP:g} of one"

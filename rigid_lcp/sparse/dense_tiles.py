@@ -25,7 +25,7 @@ from rigid_lcp.arrays import Floats
 TILE = 4
 """Rows of a tile, and numbers in a vector: rows and columns are padded to multiples of it."""
 TERMS_AT_ONCE = 64
-"""Terms that are summed at a time: what they read stays in the processor's nearest memory."""
+"""Terms summed at a time [-]: what they read stays in the processor's nearest memory."""
 _VECTOR, _WORD = ir.VectorType(ir.DoubleType(), TILE), ir.IntType(64)
 _FUSED = ("contract",)
 

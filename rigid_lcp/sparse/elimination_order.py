@@ -10,6 +10,8 @@ it.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import scipy.sparse as sp
 from numba import njit
@@ -17,10 +19,20 @@ from scipy.sparse.linalg import splu
 
 from rigid_lcp.arrays import Ints
 
-FEW_BLOCKS = 1000
-"""Up to so many blocks the order is found by a full table."""
-MUCH_FLOPS = 1e8
-"""Cost of the factors, some 10 ms, above which another order is looked for, in less than that."""
+
+@dataclass(frozen=True)
+class EliminationNumbers:
+    """Orders and fronts; costs are [flops] of a dense product."""
+
+    table_blocks: int = 1000  # up to which the order is found by a full table [-]
+    dissected_flops: float = 1e8
+    """Cost of factors, some 10 ms, above which another order is looked for, in less than that."""
+    front_columns: int = 192  # at most [-]: longer fronts are split, child under child
+    front_cost: float = 2e4  # of a front, by calls and copies,
+    entry_cost: float = 10.0  # and of each of its entries
+
+
+ELIMINATION = EliminationNumbers()
 
 
 @njit(cache=True)
@@ -54,7 +66,7 @@ def elimination_order(start: Ints, neighbour: Ints, size: int) -> Ints:
     """Which block is eliminated at each place, (blocks,); ``size``: rows of a block."""
     order = minimum_degree(start, neighbour)
     flops = elimination_flops(start, neighbour, order, size)
-    if flops > MUCH_FLOPS:
+    if flops > ELIMINATION.dissected_flops:
         other = nested_dissection(start, neighbour)
         if other is not None and elimination_flops(start, neighbour, other, size) < flops:
             return other
@@ -86,7 +98,7 @@ def minimum_degree(start: Ints, neighbour: Ints) -> Ints:
     """Blocks in an order of minimum degree: that of SuperLU (multiple), or for few blocks our own,
     which costs less than to call it."""
     blocks = len(start) - 1
-    if blocks <= FEW_BLOCKS:
+    if blocks <= ELIMINATION.table_blocks:
         found: Ints = minimum_degree_dense(start, neighbour)
         return found
     graph = sp.csc_array((np.full(len(neighbour), -1.0), neighbour, start), (blocks, blocks))

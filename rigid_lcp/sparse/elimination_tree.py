@@ -18,16 +18,15 @@ from numba import njit
 from rigid_lcp.arrays import Ints
 from rigid_lcp.sparse.dense_tiles import TILE
 from rigid_lcp.sparse.elimination_order import (
+    ELIMINATION,
     elimination_order,
     find_column_parents,
     postorder,
     symmetric_pattern,
 )
 
-FRONT_COLUMNS = 192
-"""Columns of a front at most: longer ones are split, child under child."""
-FRONT_COST, ENTRY_COST = 2e4, 10.0
-"""Cost of a front and of each of its entries, in flops of a dense product: calls and copies."""
+FRONT_COLUMNS = ELIMINATION.front_columns
+FRONT_COST, ENTRY_COST = ELIMINATION.front_cost, ELIMINATION.entry_cost
 
 
 class EliminationTree(NamedTuple):

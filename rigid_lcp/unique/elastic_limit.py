@@ -36,7 +36,7 @@ that break) wants those that elastic contacts would choose at that moment (`uniq
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -65,26 +65,34 @@ from rigid_lcp.unique.micro_displacements import (
     stiffest_mode,
 )
 
-FIRST_STEP = 1e3
-"""First h in units of the stiffest mode's time."""
-LONGEST_STEP = 1e6
-"""Longest h in units of the stiffest mode's time while bodies move: h times the acceleration
-enters xi, and with it round-off of ``LONGEST_STEP * 1e-16`` in the forces."""
-LONGEST_STEP_AT_REST = 1e10
-ROUNDED = 2.0**-30
-"""Digits of the free motion that choose the state where contacts slide: round-off of the
-order of sums is 1e-6 of the last and less."""
-TURN, MOVES = 1e-8, 1e-3
-"""Change of the forces below which springs of contacts that go on sliding are turned, and the part
-of their length that these grow by in a step."""
-STEPS_MAX = 400
-STEP_GROWTH, STEP_GROWTH_SLIDING = 10.0, 3.0
-"""Factors on h after a step that was found, without and with friction."""
-HELD_STEP, HELD_STEPS = 1e10, 8
-"""Length of the proximal steps of contacts that hold in units of the stiffest mode's time, and how
-many are made, all with one factorisation: each leaves 1e-10 over the softest mode of the error."""
-OUTSIDE_CONE = 1e-3
-"""Part of the greatest force by which a contact may be outside its cone after the first step."""
+
+@dataclass(frozen=True)
+class LimitNumbers:
+    """Steps h in units of the stiffest mode's time, changes of the forces, and what is closed."""
+
+    first_step: float = 1e3  # [-]
+    longest_step: float = 1e6
+    """While bodies move [-]: h times the acceleration enters xi, and with it round-off of
+    ``longest_step * 1e-16`` in the forces."""
+    longest_step_at_rest: float = 1e10  # and at rest [-]
+    shortest_step: float = 1e-3  # [-]
+    steps: int = 400  # at most [-]
+    growth: float = 10.0  # of h after a step that was found, without friction [-],
+    growth_sliding: float = 3.0  # and with it [-]
+    rounded: float = 2.0**-30
+    """Digits of the free motion that choose the state where contacts slide [-]: round-off of the
+    order of sums is 1e-6 of the last and less."""
+    turned_change: float = 1e-8  # of forces [-], below which springs that go on sliding turn
+    sliding_growth: float = 1e-3  # part of their length [-] that these grow by in a step
+    stalled_change: float = 1e-8  # of forces [-], below which one that does not halve is round-off
+    settled_change: float = 1e-11  # of forces [-], below which it may end so
+    held_step: float = 1e10  # of contacts that hold, proximal [-];
+    held_steps: int = 8  # so many are made [-], each leaves 1e-10 over the softest mode
+    outside_cone: float = 1e-3  # distance of such a force from its cone, over the greatest [-]
+    closed_gap: float = 1e-6  # over the smallest body's size [-]: time steps leave such gaps
+
+
+LIMIT = LimitNumbers()
 
 
 def elastic_limit(
@@ -122,7 +130,7 @@ def elastic_limit(
     else:
         # deformations of displacements: others would be a self-stress for good
         deformation = -mode * (bodies_of(mine).jacobian @ begun[column]).reshape(k.shape)
-        found, _ = _relax(mine, network, deformation, FIRST_STEP, tolerance, iterations_max)
+        found, _ = _relax(mine, network, deformation, LIMIT.first_step, tolerance, iterations_max)
     force, displacement = np.empty_like(found.r), begun.copy()
     force[row] = found.r
     displacement[column] += root @ found.displacement / mode
@@ -169,13 +177,13 @@ def find_held_forces(
     springs[problem.friction <= 0.0, 1:] = 0.0
     weighted = sp.csr_array(sp.diags_array(springs.ravel()) @ jacobian)
     identity = sp.eye_array(jacobian.shape[1], format="csc")
-    solve = splu(sp.csc_array(identity / HELD_STEP + jacobian.T @ weighted)).solve
+    solve = splu(sp.csc_array(identity / LIMIT.held_step + jacobian.T @ weighted)).solve
     displacement, trial = np.zeros(jacobian.shape[1]), np.zeros(springs.shape)
-    for _ in range(HELD_STEPS):
+    for _ in range(LIMIT.held_steps):
         displacement = displacement + solve(network.free + jacobian.T @ trial.ravel())
         before, trial = trial, -(weighted @ displacement).reshape(springs.shape)
         force = slider_forces(trial, problem.friction * np.maximum(trial[:, 0], 0.0))
-        if not np.abs(trial - force).max() <= OUTSIDE_CONE * np.abs(trial).max():
+        if not np.abs(trial - force).max() <= LIMIT.outside_cone * np.abs(trial).max():
             return None
         change = float(np.linalg.norm(trial - before))
         if (
@@ -191,17 +199,17 @@ def find_held_forces(
 def _relax_from_nothing(
     problem: FrictionProblem, network: ElasticNetwork, tolerance: float, iterations_max: int
 ) -> ElasticForces:
-    """Relaxation from no displacements: to the state of the load in `ROUNDED` digits, which the
+    """Relaxation from no displacements: to the state of the load in `LIMIT`'s digits, which the
     round-off of q has no part in, and from there to that of the load itself."""
     free = rounded(network.free)
     rough = replace(problem, offset=network.jacobian @ free)
     near = ElasticNetwork(network.jacobian, free, network.stiffness, problem.friction)
     none = np.zeros(network.stiffness.shape)
-    first, deformation = _relax(rough, near, none, FIRST_STEP, tolerance, iterations_max)
+    first, deformation = _relax(rough, near, none, LIMIT.first_step, tolerance, iterations_max)
     if not first.solved:
         return replace(first, residual=problem.residual(first.r))
     rest = max(iterations_max - first.iterations, 1)  # the forces of none would be zero
-    last, _ = _relax(problem, network, deformation, LONGEST_STEP, tolerance, rest)
+    last, _ = _relax(problem, network, deformation, LIMIT.longest_step, tolerance, rest)
     return replace(
         last, displacement=first.displacement + last.displacement,
         iterations=first.iterations + last.iterations,
@@ -209,8 +217,8 @@ def _relax_from_nothing(
 
 
 def rounded(numbers: Floats) -> Floats:
-    """Numbers to `ROUNDED` of the greatest of them."""
-    unit = 2.0 ** np.ceil(np.log2(np.abs(numbers).max(initial=0.0) or 1.0)) * ROUNDED
+    """Numbers to so small a part as `LIMIT` has of the greatest of them."""
+    unit = 2.0 ** np.ceil(np.log2(np.abs(numbers).max(initial=0.0) or 1.0)) * LIMIT.rounded
     return np.asarray(np.round(numbers / unit) * unit)
 
 
@@ -222,13 +230,13 @@ def _relax(
     forces with the mass-free displacements made, and the deformation at the end."""
     jacobian, shape = network.jacobian, network.stiffness.shape
     way, force = np.zeros(jacobian.shape[1]), np.zeros(shape)
-    residual, change, longest = np.inf, np.inf, LONGEST_STEP
-    growth = STEP_GROWTH_SLIDING if problem.friction.any() else STEP_GROWTH
+    residual, change, longest = np.inf, np.inf, LIMIT.longest_step
+    growth = LIMIT.growth_sliding if problem.friction.any() else LIMIT.growth
     solved = shape[0] == 0
     if solved:
         residual = 0.0
-    for _ in range(STEPS_MAX):
-        if solved or network.newton_steps >= iterations_max or h <= 1e-3:
+    for _ in range(LIMIT.steps):
+        if solved or network.newton_steps >= iterations_max or h <= LIMIT.shortest_step:
             break
         move, converged = network.implicit_step(deformation, h)
         if not converged:
@@ -241,16 +249,16 @@ def _relax(
         residual = problem.residual(force.ravel())
         size = float(np.linalg.norm(force))
         change = float(np.linalg.norm(force - previous)) / size if size > 0 else 0.0
-        stalled = change < 1e-8 and change > 0.5 * earlier
-        settled = change <= tolerance or (stalled and change < 1e-11)
-        if residual > tolerance and change < TURN:
+        stalled = change < LIMIT.stalled_change and change > 0.5 * earlier
+        settled = change <= tolerance or (stalled and change < LIMIT.settled_change)
+        if residual > tolerance and change < LIMIT.turned_change:
             deformation = turned(deformation, -(jacobian @ move).reshape(shape))
         solved = residual <= tolerance and settled
         if stalled:
             # what is left is round-off, which a shorter step makes smaller
             longest /= 10.0
         moving = float(np.linalg.norm(move)) / (h * network.load)
-        h = min(growth * h, LONGEST_STEP_AT_REST, longest / max(moving, 1e-300))
+        h = min(growth * h, LIMIT.longest_step_at_rest, longest / max(moving, 1e-300))
     spent = network.newton_steps
     message = "" if solved else (
         f"no equilibrium of elastic contacts was found in {spent} Newton steps (residual "
@@ -272,15 +280,10 @@ def turned(deformation: Floats, growth: Floats) -> Floats:
     """
     length = np.linalg.norm(deformation[:, 1:], axis=1)
     speed = np.linalg.norm(growth[:, 1:], axis=1)
-    slides = speed > MOVES * length
+    slides = speed > LIMIT.sliding_growth * length
     new = deformation.copy()
     new[slides, 1:] = growth[slides, 1:] * (length[slides] / speed[slides])[:, None]
     return new
-
-
-CLOSED = 1e-6
-"""Contacts are closed up to this share of the smallest body's size: time steps leave gaps of their
-accuracy."""
 
 
 def unique_forces(world: World, motion: Motion, loads: ArrayLike | None = None) -> ContactForces:
@@ -290,7 +293,7 @@ def unique_forces(world: World, motion: Motion, loads: ArrayLike | None = None) 
     slow motion: impacts are not in it.  Raises `NotConverged` where the limit is not found (many
     sliding contacts).
     """
-    contacts = world.contacts(motion, 0.5 * CLOSED * world.length)
+    contacts = world.contacts(motion, 0.5 * LIMIT.closed_gap * world.length)
     none = np.zeros((len(contacts), motion.dim))
     if len(contacts) == 0:
         return contact_forces(contacts, none, None, 1.0)

@@ -13,6 +13,7 @@ where Newton's method stops; its end is left to Newton's method, for the last di
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -23,8 +24,29 @@ from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.friction.methods import gauss_seidel, newton
 from rigid_lcp.friction.problem import friction_problem
 
-SWEEPS = 300
-"""Of Gauss-Seidel in a step."""
+
+@dataclass(frozen=True)
+class NetworkNumbers:
+    """Newton's steps, sweeps and ends; imbalances are parts of the load."""
+
+    balance: float = 1e-15  # imbalance at which Newton's method ends [-],
+    no_descent: float = 1e-11  # and with which it may where it finds no descent [-]
+    decrease: float = 1e-4  # part of what a step promises that it has to keep [-]
+    halvings: int = 12  # of a step, at most [-],
+    energy_halvings: int = 20  # and of one that lowers the energy [-]
+    energy_steps: int = 60  # of these, at most [-],
+    energy_balance: float = 1e-9  # down to this imbalance [-]
+    first_steps: int = 15  # of Newton with friction, before sweeps [-],
+    last_steps: int = 10  # after them [-],
+    frictionless_steps: int = 5  # and from the least energy [-]
+    sweeps: int = 300  # of Gauss-Seidel in a step [-],
+    swept: float = 1e-7  # down to this residual [-]
+    polished: float = 1e-13  # residual that needs no Newton after it [-]
+    polish: float = 1e-14  # to which that goes [-]
+    most_residual: float = 1e-9  # of a friction step that is found [-]
+
+
+NETWORK = NetworkNumbers()
 
 
 def slider_forces(trial: Floats, allowed: Floats) -> Floats:
@@ -135,19 +157,19 @@ class ElasticNetwork:
         """Newton's method under Coulomb's law from a first ``move``; move, whether found."""
         trial, imbalance, error = self.find_imbalance(deformation, move, h)
         for _ in range(steps):
-            if error <= 1e-15 * self.load:
+            if error <= NETWORK.balance * self.load:
                 return move, True
             direction = self.newton_direction(trial, imbalance, h)
-            for halvings in range(12):
+            for halvings in range(NETWORK.halvings):
                 tried = move + direction / 2**halvings
                 found = self.find_imbalance(deformation, tried, h)
-                if found[2] < (1 - 1e-4 / 2**halvings) * error:
+                if found[2] < (1 - NETWORK.decrease / 2**halvings) * error:
                     break
             else:
                 break
             move, (trial, imbalance, error) = tried, found
         # no more descent: round-off, if the balance is as good as it can be
-        return move, error <= 1e-11 * self.load
+        return move, error <= NETWORK.no_descent * self.load
 
     def friction_step(self, deformation: Floats, h: float) -> tuple[Floats, bool]:
         """The implicit step as a friction problem; move, whether found.
@@ -163,17 +185,17 @@ class ElasticNetwork:
             sp.csr_array(sp.csr_array(soft)[rows][:, rows]), offset[rows], self.friction[order],
             deformation.shape[1],
         )  # fmt: skip
-        found = gauss_seidel(problem, self.force[rows], 1e-7, SWEEPS)
-        self.newton_steps += SWEEPS // 100  # the cost of as many sweeps
-        if found.residual > 1e-13:
-            polished = newton(problem, found.r, 1e-14)
+        found = gauss_seidel(problem, self.force[rows], NETWORK.swept, NETWORK.sweeps)
+        self.newton_steps += NETWORK.sweeps // 100  # the cost of as many sweeps
+        if found.residual > NETWORK.polished:
+            polished = newton(problem, found.r, NETWORK.polish)
             self.newton_steps += int(polished.work.get("factorisations", 0.0))
             found = min(polished, found, key=lambda each: each.residual)
-        if found.residual > 1e-9:
+        if found.residual > NETWORK.most_residual:
             return np.zeros(self.jacobian.shape[1]), False
         self.force[rows] = found.r
         move = h * (self.free + self.jacobian.T @ self.force)
-        return self.coulomb_step(deformation, move, h, 10)
+        return self.coulomb_step(deformation, move, h, NETWORK.last_steps)
 
     def frictionless_step(self, deformation: Floats, move: Floats, h: float) -> Floats:
         """The move (ndof,) of least energy, from a first ``move``."""
@@ -184,16 +206,17 @@ class ElasticNetwork:
 
         trial, imbalance, error = self.find_imbalance(deformation, move, h)
         value = energy(move, trial)
-        for _ in range(60):
-            if error <= 1e-9 * self.load:
+        for _ in range(NETWORK.energy_steps):
+            if error <= NETWORK.energy_balance * self.load:
                 break
             direction = self.newton_direction(trial, imbalance, h)
             descent = float(imbalance @ direction)
-            for halvings in range(20):
+            for halvings in range(NETWORK.energy_halvings):
                 tried = move + direction / 2**halvings
                 found = self.find_imbalance(deformation, tried, h)
                 value_tried = energy(tried, found[0])
-                if value_tried <= value + 1e-4 * descent / 2**halvings + 1e-15 * abs(value):
+                promised = NETWORK.decrease * descent / 2**halvings
+                if value_tried <= value + promised + 1e-15 * abs(value):
                     break
             else:
                 break
@@ -205,6 +228,6 @@ class ElasticNetwork:
         move = np.zeros(self.jacobian.shape[1])
         if not self.friction.any():
             move = self.frictionless_step(deformation, move, h)
-            return self.coulomb_step(deformation, move, h, 5)
-        found, converged = self.coulomb_step(deformation, move, h, 15)
+            return self.coulomb_step(deformation, move, h, NETWORK.frictionless_steps)
+        found, converged = self.coulomb_step(deformation, move, h, NETWORK.first_steps)
         return (found, True) if converged else self.friction_step(deformation, h)

@@ -41,6 +41,10 @@ from rigid_lcp.shapes import rotation_matrix
 from rigid_lcp.wear.cuts import find_volume
 from rigid_lcp.wear.fragmentation import split_body
 
+MOST_PARTS = 100
+"""Of a grain of the start, on average [-], beyond which grains break without end: without a size
+effect parts under the stress that broke the whole break as well, and their number doubles."""
+
 
 @dataclass(frozen=True)
 class Break:
@@ -119,11 +123,6 @@ def find_splitting_line(
     return Break((points[i] + points[j]) / 2, apart / distance, tension, strength)
 
 
-DUST = 100
-"""Parts of a grain of the start, on average, beyond which grains break without end: without a size
-effect parts under the stress that broke the whole break as well, and their number doubles."""
-
-
 @dataclass(frozen=True)
 class Breakage:
     """When grains break in a run."""
@@ -135,7 +134,7 @@ class Breakage:
     """Steps between judgements."""
     smallest: float = 0.0
     """Volume (2D: area) below which grains do not break [m^3, m^2]; with zero a run ends with a
-    `SceneError` where grains turn to `DUST`."""
+    `SceneError` where grains have more than `MOST_PARTS`."""
     modulus: float | None = None
     """Weibull's modulus m of the size effect [-], 2 to 4 for ballast; None: none."""
     reference_volume: float | None = None
@@ -225,10 +224,10 @@ def breaks(
 
 
 def refuse_dust(breakage: Breakage, movable: int, broken: int, time: float) -> None:
-    """Raise `SceneError` where ``broken`` breaks have made ``movable`` grains, `DUST` of each, at a
-    ``time`` [s], and no smallest volume will end it."""
+    """Raise `SceneError` where ``broken`` breaks have made ``movable`` grains, too many of each,
+    at a ``time`` [s], and no smallest volume will end it."""
     whole = movable - broken
-    if breakage.smallest == 0.0 and movable > DUST * whole:
+    if breakage.smallest == 0.0 and movable > MOST_PARTS * whole:
         raise SceneError(
             f"{whole} grains have broken into {movable} parts, which go on to break",
             where=f"breakage at {time:.6g} s",

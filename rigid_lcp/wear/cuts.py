@@ -14,20 +14,24 @@ from itertools import pairwise
 import numpy as np
 
 from rigid_lcp.arrays import Floats, Ints
-from rigid_lcp.contact import FACE_BITS, MOST_EDGES
+from rigid_lcp.contact import FEATURE_BITS, MOST_EDGES
 from rigid_lcp.errors import ShapeError
 from rigid_lcp.shapes import Polygon, Polyhedron
 
 Solid = Polygon | Polyhedron
 
-CLEARANCE = 1e-6
-"""Corners within this share of the reach of a cut lie in it."""
-LEAST_CUT = 1e-5
-"""Cuts less deep than this share of a grain's reach wait: corners within `CLEARANCE` are one."""
-NEAR_PLANE = 2e-6
-"""Corners within this share of the reach of a plane lie in it."""
-MOST_AT_ONCE = 0.5
-"""Share of a grain's volume that one cut may take."""
+
+@dataclass(frozen=True)
+class CutNumbers:
+    """Cuts and their planes; lengths are shares of a grain's reach."""
+
+    clearance: float = 1e-6  # of a cut, within which corners lie in it [-]
+    least_depth: float = 1e-5  # less deep ones wait [-]: corners within the clearance are one
+    near_plane: float = 2e-6  # within which corners lie in a plane that wears [-]
+    most_at_once: float = 0.5  # share of a grain's volume that one cut may take [-]
+
+
+CUTS = CutNumbers()
 
 
 @dataclass(frozen=True)
@@ -59,7 +63,7 @@ def place_plane(grain: WornShape, corners: Ints) -> int | None:
     A chamfer wears on at all its edges and corners; a plane that has not cut yet only where it is.
     """
     height = grain.shape.vertices @ grain.normal.T
-    on = height >= height.max(axis=0, initial=-np.inf) - NEAR_PLANE * grain.shape.reach
+    on = height >= height.max(axis=0, initial=-np.inf) - CUTS.near_plane * grain.shape.reach
     mine = on[corners].all(axis=0) & ((grain.lost > 0) | (on.sum(axis=0) == len(corners)))
     return int(np.argmax(mine)) if mine.any() else None
 
@@ -85,7 +89,7 @@ def wear_shape(grain: WornShape) -> tuple[WornShape, Floats] | None:
     """The grain with all pending wear cut off that is deep enough, and the way (dim,) [m] that its
     centre of mass took in the body frame; None where nothing is.
 
-    Raises `ShapeError` where more than `MOST_AT_ONCE` of the grain would go in one cut.
+    Raises `ShapeError` where more of the grain than `CUTS` allows would go in one cut.
     """
     shape, way = grain.shape, np.zeros(grain.shape.dim)
     lost, pending = grain.lost.copy(), grain.pending.copy()
@@ -107,14 +111,14 @@ def cut_shape(shape: Solid, normal: Floats, volume: float) -> tuple[Solid, Float
     than detection has names for: then it waits.
     """
     whole = find_volume(shape)
-    if volume > MOST_AT_ONCE * whole:
+    if volume > CUTS.most_at_once * whole:
         unit = "m^2" if shape.dim == 2 else "m^3"
         raise ShapeError(
             f"{volume:.3g} {unit} wore off a grain of {whole:.3g} {unit} between two cuts",
             where="wear", remedy="cut more often (every), or take a smaller coefficient",
         )  # fmt: skip
     depth = cut_depth(shape, normal, volume)
-    if depth < LEAST_CUT * shape.reach:
+    if depth < CUTS.least_depth * shape.reach:
         return None
     height = shape.vertices @ normal
     try:
@@ -131,7 +135,7 @@ def take_part(shape: Solid, height: Floats) -> tuple[Solid, Floats]:
     """
     part = type(shape)(cut_points(shape, height))
     made = type(shape).of_corners(part.vertices)  # as a run that goes on makes it again
-    if len(made.edges) + 2 > (MOST_EDGES if shape.dim == 3 else 1 << FACE_BITS):
+    if len(made.edges) + 2 > (MOST_EDGES if shape.dim == 3 else 1 << FEATURE_BITS):
         raise ShapeError(f"it has {len(made.edges)} edges", where="cut", remedy="wear it less")
     return made, part.centroid
 
@@ -142,7 +146,7 @@ def cut_points(shape: Solid, height: Floats) -> Floats:
     Corners nearly in the plane go to both parts as they are: slivers would have no faces.  Those
     of a polygon are in order.
     """
-    on = np.abs(height) <= CLEARANCE * shape.reach
+    on = np.abs(height) <= CUTS.clearance * shape.reach
     first, second, share = cross_edges(shape, np.where(on, 0.0, height))
     crossing = (1 - share) * shape.vertices[first] + share * shape.vertices[second]
     kept = np.concatenate([np.flatnonzero(~on & (height < 0)), np.flatnonzero(on)])

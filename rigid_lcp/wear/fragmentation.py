@@ -16,9 +16,9 @@ from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import ShapeError
 from rigid_lcp.motion import Body, Motion, Scene, turn_arm
 from rigid_lcp.shapes import rotate, rotate_back
-from rigid_lcp.wear.cuts import CLEARANCE, Solid, find_volume, take_part
+from rigid_lcp.wear.cuts import CUTS, Solid, find_volume, take_part
 
-SLIVER = 1e-3
+LEAST_WIDTH = 1e-3
 """Least width of a part across the cut in 2D, as a share of the width of the whole [-]."""
 
 
@@ -79,7 +79,9 @@ def measure_height(whole: Body, point: Floats, direction: Floats, where: str) ->
     offset = float(normal @ rotate_back(whole.angle, point - whole.position))
     height = np.asarray((whole.shape.vertices @ normal - offset) / length)
     most, least = float(height.max()), float(height.min())
-    thin = SLIVER * (most - least) if len(direction) == 2 else CLEARANCE * whole.shape.reach
+    thin = CUTS.clearance * whole.shape.reach
+    if len(direction) == 2:
+        thin = LEAST_WIDTH * (most - least)
     if min(most, -least) <= thin:
         raise ShapeError(
             f"the cut misses the grain or leaves a sliver: its corners lie {least:.3g} to"

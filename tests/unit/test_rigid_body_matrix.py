@@ -25,8 +25,7 @@ from rigid_lcp.sparse.body_matrix import (
     subtract_motion,
 )
 from rigid_lcp.sparse.elimination_order import (
-    FEW_BLOCKS,
-    MUCH_FLOPS,
+    ELIMINATION,
     elimination_flops,
     elimination_order,
     minimum_degree,
@@ -123,7 +122,7 @@ def test_small_inverses_keep_their_digits(dim):
     np.testing.assert_allclose(multiply_blocks(b, vectors), twin, atol=1e-13)
 
 
-@pytest.mark.parametrize("blocks", [1, 30, FEW_BLOCKS + 50])
+@pytest.mark.parametrize("blocks", [1, 30, ELIMINATION.table_blocks + 50])
 def test_the_pattern_is_symmetric_and_the_order_a_permutation(blocks):
     g = np.random.default_rng(blocks)
     rows, columns = g.integers(0, blocks, (2, 2 * blocks))
@@ -168,7 +167,7 @@ def test_a_cube_is_dissected_where_that_costs_less(monkeypatch):
     found = elimination_order(start, neighbour, 6)
     np.testing.assert_array_equal(np.sort(found), np.arange(12**3))
     before, now = (elimination_flops(start, neighbour, o, 6) for o in (by_degree, found))
-    assert before > MUCH_FLOPS
+    assert before > ELIMINATION.dissected_flops
     assert now < 0.9 * before
     monkeypatch.setitem(sys.modules, "pymetis", None)
     np.testing.assert_array_equal(elimination_order(start, neighbour, 6), by_degree)

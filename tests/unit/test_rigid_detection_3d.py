@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigid_lcp import Disc, HalfSpace, Polyhedron, Sphere, box
-from rigid_lcp.contact.manifold import MOST
+from rigid_lcp.contact.manifold import MOST_KEPT
 from rigid_lcp.contact.near_pairs import bound_shapes, near_pairs
 from rigid_lcp.contact.placed_solids import place_solids, shapes_3d
 from rigid_lcp.errors import SceneError
@@ -81,12 +81,12 @@ def test_a_shared_octagon_keeps_its_corners() -> None:
 
 
 def test_many_corners_are_thinned_out_evenly() -> None:
-    """A face of 40 corners on a floor keeps `MOST`: none is more than 0.1 of the radius outside."""
+    """A face of 40 corners on a floor keeps `MOST_KEPT`: none is 0.1 of the radius outside."""
     ring = np.exp(2j * np.pi * np.arange(40) / 40)
     drum = Polyhedron([[one.real, one.imag, z] for one in ring for z in (0, 1)])
     x, y, _ = contacts([drum, FLOOR], [[0, 0, 0.5], [0, 0, 0]]).point.T
     angle = np.sort(np.arctan2(y, x))
-    assert len(angle) == MOST
+    assert len(angle) == MOST_KEPT
     assert 1 - np.cos(np.diff(angle, append=angle[0] + 2 * np.pi).max() / 2) < 0.1
 
 

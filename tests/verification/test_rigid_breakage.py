@@ -56,7 +56,7 @@ def test_a_pressed_diamond_breaks_at_its_strength(share):
 
 def test_grains_that_turn_to_dust_end_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
     """Far above the strength every part breaks again: an error unless there is a least volume."""
-    monkeypatch.setattr("rigid_lcp.wear.breakage.DUST", 4)
+    monkeypatch.setattr("rigid_lcp.wear.breakage.MOST_PARTS", 4)
     with pytest.raises(
         SceneError, match=r"2 grains have broken into .* parts, which go on to break"
     ):

@@ -8,7 +8,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rigid_lcp import Polyhedron, box
-from rigid_lcp.contact.manifold import MOST
+from rigid_lcp.contact.manifold import MOST_KEPT
 from rigid_lcp.contact.separation import PARALLEL_EDGES
 from rigid_lcp.shapes.rotations import (
     Floats,
@@ -112,7 +112,7 @@ def test_an_overlap_has_a_contact_with_its_depth(name: str, seed: int, share: fl
     found = contacts(shapes, position, turns, margin=1e-3 * width)
     assert len(found) > 0
     least = np.argmin(np.abs(found.gap - depth))
-    # lengths tell apart what differs by more than 1e-9 of the size (`TIE_IN_SPACE`)
+    # lengths tell apart what differs by more than 1e-9 of the size (`LENGTH_TIE`)
     tie = 2e-9 * min(shape.reach for shape in shapes)
     assert found.gap[least] == pytest.approx(depth, abs=tie)
     away = 1.0 if found.body_a[least] == 1 else -1.0
@@ -232,7 +232,7 @@ def test_many_sided_grains_keep_the_outer_contacts_and_the_deepest() -> None:
         ([drum, box(4.0, 4.0, 1.0)], [[0, 0, 0.5], [0, 0, -0.5]]),
     ):
         found = contacts(shapes, places, [tilt, UPRIGHT], margin=0.1)
-        assert len(found) == MOST
+        assert len(found) == MOST_KEPT
         lowest = rotate(tilt, drum.vertices)[:, 2].min() + 0.5
         assert found.gap.min() == pytest.approx(lowest, abs=1e-15)
         assert np.ptp(found.point[:, 0]) > 1.9

@@ -13,7 +13,7 @@ import scipy.linalg
 
 from rigid_lcp.friction.linear.factorisation import BlockSystem, SingularSystem
 from rigid_lcp.sparse.dense_tiles import TERMS_AT_ONCE
-from rigid_lcp.sparse.elimination_order import FEW_BLOCKS, minimum_degree, symmetric_pattern
+from rigid_lcp.sparse.elimination_order import ELIMINATION, minimum_degree, symmetric_pattern
 from rigid_lcp.sparse.elimination_tree import EliminationTree, elimination_tree
 from rigid_lcp.sparse.multifrontal import factor_fronts, solve_fronts
 
@@ -154,7 +154,7 @@ def test_fill_grows_as_n_log_n_on_grids_and_not_faster(side):
     assert numbers < 2 * 31 / 4 * count * np.log2(count)
 
 
-@pytest.mark.parametrize("arms", [50, FEW_BLOCKS + 50])
+@pytest.mark.parametrize("arms", [50, ELIMINATION.table_blocks + 50])
 def test_the_order_does_not_eliminate_a_hub_first(arms):
     """A star: the hub joins all arms if eliminated first; then the factors would be full."""
     hub = np.zeros(arms, dtype=int)

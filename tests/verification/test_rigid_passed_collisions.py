@@ -11,6 +11,7 @@ Regular and Chaotic Dynamics 8 (2003) 375).
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import sqrt
 from pathlib import Path
 
@@ -19,7 +20,6 @@ import pytest
 
 import rigid_lcp as r
 from rigid_lcp.collision import passing as passed_collisions
-from rigid_lcp.collision.passing import LOSSY_ROUNDS
 from rigid_lcp.report.page import write_report
 from rigid_lcp.scene.file import scene_read
 from rigid_lcp.scene.run import scene_run, simulation_of, summary_of
@@ -84,12 +84,13 @@ def test_an_inelastic_collapse_ends() -> None:
         before = run.energy
     assert run.steps_cut_off >= 1
     assert run.overlap <= 1e-9 * run.world.length
-    assert LOSSY_ROUNDS < passed_collisions.PASSING_ROUNDS
+    assert passed_collisions.PASSING.lossy_rounds < passed_collisions.PASSING.rounds
 
 
 def test_a_run_tells_what_was_cut_off(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In the summary, in the report, and after a resumed run."""
-    monkeypatch.setattr(passed_collisions, "PASSING_ROUNDS", 20)
+    few = replace(passed_collisions.PASSING, rounds=20)
+    monkeypatch.setattr(passed_collisions, "PASSING", few)
     path = tmp_path / "billiard.toml"
     path.write_text(
         "dimensions = 2\ngravity = [0.0, 0.0]\n[run]\nduration = 0.3\nstep = 1e-2\nframes = 2\n"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -9,6 +11,7 @@ from scipy.integrate import solve_ivp
 from rigid_lcp import Disc, HalfSpace, Polygon, Scene, Simulation, box
 from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import NoSolution, NotConverged
+from rigid_lcp.motion import runge_kutta
 from rigid_lcp.motion.lasting_contacts import find_first_fall
 from rigid_lcp.motion.state import Motion
 from rigid_lcp.scene.simulation import Method
@@ -26,6 +29,7 @@ from validation.bench.rigid.scenes import (
     stack,
 )
 
+BY_HALVING = replace(runge_kutta.RUNGE_KUTTA, located_ends=0)
 NEEDLE = Polygon([(-1, 0), (0, -0.01), (1, 0), (0, 0.01)])
 
 
@@ -186,7 +190,7 @@ def test_zeno_is_cut_off() -> None:
 def test_step_is_halved_and_doubled(monkeypatch: pytest.MonkeyPatch) -> None:
     """Section 9: overlaps halve the step; three clean steps double it, up to the longest one."""
     run = bouncing_disc(0.1, 0.5, method="acceleration", step=0.01)
-    monkeypatch.setattr("rigid_lcp.motion.runge_kutta.LOCATED", 0)  # by halving alone
+    monkeypatch.setattr(runge_kutta, "RUNGE_KUTTA", BY_HALVING)
     run.advance(0.15)
     assert run.pace.halved > 5
     assert run.pace.step < 0.01
@@ -204,7 +208,7 @@ def test_where_a_gap_closes_is_located(seed: int, monkeypatch: pytest.MonkeyPatc
     runs = [Simulation(grains_in_a_box(seed), "acceleration", step=5e-3) for _ in range(2)]
     for run in runs:  # the second by halving alone
         run.advance(0.12)
-        monkeypatch.setattr("rigid_lcp.motion.runge_kutta.LOCATED", 0)
+        monkeypatch.setattr(runge_kutta, "RUNGE_KUTTA", BY_HALVING)
         assert run.overlap <= 1e-11 * run.world.length
     paces = [run.pace for run in runs]
     assert paces[0].collisions == paces[1].collisions > 2

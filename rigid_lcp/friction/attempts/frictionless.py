@@ -43,30 +43,21 @@ Solve = Callable[[Floats], Floats]
 class FrictionlessNumbers:
     """Sweeps, exchanges of sides and proximal steps."""
 
-    shift: float = 1e-8
-    """Of the diagonal, over its mean [-]: a small one is soon taken out again,"""
-    shift_steps: int = 20
-    """in so many proximal steps at most."""
-    sweeps: int = 400
-    """Most sweeps before the first exchange;"""
+    shift: float = 1e-8  # of the diagonal, over its mean [-]: a small one is soon taken out again,
+    shift_steps: int = 20  # in so many proximal steps at most
+    sweeps: int = 400  # most sweeps before the first exchange;
     settled: tuple[int, int] = (20, 1)
     """they end when in so many of them so few contacts changed sides."""
-    sweeps_between: int = 100
-    """Sweeps instead of an exchange,"""
-    smoothed: int = 2
-    """as long as more contacts than that are wrong,"""
-    smoothings: int = 3
-    """so many times; with self-stress they mislead,"""
-    haste: int = 15
-    """so that the exchanges begin again without them where so many do not end."""
-    exchanges: int = 60
-    """Exchanges of a proximal step at most."""
+    sweeps_between: int = 100  # sweeps instead of an exchange,
+    smoothed: int = 2  # as long as more contacts than that are wrong,
+    smoothings: int = 3  # so many times; with self-stress they mislead,
+    haste: int = 15  # so that the exchanges begin again without them where so many do not end
+    exchanges: int = 60  # exchanges of a proximal step at most
     patience: int = 5
     """Exchanges at once that may fail to make violations fewer, before one at a time."""
     sign_margin: float = 1e-13
     """Size of an acceleration or force that counts as zero, over the greatest [-]."""
-    band_most: float = 1.3e8
-    """Banded Cholesky up to about so many multiplications,"""
+    band_most: float = 1.3e8  # banded Cholesky up to about so many multiplications,
     band_overhead: int = 20
     """the band counted so much wider: half of what sparse LU takes in the plane, as much as it
     where 1,700 spheres touch."""

@@ -44,69 +44,49 @@ class ProximalNumbers:
 
     first_shift: float = 1e-4
     """alpha over the mean of W's diagonal [-] at first, not greater than the residual,"""
-    least_shift: float = 1e-11
-    """at least"""
-    greatest_shift: float = 10.0
-    """and at most."""
-    shrink: float = 0.3
-    """Factor of alpha after a point that was found,"""
-    grow: float = 10.0
-    """and after one that was not."""
+    least_shift: float = 1e-11  # at least
+    greatest_shift: float = 10.0  # and at most
+    shrink: float = 0.3  # factor of alpha after a point that was found,
+    grow: float = 10.0  # and after one that was not
     steps: int = 5
     """Newton steps in which a point has to be found: most take one or two from the one before."""
     finer: float = 0.1
     """A point is found where its own error is so small a part of the residual of the one before
     [-],"""
-    finest: float = 1e-15
-    """or so small [-]."""
+    finest: float = 1e-15  # or so small [-]
     hopeless: float = 10.0
     """A point is given up where its last error is so many times that of the first step [-],"""
     same: float = 1e-3
     """or is an earlier one again to this part of it [-]: the same changes of status in a circle,"""
-    tried: int = 4
-    """from so many errors on."""
-    factorisations: int = 60
-    """At most."""
+    tried: int = 4  # from so many errors on
+    factorisations: int = 60  # at most
 
 
 @dataclass(frozen=True)
 class ExtrapolatedNumbers:
     """Shifts, steps and extrapolation of points whose centre runs ahead."""
 
-    first_shift: float = 1e-5
-    """alpha over the mean of W's diagonal [-] at first,"""
-    least_shift: float = 1e-9
-    """at least"""
-    greatest_shift: float = 10.0
-    """and at most."""
-    steps: int = 8
-    """Newton steps in which a point has to be found."""
-    few_steps: int = 3
-    """The centre runs further ahead after a point that took so few,"""
-    many_steps: int = 5
-    """and less far after one that took so many."""
+    first_shift: float = 1e-5  # alpha over the mean of W's diagonal [-] at first,
+    least_shift: float = 1e-9  # at least
+    greatest_shift: float = 10.0  # and at most
+    steps: int = 8  # Newton steps in which a point has to be found
+    few_steps: int = 3  # the centre runs further ahead after a point that took so few,
+    many_steps: int = 5  # and less far after one that took so many
     finer: float = 0.3
     """A point is found where its own error is so small a part of the residual of the one before
     [-];"""
-    rough: float = 1e-3
-    """of a residual [-] above this, of this."""
+    rough: float = 1e-3  # of a residual [-] above this, of this
     shrink: float = 0.5
     """Factor of alpha after more than `easy` points in turn, the last in `easy_steps` steps."""
-    grow: float = 3.0
-    """Factor of alpha where no point is found without extrapolation."""
-    easy: int = 3
-    """Points."""
-    easy_steps: int = 3
-    """Steps."""
-    furthest: float = 1e12
-    """Greatest theta [-]: where nothing drifts it would double without end."""
-    fall_back: float = 0.25
-    """What is left of theta after a point that was not found [-]."""
+    grow: float = 3.0  # factor of alpha where no point is found without extrapolation
+    easy: int = 3  # points
+    easy_steps: int = 3  # steps
+    furthest: float = 1e12  # greatest theta [-]: where nothing drifts it would double without end
+    fall_back: float = 0.25  # what is left of theta after a point that was not found [-]
     endless: float = 1e12
     """Forces over ``rho |q|`` [-] that are not exceeded: the drift of a problem without solution
     never ends."""
-    factorisations: int = 1500
-    """At most."""
+    factorisations: int = 1500  # at most
 
 
 PROXIMAL, POINTS = ProximalNumbers(), ExtrapolatedNumbers()

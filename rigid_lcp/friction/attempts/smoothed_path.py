@@ -50,35 +50,22 @@ class SmoothedNumbers:
     roundings: tuple[float, ...] = (1e-2, 1e-1, 1e-3, 1e-4)
     """eps over ``sqrt(sigma) / rho``, the velocity of a sticking contact on the path [-]: every one
     is another path, and they are followed in turn."""
-    shrink: float = 0.3
-    """sigma of the next point over that of the last [-],"""
-    less: float = 0.55
-    """and where that was not found."""
+    shrink: float = 0.3  # sigma of the next point over that of the last [-],
+    less: float = 0.55  # and where that was not found
     back: tuple[float, float] = (3.0, 10.0)
     """sigma with which another path is begun where one folds, over that of its last point [-]: the
     greater when all paths have folded."""
-    hops: int = 6
-    """So many other paths at most are followed."""
-    shift: float = 1e-8
-    """Of W in the matrices, over the mean of its diagonal [-]."""
-    found: float = 0.03
-    """A point is found where |F| is so small a part of ``sqrt(sigma nc)`` [-]."""
-    first_steps: int = 20
-    """Newton steps in which the first point of a path has to be found,"""
-    steps: int = 10
-    """and each other."""
-    decrease: float = 1e-2
-    """Part of a step [-] by which |F| has to fall;"""
-    least_step: float = 2e-3
-    """a shorter step is none [-]."""
-    near: float = 3e-8
-    """Residual [-] from which Newton's method tries to end the path,"""
-    end_steps: int = 5
-    """its steps"""
-    end_patience: int = 3
-    """and those that may fail to halve the residual."""
-    factorisations: int = 150
-    """At most."""
+    hops: int = 6  # so many other paths at most are followed
+    shift: float = 1e-8  # of W in the matrices, over the mean of its diagonal [-]
+    found: float = 0.03  # a point is found where |F| is so small a part of ``sqrt(sigma nc)`` [-]
+    first_steps: int = 20  # Newton steps in which the first point of a path has to be found,
+    steps: int = 10  # and each other
+    decrease: float = 1e-2  # part of a step [-] by which |F| has to fall;
+    least_step: float = 2e-3  # a shorter step is none [-]
+    near: float = 3e-8  # residual [-] from which Newton's method tries to end the path,
+    end_steps: int = 5  # its steps
+    end_patience: int = 3  # and those that may fail to halve the residual
+    factorisations: int = 150  # at most
 
 
 SMOOTHED = SmoothedNumbers()

@@ -42,21 +42,17 @@ from rigid_lcp.friction.problem import (
 class RefinementNumbers:
     """Steps without a shift, and what ends them."""
 
-    shift: float = 1e-9
-    """Proximal shift of the factors, over the mean of W's diagonal [-]."""
+    shift: float = 1e-9  # proximal shift of the factors, over the mean of W's diagonal [-]
     products: int = 8
     """Dimension of the space that GMRES builds at most: one for each eigenvalue that the shift
     hides, and one for all others."""
     steps: int = 8
     """Most Newton steps: where contacts at Coulomb's limit turn it rises before it falls."""
-    level: int = 2
-    """They end where so many in turn leave it where it was: at round-off."""
-    exact: float = 2.2e-16
-    """A residual [-] that no step betters."""
+    level: int = 2  # they end where so many in turn leave it where it was: at round-off
+    exact: float = 2.2e-16  # a residual [-] that no step betters
     enough: float = 1e-6
     """Error of a solution over the right hand side [-]: a Newton step needs no less."""
-    little: float = 1e-14
-    """Part of a vector that is round-off of it [-]."""
+    little: float = 1e-14  # part of a vector that is round-off of it [-]
 
 
 REFINEMENT = RefinementNumbers()
@@ -136,16 +132,11 @@ def gmres(problem: FrictionProblem, a: Floats, b: Floats, solve: Solve, right: F
 class StickingNumbers:
     """All contacts stick: when that is tried, and when given up."""
 
-    shift: float = 1e-9
-    """alpha over the mean of W's diagonal [-]."""
-    steps: int = 6
-    """Proximal steps at most."""
-    pays: float = 0.01
-    """What a step leaves of the residual [-] if plain ones are enough;"""
-    stands: float = 0.5
-    """and if no more are of use."""
-    hopeless: float = 1e-2
-    """A residual [-] above this after a step: some contact does not stick."""
+    shift: float = 1e-9  # alpha over the mean of W's diagonal [-]
+    steps: int = 6  # proximal steps at most
+    pays: float = 0.01  # what a step leaves of the residual [-] if plain ones are enough;
+    stands: float = 0.5  # and if no more are of use
+    hopeless: float = 1e-2  # a residual [-] above this after a step: some contact does not stick
     loose: float = 0.4
     """Share of contacts [-] that would have to be pulled to stick: much is loose (beds at rest:
     0.2 to 0.4, as their forces of least norm pull at some)."""
@@ -154,10 +145,8 @@ class StickingNumbers:
     straight: float = 0.3
     """Tangential forces over normal ones [-], up to which the forces of sticking show what bears
     what."""
-    heavy: float = 1e3
-    """Forces over ``rho |q|`` [-] that heavy bodies on light ones have,"""
-    great: float = 10.0
-    """and from which on their part is asked for more exactly."""
+    heavy: float = 1e3  # forces over ``rho |q|`` [-] that heavy bodies on light ones have,
+    great: float = 10.0  # and from which on their part is asked for more exactly
 
 
 STICKING = StickingNumbers()

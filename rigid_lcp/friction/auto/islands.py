@@ -25,7 +25,7 @@ from rigid_lcp.sparse import csr_arrays, diagonal_blocks
 Method = Callable[..., FrictionSolution]
 
 ISLAND_ROUNDS = 4
-"""Times the islands are solved again, ten times finer each, until the whole is fine enough."""
+"""Times [-] the islands are solved, ten times finer each, until the whole is fine enough."""
 
 
 def islands(problem: FrictionProblem) -> list[Ints]:

@@ -13,15 +13,11 @@ from rigid_lcp.friction.linear import SingularSystem
 from rigid_lcp.friction.methods import Path, PathStep, interior_point
 from rigid_lcp.friction.problem import FrictionSolution, length
 
-PATH_END_PATIENCE = 3
-"""Steps of Newton that may fail to halve the residual: from the end of a path it begins to converge
-in the first two or not at all."""
-
-
 CONVEX_PATH = Path(convex=True, compliance=1e-4)
 BENT_PATH = Path(compliance=1e-4, rounding=0.3)
 """The convex path with the term |u_T|."""
-SHARP_ROUNDING = Path(rounding=1e-4, compliance=1e-3)
+LAGGED_PATH = Path(compliance=1e-4, rounding=1e-3, lagged=True)
+SHARP_PATH = Path(compliance=1e-3, rounding=1e-4)
 
 
 @dataclass(frozen=True)
@@ -29,29 +25,24 @@ class ConvexPath:
     """The convex path, all of it where nothing moves, and from a part of it on Coulomb's."""
 
     steps: int = 7
-    until: float = 1e-4
-    """Residual [-] at which it is left."""
-    useful: float = 1e-3
-    """Residual [-] from which Newton is begun (where little slides)."""
-    newton: int = 5
-    """Steps of Newton."""
+    until: float = 1e-4  # residual [-] at which it is left
+    useful: float = 1e-3  # residual [-] from which Newton is begun (where little slides)
+    newton: int = 5  # steps of Newton, and those that may fail to halve the residual:
+    patience: int = 3  # from the end of a path it begins to converge in the first two or not at all
     rest: float = 1e-3
     """Where nothing moves the convex law is Coulomb's: velocities so small beside those of q [-]
     are taken for rest, and the path is followed to its end.  Other paths may end at a motion that
     solves the problem as well (an arch that only just stands)."""
-    rest_until: float = 1e-8
-    """Residual [-] at that end."""
+    rest_until: float = 1e-8  # residual [-] at that end
     rest_steps: int = 15
     bent_steps: int = 25
     """Along the bent path from where the convex one was left: from there it folds back seldom."""
     bent_useful: float = 3e-6
     """Residual [-] at which Newton is tried, and again at `Limits.hand_over`."""
-    bent_newton: int = 8
-    """Steps of Newton."""
+    bent_newton: int = 8  # steps of Newton
     heavy_steps: int = 20
     """Along the convex path where light bodies bear heavy ones, as it has to go further."""
-    heavy_newton: int = 10
-    """Steps of Newton from its end."""
+    heavy_newton: int = 10  # steps of Newton from its end
     wider: float = 10.0
     """sigma with which the smoothed path goes on from there, over that of the point [-]: where the
     interior point has jammed, some contacts are far from its own."""
@@ -63,14 +54,10 @@ class SharpPath:
     not its end is near."""
 
     steps: int = 40
-    until: float = 3e-8
-    """Residual [-] at its end."""
-    useful: float = 1e-5
-    """Residual [-] from which Newton is begun."""
-    near: float = 1e-7
-    """Residual [-] from which turns are begun."""
-    turns: int = 3
-    """Turns that may fail."""
+    until: float = 3e-8  # residual [-] at its end
+    useful: float = 1e-5  # residual [-] from which Newton is begun
+    near: float = 1e-7  # residual [-] from which turns are begun
+    turns: int = 3  # turns that may fail
 
 
 @dataclass(frozen=True)
@@ -78,23 +65,21 @@ class SmoothedFurther:
     """The smoothed path that goes on from the convex one, and extrapolated points from its end."""
 
     factorisations: int = 150
-    useful: float = 1e-6
-    """Residual [-] from which points are begun."""
-    points: int = 80
-    """Factorisations of them."""
-    points_flops: float = 5e9
-    """Their effort."""
+    useful: float = 1e-6  # residual [-] from which points are begun
+    points: int = 80  # factorisations of them
+    points_flops: float = 5e9  # their effort
 
 
-CONVEX, SHARP, FURTHER = ConvexPath(), SharpPath(), SmoothedFurther()
-TURN_PATHS = (
-    Path(rounding=0.3, compliance=1e-4),
-    Path(rounding=1e-3, compliance=1e-4, lagged=True),
-    Path(convex=True, compliance=1e-4),
-)
-TURN_PATH_STEPS = 45
-"""Paths from whose ends turns begin again, and steps along each: how many turns are needed differs
-by ten between starts that look alike, so a few of many starts cost less than many of one."""
+@dataclass(frozen=True)
+class TurnPaths:
+    """Paths from whose ends turns begin again: how many turns are needed differs by ten between
+    starts that look alike, so a few of many starts cost less than many of one."""
+
+    paths: tuple[Path, ...] = (BENT_PATH, LAGGED_PATH, CONVEX_PATH)
+    steps: int = 45  # along each [-]
+
+
+CONVEX, SHARP, FURTHER, TURNING = ConvexPath(), SharpPath(), SmoothedFurther(), TurnPaths()
 
 
 # --- what sticks ------------------------------------------------------------------------------
@@ -128,11 +113,11 @@ def follow_convex_path(trial: Trial) -> bool:
         return False
     found = follow(trial, path, CONVEX.until, CONVEX.steps)
     if found.residual < CONVEX.useful:
-        trial.newton(found.r, CONVEX.newton, found.method, PATH_END_PATIENCE)
+        trial.newton(found.r, CONVEX.newton, found.method, CONVEX.patience)
     if not trial.best.solved and seems_at_rest(trial):
         part = path.x, path.s
         rest = follow(trial, path, CONVEX.rest_until, CONVEX.rest_steps)
-        trial.newton(rest.r, CONVEX.newton, rest.method, PATH_END_PATIENCE)
+        trial.newton(rest.r, CONVEX.newton, rest.method, CONVEX.patience)
         path.x, path.s = part
     path.path = BENT_PATH
     steps = CONVEX.bent_steps
@@ -143,7 +128,7 @@ def follow_convex_path(trial: Trial) -> bool:
         if found.residual > CONVEX.bent_useful:
             break
         steps -= int(found.work["iterations"])
-        trial.newton(found.r, CONVEX.bent_newton, found.method, PATH_END_PATIENCE)
+        trial.newton(found.r, CONVEX.bent_newton, found.method, CONVEX.patience)
     return end_path(trial, path, found)
 
 
@@ -195,7 +180,7 @@ def follow_sharp_path(trial: Trial) -> bool:
     """`SHARP` and Newton from its end, and turns from where that is near."""
     trial.sharp = True
     steps = min(SHARP.steps, trial.affordable)
-    found = follow(trial, SHARP_ROUNDING, max(SHARP.until, trial.tolerance), steps)
+    found = follow(trial, SHARP_PATH, max(SHARP.until, trial.tolerance), steps)
     if found.residual <= SHARP.useful:
         found = trial.newton(found.r, LIMITS.newton, found.method)
     if not trial.best.solved and found.residual <= SHARP.near:
@@ -226,10 +211,10 @@ def turn_from_paths(trial: Trial) -> bool:
     most = trial.effort + TURNS.flops
     if trial.path_end is not None and take_turns(trial, trial.path_end):
         return True
-    for path in TURN_PATHS:
+    for path in TURNING.paths:
         if trial.effort > most or not trial.affordable:
             break
-        steps = min(TURN_PATH_STEPS, trial.affordable)
+        steps = min(TURNING.steps, trial.affordable)
         found = follow(trial, path, max(LIMITS.hand_over, trial.tolerance), steps)
         if trial.polish(found, factorisations=0) or take_turns(trial, found.r):
             return True

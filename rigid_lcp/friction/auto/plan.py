@@ -20,7 +20,7 @@ from rigid_lcp.arrays import Floats
 from rigid_lcp.friction.attempts import PROXIMAL
 from rigid_lcp.friction.auto import paths as along
 from rigid_lcp.friction.auto import sweeps as by
-from rigid_lcp.friction.auto.trial import ENDLESS, Trial
+from rigid_lcp.friction.auto.trial import LIMITS, Trial
 from rigid_lcp.friction.problem import FrictionProblem, prove_forces_insufficient
 
 PROOF_CONTACTS = 3000
@@ -127,7 +127,7 @@ points by Newton at its end.  A large bed with a start goes far down by sweeps i
 Newton's method still guesses dozens of 10,000 contacts wrong, after these few."""
 
 LAST = (
-    Stage("proof", lambda t: t.forces > ENDLESS, prove_insoluble),
+    Stage("proof", lambda t: t.forces > LIMITS.endless, prove_insoluble),
     Stage("one turn", lambda t: t.gives_energy, by.turn_once),
     Stage("paths, late", lambda t: t.convex_useful and not t.smoothed, ALL_PATHS),
     Stage("turns from paths", lambda t: True, along.turn_from_paths),

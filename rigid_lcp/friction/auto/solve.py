@@ -36,12 +36,8 @@ from rigid_lcp.friction.problem import (
 )
 from trackbed.choices import find_choices
 
-TINY = 1e-60
-"""Problems with a smaller q are solved in other units."""
-FEW_ISLANDS = 20
-"""Up to so many islands, single contacts not counted, of a large problem are solved apart at once:
-a few grains that lie loose can keep a whole bed from converging.  More cost more than they gain."""
-
+LEAST_OFFSET = 1e-60
+"""Problems with a smaller q [that of u] are solved in other units."""
 ENERGY_GIVEN = (
     "W gives energy to forces within the cones of friction (r . W r < 0), so a solution need not"
     " exist; the best residual is {:.2g}\n  -> give W by its bodies (BodySpace), or to more digits"
@@ -87,7 +83,7 @@ def solve_friction(
     if problem.contacts == 0:
         return judge_forces(problem, problem.offset.copy(), tolerance, method)
     largest = float(np.abs(problem.offset).max())
-    if 0.0 < largest < TINY:  # squares of such numbers are zero
+    if 0.0 < largest < LEAST_OFFSET:  # squares of such numbers are zero
         unit = 2.0 ** np.frexp(largest)[1]
         large = replace(problem, offset=problem.offset / unit)
         found = solve_friction(
@@ -111,7 +107,7 @@ def solve_auto(
             return exact
     parts = islands(problem) if problem.contacts > LIMITS.few_contacts else []
     larger = sum(len(part) > 1 for part in parts)
-    split = len(parts) > 1 and larger <= FEW_ISLANDS
+    split = len(parts) > 1 and larger <= LIMITS.few_islands
     if split:
         trial = Trial(problem, start, tolerance)
         trial.keep(solve_islands(problem, _solve_island, start, tolerance, accept=accept))

@@ -28,8 +28,7 @@ class BriefSweeps:
     """They end where so many of them leave more than this residual [-] (towers)."""
     fast: float = 3e-4
     """A residual [-] that few sweeps leave where more may end it (loose grains, crystals)."""
-    fast_sweeps: int = 200
-    """So many more."""
+    fast_sweeps: int = 200  # so many more
 
 
 @dataclass(frozen=True)
@@ -37,35 +36,26 @@ class LongSweeps:
     """Sweeps of a large bed with a start, in one run."""
 
     sweeps: int = 1600
-    until: float = 1e-9
-    """Residual [-] at which Newton's method takes over."""
-    yielding_sweeps: int = 2000
-    """Where the bed yields and a rough answer is asked for."""
+    until: float = 1e-9  # residual [-] at which Newton's method takes over
+    yielding_sweeps: int = 2000  # where the bed yields and a rough answer is asked for
     near: float = 1.4
     """They end at so many times the tolerance [-], from where proximal points with a great shift,
     which hardly ever fail, take off what is stiff of the error: a third and more."""
-    few: int = 1000
-    """After fewer sweeps some more cost less than such points."""
-    shift: float = 1e-3
-    """First shift of the points, over the mean of W's diagonal [-]."""
-    factorisations: int = 8
-    """Of the points."""
+    few: int = 1000  # after fewer sweeps some more cost less than such points
+    shift: float = 1e-3  # first shift of the points, over the mean of W's diagonal [-]
+    factorisations: int = 8  # of the points
 
 
 @dataclass(frozen=True)
 class Turns:
     """Sweeps and extrapolated points by turns."""
 
-    sweeps: int = 1000
-    """A turn."""
-    points: int = 1500
-    """Factorisations a turn at most."""
+    sweeps: int = 1000  # a turn
+    points: int = 1500  # factorisations a turn at most
     points_patience: int = 30
     """Factorisations after which points that did not halve their residual are left."""
-    patience: int = 8
-    """Turns that may fail to halve the least residual so far."""
-    flops: float = 6e10
-    """Effort after which there is no next turn."""
+    patience: int = 8  # turns that may fail to halve the least residual so far
+    flops: float = 6e10  # effort after which there is no next turn
 
 
 BRIEF, LONG, TURNS = BriefSweeps(), LongSweeps(), Turns()

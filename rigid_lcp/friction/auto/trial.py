@@ -31,20 +31,19 @@ from rigid_lcp.friction.problem import (
 )
 from rigid_lcp.friction.sweeps import SweepBlocks
 
-ENDLESS = 1e6
-"""Forces over ``rho |q|`` [-] that look endless."""
-
 
 @dataclass(frozen=True)
 class Limits:
     """What holds for every attempt."""
 
-    hand_over: float = 1e-7
-    """Residual [-] at which Newton takes over."""
+    hand_over: float = 1e-7  # residual [-] at which Newton takes over
     few_contacts: int = 300
     """Up to so many a problem is small: it costs less to factor than to sweep."""
-    convex_contacts: int = 10_000
-    """Up to so many the convex path is followed."""
+    few_islands: int = 20
+    """Up to so many [-], single contacts not counted, of a large problem are solved apart at once:
+    a few grains that lie loose can keep a whole bed from converging.  More cost more than they
+    gain."""
+    convex_contacts: int = 10_000  # up to so many the convex path is followed
     newton: int = 20
     """Steps of Newton from `hand_over`, where it mostly needs fewer factorisations than proximal
     points."""
@@ -61,14 +60,11 @@ class Limits:
     contact at rest: corrections of a solution are of the size of its error."""
     refinements: int = 8
     """Most such steps, where factorisations cost next to nothing; one beyond `few_contacts`."""
-    more_sweeps: float = 0.5
-    """Sweeps to that end over those that found the solution [-], at most."""
-    few_points: int = 50
-    """Fewer factorisations than that extrapolated points are not begun with."""
-    most_flops: float = 4e11
-    """An effort (some 20 s) beyond which no factorisation is begun."""
-    most_factored: float = 2e7
-    """Factorisations times contacts, of the same use."""
+    more_sweeps: float = 0.5  # sweeps to that end over those that found the solution [-], at most
+    few_points: int = 50  # fewer factorisations than that extrapolated points are not begun with
+    endless: float = 1e6  # forces over ``rho |q|`` [-] that look endless
+    most_flops: float = 4e11  # an effort (some 20 s) beyond which no factorisation is begun
+    most_factored: float = 2e7  # factorisations times contacts, of the same use
     misled: float = 2.0
     """Error of forces to start from over that of none [-] above which they are left aside: those
     of a step before that know but some of the contacts may be a little above 1, and lead on."""
@@ -262,11 +258,11 @@ class Trial:
     def endless(self, force: Floats) -> bool:
         """Whether the greatest of forces r is so far above ``rho |q|`` that they look endless."""
         offered = self.problem.rho * length(self.problem.offset)
-        return not float(np.abs(force).max(initial=0.0)) <= ENDLESS * offered
+        return not float(np.abs(force).max(initial=0.0)) <= LIMITS.endless * offered
 
     def forget_endless(self) -> None:
         """No forces in place of endless ones, behind whose size any velocity hides."""
-        if self.forces > ENDLESS:
+        if self.forces > LIMITS.endless:
             self.best = Trial(self.problem, None, self.tolerance).best
 
     def newton(

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -44,10 +45,16 @@ from rigid_lcp.sparse import (
 
 Solve = Callable[[Floats], Floats]
 
-DENSE_SIZE = 100
-"""Up to so many rows a dense LU costs less than the bookkeeping of a sparse one."""
-DENSE_SHARE = 0.3
-"""Fuller matrices are factored dense: their sparse LU would be full anyway."""
+
+@dataclass(frozen=True)
+class DenseNumbers:
+    """Where a dense LU costs less than a sparse one."""
+
+    rows: int = 100  # up to so many it does without bookkeeping [-]
+    share: float = 0.3  # of entries [-]: the sparse LU of fuller matrices would be full anyway
+
+
+DENSE = DenseNumbers()
 
 
 class SingularSystem(ArithmeticError):
@@ -67,9 +74,9 @@ class Factorisation(Protocol):
 def factorisation(problem: FrictionProblem) -> Factorisation:
     """The cheaper one: by way of the bodies where they are known, unless W is small."""
     size = problem.contacts * problem.dim
-    if problem.bodies is not None and size > DENSE_SIZE:
+    if problem.bodies is not None and size > DENSE.rows:
         return BodyFactorisation(problem)
-    if size <= DENSE_SIZE or problem.delassus.nnz > DENSE_SHARE * size * size:
+    if size <= DENSE.rows or problem.delassus.nnz > DENSE.share * size * size:
         return DenseFactorisation(problem)
     return ContactFactorisation(problem)
 

@@ -26,6 +26,8 @@ O(k^3).
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -40,16 +42,18 @@ from rigid_lcp.friction.pivots import (
     remove_shift,
     start_pivots,
 )
-from rigid_lcp.friction.problem import (
-    FrictionProblem,
-    FrictionSolution,
-    require_number,
-)
+from rigid_lcp.friction.problem import FrictionProblem, FrictionSolution, require_number
 
-PERTURBATION = 1e-4
-"""Of b, over its size [-], against ties; removed at the end."""
-PIVOTS = 40
-"""Changes of lists a contact at most."""
+
+@dataclass(frozen=True)
+class DantzigNumbers:
+    """Against ties, and the end."""
+
+    perturbation: float = 1e-4  # of b, over its size [-], against ties; removed at the end
+    pivots: int = 40  # changes of lists a contact at most [-]
+
+
+DANTZIG = DantzigNumbers()
 
 
 def dantzig(
@@ -74,8 +78,8 @@ def dantzig(
     is none.  Takes memory for (2 nc)^2 numbers: not for above some 2,000 contacts.
     """
     tolerance = require_number(tolerance, "tolerance")
-    limit = PIVOTS * problem.contacts + 100
-    state = start_pivots(problem, SHIFT.least, PERTURBATION, tangential_velocity)
+    limit = DANTZIG.pivots * problem.contacts + 100
+    state = start_pivots(problem, SHIFT.least, DANTZIG.perturbation, tangential_velocity)
     ended, where = consider_contacts(
         state.geometry, state.reduced, state.b, state.f, state.a, np.arange(problem.contacts),
         limit, state.codes, state.events,

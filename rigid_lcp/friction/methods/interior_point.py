@@ -53,28 +53,21 @@ from rigid_lcp.friction.problem import (
 )
 from rigid_lcp.sparse import multiply_blocks
 
-POLISHED = True
-"""Newton's method is called from its end."""
-
 
 @dataclass(frozen=True)
 class InteriorNumbers:
     """Steps, and what ends them."""
 
-    iterations: int = 50
-    """At most."""
+    iterations: int = 50  # at most
     boundary_share: float = 0.99
     """Part of the way to the nearest cone's boundary [-] that a step may go."""
     least_centring: float = 1e-6
     """The predictor never aims lower than so many times the present gap [-]."""
     back_off_step: float = 0.05
     """A step shorter than this [-] is replaced by one towards the middle,"""
-    back_off_gap: float = 3.0
-    """with a gap so many times as large [-] and the lack left as it is."""
-    short_step: float = 0.03
-    """Where steps are shorter than this [-],"""
-    short_steps: int = 4
-    """so many in a row: the path has folded, or there is no solution."""
+    back_off_gap: float = 3.0  # with a gap so many times as large [-] and the lack left as it is
+    short_step: float = 0.03  # where steps are shorter than this [-],
+    short_steps: int = 4  # so many in a row: the path has folded, or there is no solution
 
 
 INTERIOR = InteriorNumbers()
@@ -315,3 +308,5 @@ def coulomb_velocity(s: Floats, mu: Floats, eps: float, convex: bool) -> tuple[F
 
 
 METHOD = interior_point
+POLISHED = True
+"""Newton's method is called from its end."""

@@ -40,8 +40,7 @@ class NewtonNumbers:
 
     first_shifts: tuple[float, float] = (1e-5, 1e-3)
     """Proximal shifts over mean(diag W) [-] to begin with, tried in turn."""
-    least_shift: float = 1e-10
-    """Least of them [-]."""
+    least_shift: float = 1e-10  # least of them [-]
     quiet: float = 0.01
     """The shift falls by this factor at a step on which no contact changes its status: then it is
     all that holds the steps up.  While some do a great one is better: round-off is divided by it,
@@ -49,8 +48,7 @@ class NewtonNumbers:
     bearable: float = 1e-2
     """Part of what makes the contacts approach, ``rho |q|`` [-], that the first shift may hold back
     of the forces: a great weight on light bodies answers at a small eigenvalue of W."""
-    iterations: int = 50
-    """Steps at most,"""
+    iterations: int = 50  # steps at most,
     patience: int = 8
     """and those that may fail to halve the best residual, as contacts change status first."""
 

@@ -55,20 +55,13 @@ from rigid_lcp.friction.problem import (
 class PivotingNumbers:
     """Paths, their starts and shifts."""
 
-    sweeps: int = 300
-    """Of Gauss-Seidel for a start,"""
-    more_sweeps: int = 2000
-    """and to better one from which a path took too many pivots,"""
-    swept: float = 1e-10
-    """to this residual [-]."""
-    shift: float = 1e-2
-    """Of the diagonal, over its mean [-], at first;"""
-    near: float = 10.0
-    """so many times the residual of a start [-], if that is less;"""
-    wider: float = 10.0
-    """and so many times as much on the last path from a start [-]."""
-    pivots: int = 60
-    """A contact, of all paths together."""
+    sweeps: int = 300  # of Gauss-Seidel for a start,
+    more_sweeps: int = 2000  # and to better one from which a path took too many pivots,
+    swept: float = 1e-10  # to this residual [-]
+    shift: float = 1e-2  # of the diagonal, over its mean [-], at first;
+    near: float = 10.0  # so many times the residual of a start [-], if that is less;
+    wider: float = 10.0  # and so many times as much on the last path from a start [-]
+    pivots: int = 60  # a contact, of all paths together
 
 
 PIVOTING = PivotingNumbers()

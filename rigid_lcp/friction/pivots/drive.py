@@ -37,8 +37,8 @@ NO_EVENT, TOUCHES, PARTS, STICKS, SLIDES = range(5)
 """Events of step 3: none, (a), (b), (c), (d)."""
 NORMAL, TANGENTIAL, OFFSET, PATH = range(4)
 """What is driven; along a path the share of an offset may fall as well."""
-REFRESH = 200
-"""Updates of an inverse before it is computed afresh."""
+MOST_UPDATES = 200
+"""Of an inverse [-] before it is computed afresh."""
 
 
 @njit(cache=True)
@@ -275,7 +275,7 @@ def drive(
         if not move_contact(geometry, reduced, who, to):
             return SINGULAR, who
         snap_event(geometry, f, a, who, event, to)
-        if turn % REFRESH == 0 and not refresh_reduced(geometry, reduced):
+        if turn % MOST_UPDATES == 0 and not refresh_reduced(geometry, reduced):
             return SINGULAR, who
     return TOO_MANY, contact
 

@@ -34,16 +34,12 @@ class ShiftNumbers:
 
     least: float = 1e-6
     """Over the mean of the diagonal [-]: below it round-off in the inverse would make events up."""
-    steps: int = 60
-    """Most proximal steps that take the shift out,"""
+    steps: int = 60  # most proximal steps that take the shift out,
     patience: int = 12
     """and most without a better residual: self-stress moves on for a while before it settles."""
-    fall: float = 0.1
-    """Factor of the shift at a proximal step [-],"""
-    steep_fall: float = 0.01
-    """and after one of few pivots [-]:"""
-    few_pivots: int = 10
-    """so many at most."""
+    fall: float = 0.1  # factor of the shift at a proximal step [-],
+    steep_fall: float = 0.01  # and after one of few pivots [-]:
+    few_pivots: int = 10  # so many at most
     least_pace: float = 0.1
     """Exponent of that factor [-], halved after a step of too many pivots, below which it ends."""
 

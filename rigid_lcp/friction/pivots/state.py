@@ -40,8 +40,8 @@ from rigid_lcp.friction.problem import (
     require_finite,
 )
 
-DIVERGED = 1e-3
-"""Approach that forces leave, over the greatest of q, which no residual turns into a solution:
+MOST_APPROACH = 1e-3
+"""That a solution may leave, over the greatest of q [-], however small its residual:
 relative to |r| it falls to nothing as forces grow without bound, which hide the approach."""
 
 
@@ -197,7 +197,7 @@ def judge_pivots(
     work = {"pivots": float(state.events[0])}
     velocity = problem.velocity(force)
     size = float(np.abs(problem.offset).max(initial=0.0))
-    diverged = bool(velocity[:: problem.dim].min(initial=0.0) < -DIVERGED * size)
+    diverged = bool(velocity[:: problem.dim].min(initial=0.0) < -MOST_APPROACH * size)
     if residual <= tolerance and not diverged:
         return FrictionSolution(force, velocity, residual, "solved", method, work)
     status, text = _ENDS[RAY if diverged and ended == DONE else ended]

@@ -18,12 +18,9 @@ import numpy as np
 from numba import njit
 
 from rigid_lcp.arrays import Floats, Ints
-from rigid_lcp.friction.sweeps.local_contact import NONE, solve_contact_2d, solve_contact_3d
+from rigid_lcp.friction.sweeps.local_contact import LOCAL, NONE, solve_contact_2d, solve_contact_3d
 
-REGULAR = 1e-8
-"""Least determinant of a block that is inverted, over the product of its diagonal."""
-COUPLED = 0.999
-"""Greatest ``mu |W_NT| / W_NN`` at which the sign of sliding is known without a test."""
+LEAST_DETERMINANT, MOST_COUPLING = LOCAL.least_determinant, LOCAL.most_coupling
 
 
 @njit(cache=True)
@@ -34,8 +31,8 @@ def inverses(local: Floats, friction: Floats) -> Floats:
         w = local[c]
         if w.shape[0] == 2:
             determinant = w[0, 0] * w[1, 1] - w[0, 1] * w[1, 0]
-            safe = friction[c] * abs(w[0, 1]) < COUPLED * w[0, 0]
-            if not (safe and w[0, 0] > 0.0 and determinant > REGULAR * w[0, 0] * w[1, 1]):
+            safe = friction[c] * abs(w[0, 1]) < MOST_COUPLING * w[0, 0]
+            if not (safe and w[0, 0] > 0.0 and determinant > LEAST_DETERMINANT * w[0, 0] * w[1, 1]):
                 continue
             found[c, 0, 0], found[c, 1, 1] = w[1, 1] / determinant, w[0, 0] / determinant
             found[c, 0, 1], found[c, 1, 0] = -w[0, 1] / determinant, -w[1, 0] / determinant
@@ -46,7 +43,7 @@ def inverses(local: Floats, friction: Floats) -> Floats:
                 n, o = (m + 1) % 3, (m + 2) % 3
                 found[c, m, i] = w[j, n] * w[k, o] - w[j, o] * w[k, n]
         determinant = w[0, 0] * found[c, 0, 0] + w[0, 1] * found[c, 1, 0] + w[0, 2] * found[c, 2, 0]
-        if w[0, 0] > 0.0 and determinant > REGULAR * w[0, 0] * w[1, 1] * w[2, 2]:
+        if w[0, 0] > 0.0 and determinant > LEAST_DETERMINANT * w[0, 0] * w[1, 1] * w[2, 2]:
             found[c] /= determinant
         else:
             found[c] = 0.0

@@ -8,6 +8,7 @@ over a hundred contacts costs a few microseconds.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -19,25 +20,36 @@ from rigid_lcp.friction.sweeps.blocks import add_impulses, find_relative_velocit
 from rigid_lcp.friction.sweeps.body_kernel import sweep_bodies_2d, sweep_bodies_3d
 from rigid_lcp.friction.sweeps.local_contact import NONE, solve_contact_2d, solve_contact_3d
 
-CHANGE_GROWTH = 1.5
-"""Momentum starts again when a sweep changes the forces by so many times the least change [-]
-since it last did: without this large beds (10,000 contacts) swing on at 1e-4, as nothing turns
-back."""
-CHECK_EVERY = 0.1
-"""The residual costs about a sweep: it is taken when the sweeps have grown by this part [-],"""
-CHECK_AFTER = 5.0
-"""and by so many at least, and when the change a sweep makes has fallen as far as the residual
-should."""
-MANY_CONTACTS = 2000
-"""From so many contacts on only some sweeps go over all of them, and the others over those that
-bear: beds in motion have two open contacts for one that does."""
-ALL_EVERY = 10
-"""One sweep of so many goes over all."""
-STALLED = 100.0
-"""Where the sweeps since the last look, so many at least and as many as all before,"""
-STALLS = 0.7
-"""leave more than this part of the residual [-], the order is turned round: in one order sweeps
-may go round in circles, at a few contacts that slide, which in the other they leave at once."""
+
+@dataclass(frozen=True)
+class SweepNumbers:
+    """When momentum starts again, what is looked at and when, and which contacts are visited."""
+
+    change_growth: float = 1.5
+    """Momentum starts again when a sweep changes the forces by so many times the least change [-]
+    since it last did: without this large beds (10,000 contacts) swing on at 1e-4, as nothing turns
+    back."""
+    check_growth: float = 0.1
+    """The residual costs about a sweep: it is taken when the sweeps have grown by this part [-],"""
+    check_sweeps: float = 5.0
+    """and by so many at least [-], and when the change a sweep makes has fallen as far as the
+    residual should."""
+    many_contacts: int = 2000
+    """From so many [-] on only some sweeps go over all, and the others over those that bear: beds
+    in motion have two open contacts for one that does."""
+    sweeps_a_round: int = 10  # one of so many goes over all [-]
+    stalled_sweeps: float = 100.0
+    """Where the sweeps since the last look, so many [-] at least and as many as all before,"""
+    stalled_share: float = 0.7
+    """leave more than this part of the residual [-], the order is turned round: in one order sweeps
+    may go round in circles, at a few contacts that slide, which in the other they leave at once."""
+
+
+SWEEPS = SweepNumbers()
+CHANGE_GROWTH, MANY_CONTACTS = SWEEPS.change_growth, SWEEPS.many_contacts
+CHECK_GROWTH, CHECK_SWEEPS = SWEEPS.check_growth, SWEEPS.check_sweeps
+STALLED_SWEEPS, STALLED_SHARE = SWEEPS.stalled_sweeps, SWEEPS.stalled_share
+SWEEPS_A_ROUND = SWEEPS.sweeps_a_round
 
 
 class SweepBlocks(NamedTuple):
@@ -140,9 +152,9 @@ def sweep_until_small(
     count, carry = 0, visit
     while best_residual > tolerance and state.tally[0] < sweeps:
         done = state.tally[0]
-        check = min(float(sweeps), done + max(CHECK_AFTER, np.ceil(CHECK_EVERY * done)))
+        check = min(float(sweeps), done + max(CHECK_SWEEPS, np.ceil(CHECK_GROWTH * done)))
         while state.tally[0] < check:
-            if some and count % ALL_EVERY > 0:
+            if some and count % SWEEPS_A_ROUND > 0:
                 sweep_once(blocks, state, force, carry)
             else:
                 stuck = sweep_once(blocks, state, force, visit)
@@ -151,8 +163,8 @@ def sweep_until_small(
             count += 1
             if state.tally[3] <= enough:
                 break
-        if state.tally[0] >= max(STALLED, 2.0 * marked):
-            if best_residual > STALLS * mark:
+        if state.tally[0] >= max(STALLED_SWEEPS, 2.0 * marked):
+            if best_residual > STALLED_SHARE * mark:
                 visit, count = visit[::-1].copy(), 0
                 state.tally[1], state.tally[2] = 1.0, np.inf
             mark, marked = best_residual, state.tally[0]

@@ -18,14 +18,29 @@ the order is open, stick, slide; where none exists (Painleve) the status says so
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numba import njit
 
 from rigid_lcp.arrays import Floats, Ints
 
-TIE_ROUND_OFF = 1e-14
-"""Relative size below which a difference of the data is rounding: ties on the edge of the cone."""
-NEWTON_STEPS = 8
+
+@dataclass(frozen=True)
+class LocalNumbers:
+    """One contact: round-off, blocks that can be inverted, Newton's steps."""
+
+    round_off: float = 1e-14  # of a difference of the data [-]: ties on the edge of the cone
+    singular_pivot: float = 1e-13  # of a block, over its greatest entry [-], or less
+    least_determinant: float = 1e-8
+    """Of a block that is inverted, over the product of its diagonal [-]."""
+    most_coupling: float = 0.999
+    """``mu |W_NT| / W_NN`` [-] with which the sign of sliding is known without a test."""
+    newton_steps: int = 8  # for a direction near the last, at most [-]
+
+
+LOCAL = LocalNumbers()
+ROUND_OFF, SINGULAR_PIVOT, NEWTON_STEPS = LOCAL.round_off, LOCAL.singular_pivot, LOCAL.newton_steps
 
 
 @njit(cache=True)
@@ -74,7 +89,7 @@ def find_all_directions(
         across = c * (g_2 + b_21 * c + b_22 * s) - s * (g_1 + b_11 * c + b_12 * s)
         if abs(across) > best:
             best, e_1, e_2 = abs(across), -c, -s
-    if best <= TIE_ROUND_OFF * size:
+    if best <= ROUND_OFF * size:
         for k in range(4):
             found[k, 0], found[k, 1] = (1.0 - k, 0.0) if k % 2 == 0 else (0.0, 2.0 - k)
         return found, 4
@@ -154,9 +169,6 @@ def find_root_between(p: Floats, low: float, high: float) -> float:
 
 OPEN, STICK, SLIDE, NONE = 0, 1, 2, 3
 
-SINGULAR = 1e-13
-"""A block whose pivot is smaller than this part of its greatest entry is singular."""
-
 
 @njit(cache=True)
 def solve_contacts_apart(local: Floats, offset: Floats, friction: Floats) -> tuple[Floats, Ints]:
@@ -181,14 +193,14 @@ def solve_contact_2d(w: Floats, q_n: float, q_t: float, mu: float) -> tuple[floa
         return (-q_n / w[0, 0], 0.0, SLIDE) if w[0, 0] > 0.0 else (0.0, 0.0, NONE)
     straight, crossed = w[0, 0] * w[1, 1], w[0, 1] * w[1, 0]
     determinant = straight - crossed
-    if abs(determinant) > SINGULAR * (abs(straight) + abs(crossed)):
+    if abs(determinant) > SINGULAR_PIVOT * (abs(straight) + abs(crossed)):
         r_n = (w[0, 1] * q_t - w[1, 1] * q_n) / determinant
         r_t = (w[1, 0] * q_n - w[0, 0] * q_t) / determinant
         if r_n >= 0.0 and abs(r_t) <= mu * r_n:
             return r_n, r_t, STICK
     elif w[0, 0] > 0.0:
         r_n = -q_n / w[0, 0]
-        if abs(w[1, 0] * r_n + q_t) <= TIE_ROUND_OFF * (abs(w[1, 0] * r_n) + abs(q_t)):
+        if abs(w[1, 0] * r_n + q_t) <= ROUND_OFF * (abs(w[1, 0] * r_n) + abs(q_t)):
             return r_n, 0.0, STICK
     g = w[0, 0] * q_t - q_n * w[1, 0]
     bend = mu * (q_n * w[1, 1] - q_t * w[0, 1])
@@ -196,7 +208,7 @@ def solve_contact_2d(w: Floats, q_n: float, q_t: float, mu: float) -> tuple[floa
     size = abs(w[0, 0] * q_t) + mu * abs(q_t * w[0, 1]) - q_n * (abs(w[1, 0]) + mu * abs(w[1, 1]))
     for d in (first, -first):
         denominator = w[0, 0] - mu * w[0, 1] * d
-        if denominator > 0.0 and d * g + bend >= -TIE_ROUND_OFF * size:
+        if denominator > 0.0 and d * g + bend >= -ROUND_OFF * size:
             r_n = -q_n / denominator
             return r_n, -mu * r_n * d, SLIDE
     return 0.0, 0.0, NONE
@@ -290,7 +302,7 @@ def force_sticking_pivoted(
             for j in range(k, 3):
                 if abs(a[i, j]) > pivot:
                     pivot, row, column = abs(a[i, j]), i, j
-        if pivot <= SINGULAR * greatest:
+        if pivot <= SINGULAR_PIVOT * greatest:
             break
         rank += 1
         for j in range(3):
@@ -305,7 +317,7 @@ def force_sticking_pivoted(
                 a[i, j] -= factor * a[k, j]
             b[i] -= factor * b[k]
     for k in range(rank, 3):
-        if abs(b[k]) > SINGULAR * size:
+        if abs(b[k]) > SINGULAR_PIVOT * size:
             return 0.0, 0.0, 0.0, False
     r = np.zeros(3)
     for i in range(rank - 1, -1, -1):
@@ -327,6 +339,6 @@ def force_sliding(
     """
     denominator = w[0, 0] - mu * (w[0, 1] * d_1 + w[0, 2] * d_2)
     kappa = d_1 * (g_1 + b_11 * d_1 + b_12 * d_2) + d_2 * (g_2 + b_21 * d_1 + b_22 * d_2)
-    if denominator <= 0.0 or kappa < -TIE_ROUND_OFF * size:
+    if denominator <= 0.0 or kappa < -ROUND_OFF * size:
         return -1.0
     return -q_n / denominator

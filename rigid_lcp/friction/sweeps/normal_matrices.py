@@ -12,11 +12,12 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rigid_lcp.arrays import Floats
+from rigid_lcp.friction.sweeps.contact_kernel import CHANGE_GROWTH
 
 Indices = NDArray[np.int32]
 
-SYMMETRIC = 1e-13
-"""Relative difference of an entry and its mirror image that is round-off."""
+MIRROR_ROUND_OFF = 1e-13
+"""Difference of an entry and its mirror image that is none, over the largest entry [-]."""
 
 
 @njit(cache=True)
@@ -98,11 +99,7 @@ def face_band(
             above = rank[index[j]] - k
             if above > 0:
                 other = max(other, abs(band[k, above] - value[j]))
-    return band, other <= SYMMETRIC * largest
-
-
-SWEEP_GROWTH = 1.5
-"""Momentum starts again when a sweep goes so many times as far as the shortest since it did."""
+    return band, other <= MIRROR_ROUND_OFF * largest
 
 
 @njit(cache=True)
@@ -144,7 +141,7 @@ def normal_sweeps(
             product += diagonal[c] * back * (f[c] - last[c])
             square += diagonal[c] * back * back
         least = min(least, square)
-        if product > 0.0 or square > SWEEP_GROWTH**2 * least:
+        if product > 0.0 or square > CHANGE_GROWTH**2 * least:
             time, least = 1.0, math.inf
         if sweep % at_once == 0:
             changed = 0
