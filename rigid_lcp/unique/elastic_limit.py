@@ -90,6 +90,7 @@ class LimitNumbers:
     held_steps: int = 8  # so many are made [-], each leaves 1e-10 over the softest mode
     outside_cone: float = 1e-3  # distance of such a force from its cone, over the greatest [-]
     closed_gap: float = 1e-6  # over the smallest body's size [-]: time steps leave such gaps
+    tolerance: float = 1e-10  # of the forces at a state of a scene [-]
 
 
 LIMIT = LimitNumbers()
@@ -302,7 +303,7 @@ def unique_forces(world: World, motion: Motion, loads: ArrayLike | None = None) 
     problem = friction_problem(
         space, find_contact_offset(contacts, motion, free), contacts.friction, motion.dim
     )
-    found = elastic_limit(problem, tolerance=1e-10)
+    found = elastic_limit(problem, tolerance=LIMIT.tolerance)
     if not found.solved:
         raise NotConverged(
             f"the forces of elastic contacts were not found (residual {found.residual:.2g})",

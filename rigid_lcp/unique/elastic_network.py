@@ -41,8 +41,8 @@ class NetworkNumbers:
     frictionless_steps: int = 5  # and from the least energy [-]
     sweeps: int = 300  # of Gauss-Seidel in a step [-],
     swept: float = 1e-7  # down to this residual [-]
-    polished: float = 1e-13  # residual that needs no Newton after it [-]
-    polish: float = 1e-14  # to which that goes [-]
+    exact: float = 1e-13  # residual from which on no Newton is needed after them [-]
+    polished: float = 1e-14  # down to which that goes [-]
     most_residual: float = 1e-9  # of a friction step that is found [-]
 
 
@@ -187,8 +187,8 @@ class ElasticNetwork:
         )  # fmt: skip
         found = gauss_seidel(problem, self.force[rows], NETWORK.swept, NETWORK.sweeps)
         self.newton_steps += NETWORK.sweeps // 100  # the cost of as many sweeps
-        if found.residual > NETWORK.polished:
-            polished = newton(problem, found.r, NETWORK.polish)
+        if found.residual > NETWORK.exact:
+            polished = newton(problem, found.r, NETWORK.polished)
             self.newton_steps += int(polished.work.get("factorisations", 0.0))
             found = min(polished, found, key=lambda each: each.residual)
         if found.residual > NETWORK.most_residual:

@@ -79,7 +79,7 @@ class TurnPaths:
     steps: int = 45  # along each [-]
 
 
-CONVEX, SHARP, FURTHER, TURNING = ConvexPath(), SharpPath(), SmoothedFurther(), TurnPaths()
+CONVEX, SHARP, FURTHER, TURN_PATHS = ConvexPath(), SharpPath(), SmoothedFurther(), TurnPaths()
 
 
 # --- what sticks ------------------------------------------------------------------------------
@@ -211,10 +211,10 @@ def turn_from_paths(trial: Trial) -> bool:
     most = trial.effort + TURNS.flops
     if trial.path_end is not None and take_turns(trial, trial.path_end):
         return True
-    for path in TURNING.paths:
+    for path in TURN_PATHS.paths:
         if trial.effort > most or not trial.affordable:
             break
-        steps = min(TURNING.steps, trial.affordable)
+        steps = min(TURN_PATHS.steps, trial.affordable)
         found = follow(trial, path, max(LIMITS.hand_over, trial.tolerance), steps)
         if trial.polish(found, factorisations=0) or take_turns(trial, found.r):
             return True
