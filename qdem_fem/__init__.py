@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from qdem_fem.contact.spheres import ContactPlane, SphereContact
     from qdem_fem.contact.surface import SurfaceContact
     from qdem_fem.element import Material
-    from qdem_fem.files import QdemError, Series, StepWarning, ramp
+    from qdem_fem.files import QdemError, Series, StepWarning, make_ramp
     from qdem_fem.march import Energy, History, Simulation, StaticAnswer
 
 provide_cache_folders(__path__[0])
@@ -37,12 +37,12 @@ _HOMES = {
     "SurfaceContact": "contact.surface",
     "StaticAnswer": "march",
     "StepWarning": "files",
-    "ramp": "files",
+    "make_ramp": "files",
 }
 __all__ = [
     "Body", "ContactPlane", "CriticalStep", "Energy", "History", "Material", "PeriodicWidth",
     "QdemError", "Series", "Simulation", "SphereContact", "StaticAnswer", "StepWarning",
-    "SurfaceContact", "ramp",
+    "SurfaceContact", "make_ramp",
 ]  # fmt: skip
 
 

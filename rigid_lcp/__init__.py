@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rigid_lcp.friction.problem import BodySpace, FrictionProblem, FrictionSolution
     from rigid_lcp.motion import Scene
     from rigid_lcp.scene import Simulation
-    from rigid_lcp.shapes import Disc, HalfSpace, Polygon, Polyhedron, Sphere, box
+    from rigid_lcp.shapes import Disc, HalfSpace, Polygon, Polyhedron, Sphere, make_box
     from rigid_lcp.wear import Breakage, Wear
 
 provide_cache_folders(__path__[0])
@@ -29,13 +29,13 @@ _ROOMS = {
     "friction.problem": ("BodySpace", "FrictionProblem", "FrictionSolution"),
     "motion": ("Scene",),
     "scene": ("Simulation",),
-    "shapes": ("Disc", "HalfSpace", "Polygon", "Polyhedron", "Sphere", "box"),
+    "shapes": ("Disc", "HalfSpace", "Polygon", "Polyhedron", "Sphere", "make_box"),
     "wear": ("Breakage", "Wear"),
 }
 _HOMES = {name: room for room, names in _ROOMS.items() for name in names}
 __all__ = [
     "BodySpace", "Breakage", "Disc", "FrictionProblem", "FrictionSolution", "HalfSpace", "Polygon",
-    "Polyhedron", "RigidError", "Scene", "Simulation", "Sphere", "Wear", "box", "collide",
+    "Polyhedron", "RigidError", "Scene", "Simulation", "Sphere", "Wear", "collide", "make_box",
     "solve_friction",
 ]  # fmt: skip
 

@@ -21,39 +21,39 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
     add_run_arguments(
         parser, "a scene of rigid bodies (TOML)", "run.duration=0.1", "the last frame"
     )
-    parser.set_defaults(command=rigid_command)
+    parser.set_defaults(command=run_rigid)
 
 
-def rigid_command(arguments: argparse.Namespace) -> int:
+def run_rigid(arguments: argparse.Namespace) -> int:
     """Run a scene, or tell what would run."""
-    from rigid_lcp.scene import scene_read
+    from rigid_lcp.scene import load_scene
 
     refuse_both(arguments)
-    file = scene_read(arguments.scene, arguments.overrides)
-    answer = _outlook(file) if arguments.dry_run else _run(file, arguments)
+    file = load_scene(arguments.scene, arguments.overrides)
+    answer = _preview_run(file) if arguments.dry_run else _run(file, arguments)
     if arguments.json:
         print(json.dumps(answer, indent=1))
     else:
         for key, value in answer.items():
-            print(f"{key.replace('_', ' '):22} {_shown(value)}")
+            print(f"{key.replace('_', ' '):22} {_format_value(value)}")
     return 0
 
 
-def _shown(value: Any) -> str:
+def _format_value(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.6g}"
     if isinstance(value, list):
-        return "; ".join(_shown(each) for each in value)
+        return "; ".join(_format_value(each) for each in value)
     if isinstance(value, dict):
-        return "; ".join(f"{key} ({_shown(each)})" for key, each in value.items())
+        return "; ".join(f"{key} ({_format_value(each)})" for key, each in value.items())
     return str(value)
 
 
-def _outlook(file: SceneFile) -> dict[str, Any]:
+def _preview_run(file: SceneFile) -> dict[str, Any]:
     """What a run would be: bodies, steps, what is left out."""
-    from rigid_lcp.scene import left_out, plan_steps, simulation_of, unknowns_a_contact
+    from rigid_lcp.scene import count_unknowns, list_left_out, make_simulation, plan_steps
 
-    _, run = simulation_of(file)
+    _, run = make_simulation(file)
     tables = file.tables.run
     steps, step = plan_steps(file)
     return {
@@ -62,19 +62,19 @@ def _outlook(file: SceneFile) -> dict[str, Any]:
         "bodies": int(run.world.movable.sum()),
         "steps": steps,
         "step": step,
-        "unknowns_a_contact": unknowns_a_contact(file),
+        "unknowns_a_contact": count_unknowns(file),
         "frames": tables.frames,
-        "left_out": left_out(file),
+        "left_out": list_left_out(file),
     }
 
 
 def _run(file: SceneFile, arguments: argparse.Namespace) -> dict[str, Any]:
     """The whole run with its report; its summary."""
     from rigid_lcp.report import write_report
-    from rigid_lcp.scene import RESULT, RunFolder, scene_run, simulation_of, summary_of
+    from rigid_lcp.scene import RESULT, RunFolder, make_simulation, run_scene, summarise_run
     from trackbed.run_files import raise_on_signals, record_provenance, write_whole
 
-    scene, run = simulation_of(file)  # what it refuses must not leave a folder behind
+    scene, run = make_simulation(file)  # what it refuses must not leave a folder behind
     path = place_run(arguments)
     folder = RunFolder(path)
     manifest = {
@@ -83,19 +83,21 @@ def _run(file: SceneFile, arguments: argparse.Namespace) -> dict[str, Any]:
     }
     kept = "every finished frame is saved"
     remedy = "the same command with --resume goes on from the last one"
-    with folder.locked(), raise_on_signals(kept, remedy, str(path)):
-        goes_on = folder.settle(manifest, file.text, resume=arguments.resume, force=arguments.force)
+    with folder.lock(), raise_on_signals(kept, remedy, str(path)):
+        goes_on = folder.prepare(
+            manifest, file.text, resume=arguments.resume, force=arguments.force
+        )
         there = folder.summary
         if goes_on and there is not None:
             return there | {"folder": str(path)}
-        scene_run(file, run, folder, resume=goes_on, progress=_progress())
-        summary = summary_of(file, scene, run, folder)
+        run_scene(file, run, folder, resume=goes_on, progress=_make_progress())
+        summary = summarise_run(file, scene, run, folder)
         write_report(folder, scene, manifest, summary, draw=not arguments.no_pictures)
         write_whole(path / RESULT, json.dumps(summary, indent=1) + "\n")
     return summary | {"folder": str(path)}
 
 
-def _progress() -> Any:
+def _make_progress() -> Any:
     """A line on standard error after every frame: time reached, contacts, time left."""
     began = time.monotonic()
     first: list[float] = []

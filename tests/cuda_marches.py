@@ -11,17 +11,17 @@ from numpy.typing import NDArray
 
 from qdem_fem.contact.bounds import bound_spring_network
 from qdem_fem.contact.search.pairs import Pairs
-from qdem_fem.contact.search.periodic import extents
+from qdem_fem.contact.search.periodic import find_extents
 from qdem_fem.contact.spheres.options import compute_pair_stiffness
-from validation.bench.qdem_gpu.contact import STEPS, two_cubes
-from validation.bench.qdem_gpu.search import Cloud, contact_of, lists_gpu
+from validation.bench.qdem_gpu.contact import STEPS, stack_cubes
+from validation.bench.qdem_gpu.search import Cloud, find_pairs_gpu, make_contact
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 
 def lists_gpu_shuffled(given: Cloud, seed: int) -> Pairs:
-    """`lists_gpu` with every bucket of cells in another order, as hardware may leave it."""
+    """`find_pairs_gpu` with every bucket of cells in another order, as hardware may leave it."""
     from qdem_fem.contact.cuda import cells as cuda_cells
     from qdem_fem.contact.cuda import pairs as cuda_search
 
@@ -36,7 +36,7 @@ def lists_gpu_shuffled(given: Cloud, seed: int) -> Pairs:
         return cells
 
     with patch.object(cuda_search, "find_cells", shuffled):
-        return lists_gpu(given, seed)
+        return find_pairs_gpu(given, seed)
 
 
 class Sums(NamedTuple):
@@ -58,7 +58,7 @@ def sums_gpu(given: Cloud, seed: int, first: Integers, lost: bool) -> Sums:
     from qdem_fem.contact.cuda.arrays import DeviceContact
     from qdem_fem.kernel.cuda.step import cuda
 
-    there = DeviceContact(contact_of(given, seed), given.side)
+    there = DeviceContact(make_contact(given, seed), given.side)
     moved = np.zeros((len(given.radius), 4))
     moved[:, :3] = given.position - given.before
     moved[len(moved) // 2, 1] += np.inf if lost else 0.0
@@ -73,7 +73,7 @@ def sums_gpu(given: Cloud, seed: int, first: Integers, lost: bool) -> Sums:
 
 def sums_processor(given: Cloud, seed: int, first: Integers) -> Sums:
     """`sums_gpu`, of no lost vertex, by array."""
-    contact, x = contact_of(given, seed), given.position
+    contact, x = make_contact(given, seed), given.position
     pairs, walls = contact.pairs, contact.planes.force.any(axis=2)
     row = np.repeat(np.arange(len(x)), np.diff(pairs.first))
     ends = np.column_stack([row, pairs.second])[pairs.touching.astype(bool)]
@@ -90,7 +90,7 @@ def sums_processor(given: Cloud, seed: int, first: Integers) -> Sums:
             ends, compute_pair_stiffness(*stiffness[ends.T]), 2 * stiffness * walls.sum(axis=0),
             1 + given.radius,
         ),
-        extents(x[:, 1], first),
+        find_extents(x[:, 1], first),
         True,
     )  # fmt: skip
 
@@ -149,6 +149,6 @@ def steps_launched(look: int) -> list[tuple[int, int]]:
         patch.object(DeviceContact, "launch_push", push_counted),
         patch.object(cuda_assembly.CudaAssembly, "run_kernel", window_counted),
     ):
-        run = two_cubes("cuda", skin=2e-6)
+        run = stack_cubes("cuda", skin=2e-6)
         run.advance(STEPS * run.step)
     return [window for window in windows if window[1]]  # others are of elements alone

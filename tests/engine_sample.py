@@ -85,7 +85,7 @@ def at_rest(state: State, position: FloatArray | None = None) -> State:
     """The bed without velocities, put to other places [m] where they are given."""
     still = np.zeros_like(state.position)
     place = state.position if position is None else position
-    return state.moved(place, velocity=still, spin=still)
+    return state.move_to(place, velocity=still, spin=still)
 
 
 class Sample:

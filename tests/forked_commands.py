@@ -62,7 +62,7 @@ def slow_down(seconds: float) -> None:
         return wrapper
 
     FakeEngine._prepare = staticmethod(slowed(FakeEngine._prepare, "preparation"))  # type: ignore[method-assign]
-    FakeEngine._cycles = staticmethod(slowed(FakeEngine._cycles, "window"))  # type: ignore[method-assign]
+    FakeEngine._find_cycles = staticmethod(slowed(FakeEngine._find_cycles, "window"))  # type: ignore[method-assign]
     stages.estimate = slowed(stages.estimate, "jump")
     relaxation.relax = slowed(relaxation.relax, "relaxation")
 

@@ -15,7 +15,7 @@ from adapters.engines.fake import FakeBed
 from adapters.jumps.check import accept, judge, reject
 from adapters.jumps.control import Control, Decision, Settings, decide, observe
 from adapters.jumps.rates import Stretch
-from adapters.jumps.slopes import Landing, unmoved
+from adapters.jumps.slopes import Landing, remove_moves
 
 Law = Callable[[FloatArray], FloatArray]
 
@@ -132,7 +132,7 @@ def make_stretch(curve: FakeBed, first: int, cycles: int) -> Stretch:
 
 def moved_more(curve: Curve, stretch: Stretch, landings: Sequence[Landing]) -> Stretch:
     """A stretch as it is behind jumps: the bed settles more."""
-    more = unmoved(stretch, landings, -curve.kappa)
+    more = remove_moves(stretch, landings, -curve.kappa)
     if landings and landings[-1].cycle == stretch.first_cycle:
         more.gain[0] += (curve.first_cycle - curve.kappa) * landings[-1].moved
     return more

@@ -11,15 +11,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from adapters.bed.contact_law import hertz_stiffness
+from adapters.bed.contact_law import make_hertz_stiffness
 from adapters.bed.container import Container, Walls
-from adapters.bed.overlaps import Neighbours, find_behind_discs, neighbours
+from adapters.bed.overlaps import Neighbours, find_behind_discs, find_pairs
 from adapters.bed.state import FloatArray, State
 from adapters.relaxation.measured import Surroundings
 from adapters.relaxation.methods import relax
 from adapters.relaxation.smallest import find_smallest_move
 
-STIFFNESS = hertz_stiffness(46.9e9, 0.25, 210e9, 0.3)
+STIFFNESS = make_hertz_stiffness(46.9e9, 0.25, 210e9, 0.3)
 DENSITY = 2710.0
 OVERLAP = 6e-8
 """Mean overlap of a made bed [m]."""
@@ -57,7 +57,7 @@ def bed_made(count: int, seed: int = 0) -> tuple[State, Walls]:
     position = edge * place + 3e-4 * generator.standard_normal((count, 3))
     walls = Container("box", size_x=side * edge, size_y=side * edge).walls()
     position = parted(position, radius, walls)
-    near = neighbours(position, radius, walls, 1e-3)
+    near = find_pairs(position, radius, walls, 1e-3)
     closed = np.argsort(-near.overlap)[: 2 * count]
     network = Neighbours(
         near.first[closed],

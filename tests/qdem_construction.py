@@ -28,7 +28,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from qdem_fem.element.kinematics import isotropic
+from qdem_fem.element.kinematics import apply_hooke
 from qdem_fem.files import Floats, Integers
 
 INTERFACES = (
@@ -166,6 +166,6 @@ def internal_forces_constructed(
     reference, current = nodes[elements], (nodes + displacement)[elements]
     strain = strain_finger(deformation_gradient(reference, current))
     rate = strain_rate(velocity_gradient(current, velocity[elements]))
-    stress = isotropic(strain, *lame) + isotropic(rate, *viscous)  # eqs 2, 7 and 8
+    stress = apply_hooke(strain, *lame) + apply_hooke(rate, *viscous)  # eqs 2, 7 and 8
     forces = cell_forces(current, stress)
     return particle_forces(elements, forces, len(nodes))

@@ -14,14 +14,14 @@ from qdem_fem.element.finger import compute_nominal_stress as stress_finger
 from qdem_fem.element.finger import compute_strain as strain_finger
 from qdem_fem.element.kinematics import (
     IDENTITY,
-    cofactor,
+    apply_hooke,
     compute_displacement_gradient,
     compute_volume_change,
     compute_von_mises,
-    contraction,
-    isotropic,
-    trace,
-    transposed,
+    contract,
+    find_cofactor,
+    find_trace,
+    transpose,
 )
 from qdem_fem.element.small import compute_nominal_stress as stress_small
 from qdem_fem.element.strain_measures import (
@@ -33,11 +33,11 @@ from qdem_fem.files import Floats, Integers
 from tests.qdem_construction import particle_forces, strain_rate
 
 __all__ = [
-    "IDENTITY", "STRESS", "Elements", "Strain", "cofactor", "compute_cauchy_stress",
+    "IDENTITY", "STRESS", "Elements", "Strain", "apply_hooke", "compute_cauchy_stress",
     "compute_displacement_gradient", "compute_elastic_energy", "compute_volume_change",
-    "compute_von_mises", "contraction", "internal_forces", "isotropic", "strain_finger",
-    "stress_finger", "stress_small", "stress_viscous", "stress_viscous_small", "trace",
-    "transposed",
+    "compute_von_mises", "contract", "find_cofactor", "find_trace", "internal_forces",
+    "strain_finger", "stress_finger", "stress_small", "stress_viscous", "stress_viscous_small",
+    "transpose",
 ]  # fmt: skip
 STRESS = {name: measure.compute_nominal_stress for name, measure in MEASURES.items()}
 
@@ -70,14 +70,14 @@ def stress_viscous(
     ``H_rate`` [1/s], viscosities [Pa s].  Goes with ``finger`` and ``svk``.
     """
     L = H_rate @ np.linalg.inv(IDENTITY + H)
-    return isotropic(strain_rate(L), viscous_first, viscous_second) @ cofactor(IDENTITY + H)
+    return apply_hooke(strain_rate(L), viscous_first, viscous_second) @ find_cofactor(IDENTITY + H)
 
 
 def stress_viscous_small(
     H_rate: Floats, viscous_first: ArrayLike, viscous_second: ArrayLike
 ) -> Floats:
     """P_D = lambda_D tr(e_rate) I + 2 mu_D e_rate [Pa], e_rate = sym H_rate, for ``small``."""
-    return isotropic(strain_rate(H_rate), viscous_first, viscous_second)
+    return apply_hooke(strain_rate(H_rate), viscous_first, viscous_second)
 
 
 def internal_forces(
@@ -101,6 +101,6 @@ def internal_forces(
             P = P + stress_viscous_small(H_rate, *viscous)
         else:
             P = P + stress_viscous(H, H_rate, *viscous)
-    others = -elements.volume[:, None, None] * (elements.gradients @ transposed(P))
+    others = -elements.volume[:, None, None] * (elements.gradients @ transpose(P))
     forces = np.concatenate([-others.sum(axis=1, keepdims=True), others], axis=1)
     return particle_forces(elements.nodes, forces, len(displacement))

@@ -14,9 +14,9 @@ from rigid_lcp import Disc, HalfSpace, Polygon, Polyhedron, Scene, Simulation
 from rigid_lcp.arrays import Floats
 from rigid_lcp.motion.state import Motion
 from rigid_lcp.scene.simulation import Method
-from rigid_lcp.shapes.rotations import quaternion_of_rotation, quaternion_rate, rotate
+from rigid_lcp.shapes.rotations import find_quaternion_rate, make_quaternion, rotate
 from tests.rigid_solids import ballast_stone
-from validation.bench.rigid.scenes import DENSITY, FLOOR, G, gravity_on
+from validation.bench.rigid.scenes import DENSITY, FLOOR, G, turn_gravity
 
 EXACT = {"rtol": 1e-13, "atol": 1e-13, "method": "DOP853"}
 """How SciPy solves the equations of motion: to round-off, as good as a closed form here."""
@@ -28,7 +28,7 @@ DISC_SLOPE, DISC_FRICTION, DISC_SPEED = 0.2, 0.2, 1.0
 
 def skidding_disc(method: Method, step: float, *, radius: float = 0.5) -> Simulation:
     """A disc (body 0) that starts down an incline without spin; it has grip enough to roll."""
-    scene = Scene(2, gravity_on(DISC_SLOPE))
+    scene = Scene(2, turn_gravity(DISC_SLOPE))
     scene.add(Disc(radius), density=DENSITY, position=(0, radius), velocity=(DISC_SPEED, 0))
     scene.add(FLOOR, friction=DISC_FRICTION)
     return Simulation(scene, method, step=step)
@@ -147,7 +147,7 @@ def stone_in_flight_answer(seconds: float) -> Floats:
     def law(_: float, y: Floats) -> Floats:
         spin = y[4:]
         change = np.linalg.solve(inertia, -np.cross(spin, inertia @ spin))
-        return np.concatenate([quaternion_rate(y[:4], rotate(y[:4], spin)), change])
+        return np.concatenate([find_quaternion_rate(y[:4], rotate(y[:4], spin)), change])
 
     start = np.concatenate([[1.0, 0.0, 0.0, 0.0], STONE_SPIN])
     return np.asarray(solve_ivp(law, (0, seconds), start, **EXACT).y[:4, -1])
@@ -166,7 +166,7 @@ PRISM_SLOPE, PRISM_FRICTION, KICK, TURN = 0.2, 0.4, np.array([1.0, 0.6]), 2.0
 def sliding_prism(method: Method, step: float) -> Simulation:
     """A kicked prism (body 0) that stands on a triangle on an incline, and turns."""
     normal = np.array([np.sin(PRISM_SLOPE), 0.0, np.cos(PRISM_SLOPE)])
-    turn = quaternion_of_rotation([0.0, PRISM_SLOPE, 0.0])
+    turn = make_quaternion([0.0, PRISM_SLOPE, 0.0])
     scene = Scene(3)
     scene.add(
         PRISM, density=STONE_DENSITY, position=THICK / 2 * normal, angle=turn,
@@ -179,7 +179,7 @@ def sliding_prism(method: Method, step: float) -> Simulation:
 def sliding_prism_place(run: Simulation) -> Floats:
     """Place down the incline and across it [m], angle about its normal [rad]."""
     normal = np.array([np.sin(PRISM_SLOPE), 0.0, np.cos(PRISM_SLOPE)])
-    back = quaternion_of_rotation([0.0, -PRISM_SLOPE, 0.0])
+    back = make_quaternion([0.0, -PRISM_SLOPE, 0.0])
     place = rotate(back, run.positions[0] - THICK / 2 * normal)
     side = rotate(back, rotate(run.angles[0], [1.0, 0.0, 0.0]))
     return np.array([place[0], place[1], np.arctan2(side[1], side[0])])

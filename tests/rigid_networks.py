@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from scipy.spatial import Delaunay
 
 from rigid_lcp.arrays import Floats
-from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, friction_problem
+from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, make_problem
 from tests.rigid_collision_sets import contact_rows
 from validation.bench.rigid import packings
 from validation.bench.rigid.friction_problems import read_problem
@@ -58,7 +58,7 @@ def network_bodies(grains: int, seed: int) -> tuple[BodySpace, Floats]:
 def network(grains: int, mu: float, seed: int = 0) -> FrictionProblem:
     """The friction problem of `network_bodies`, with W as a matrix."""
     bodies, velocity = network_bodies(grains, seed)
-    return friction_problem(bodies.matrix, bodies.jacobian @ velocity, mu, 2)
+    return make_problem(bodies.matrix, bodies.jacobian @ velocity, mu, 2)
 
 
 def random_bodies(pairs, bodies, dim, generator, full=False) -> BodySpace:
@@ -85,13 +85,13 @@ def random_pairs(contacts, bodies, generator):
 
 def tower(boxes: int, mu: float, top: float = 1.0) -> FrictionProblem:
     """A tower under gravity for a step, at rest before, by W alone."""
-    made = packings.tower(boxes, 2, top_mass=top, friction=mu, step=STEP)
-    return friction_problem(made.delassus, made.offset, mu, 2)
+    made = packings.build_tower(boxes, 2, top_mass=top, friction=mu, step=STEP)
+    return make_problem(made.delassus, made.offset, mu, 2)
 
 
 def stack_on_slope(masses, slope=0.0, friction=0.5, dim=2, step=STEP) -> FrictionProblem:
     """Boxes of such masses [kg] upon each other that fall along a floor of such a slope [rad]."""
-    bodies = packings.tower(len(masses), dim, friction=friction).bodies
+    bodies = packings.build_tower(len(masses), dim, friction=friction).bodies
     assert bodies is not None
     size = bodies.body_size
     inverse = bodies.inverse_mass.diagonal() / np.repeat(masses, size)
@@ -99,7 +99,7 @@ def stack_on_slope(masses, slope=0.0, friction=0.5, dim=2, step=STEP) -> Frictio
     fall = np.zeros(space.jacobian.shape[1])
     fall[dim - 1 :: size] = -GRAVITY * step * np.cos(slope)
     fall[::size] = GRAVITY * step * np.sin(slope)
-    return friction_problem(space, space.jacobian @ fall, friction, dim)
+    return make_problem(space, space.jacobian @ fall, friction, dim)
 
 
 def stored(name: str, mu: float | None = None) -> FrictionProblem:

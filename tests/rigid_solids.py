@@ -7,21 +7,21 @@ from typing import Any
 
 import numpy as np
 
-from rigid_lcp import HalfSpace, Polyhedron, box
-from rigid_lcp.contact import detect_3d, shapes_3d
+from rigid_lcp import HalfSpace, Polyhedron, make_box
+from rigid_lcp.contact import detect_3d, pack_shapes_3d
 from rigid_lcp.contact.arrays import Contacts
-from rigid_lcp.motion.gyroscopic import world_inertia
-from rigid_lcp.shapes.rotations import Floats, rotation_matrix, unit_quaternion
+from rigid_lcp.motion.gyroscopic import turn_inertia
+from rigid_lcp.shapes.rotations import Floats, make_rotation, normalise_quaternion
 
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 FLOOR = HalfSpace([0.0, 0.0, 1.0], 0.0)
-CUBE = box(1.0, 1.0, 1.0)
+CUBE = make_box(1.0, 1.0, 1.0)
 Placed = tuple[Sequence[object], Floats, Floats]
 
 
 def angular_momentum(inertia: Floats, quaternion: Floats, spin: Floats) -> Floats:
     """``I(q) w`` in the world frame."""
-    return np.einsum("...ij,...j->...i", world_inertia(inertia, quaternion), spin)
+    return np.einsum("...ij,...j->...i", turn_inertia(inertia, quaternion), spin)
 
 
 def ballast_stone(generator: np.random.Generator, size: float, corners: int = 16) -> Polyhedron:
@@ -45,7 +45,9 @@ def contacts(
     """Contacts with a gap up to ``2 margin``."""
     movable = np.array([not isinstance(shape, HalfSpace) for shape in shapes])
     turns = np.array([UPRIGHT] * len(shapes)) if quaternion is None else np.array(quaternion)
-    return detect_3d(shapes_3d(shapes, movable), np.array(position, dtype=float), turns, margin)
+    return detect_3d(
+        pack_shapes_3d(shapes, movable), np.array(position, dtype=float), turns, margin
+    )
 
 
 def coal_distance(shapes: Sequence[Polyhedron], position: Floats, turns: Floats) -> Any:
@@ -53,7 +55,7 @@ def coal_distance(shapes: Sequence[Polyhedron], position: Floats, turns: Floats)
     import coal
 
     hulls, places = [], []
-    for shape, x, turn in zip(shapes, position, rotation_matrix(turns), strict=True):
+    for shape, x, turn in zip(shapes, position, make_rotation(turns), strict=True):
         points = coal.StdVec_Vec3s()
         for corner in shape.vertices:
             points.append(corner)
@@ -73,10 +75,10 @@ def near_pair(seed: int, gap: float = 1e-4) -> Placed:
     """Two stones at random angles, moved together until the least gap is about ``gap`` [m]."""
     generator = np.random.default_rng(seed)
     shapes = [ballast_stone(generator, 1.0), ballast_stone(generator, 0.7, 12)]
-    quaternion = unit_quaternion(generator.normal(size=(2, 4)))
+    quaternion = normalise_quaternion(generator.normal(size=(2, 4)))
     direction = generator.normal(size=3)
     direction /= np.linalg.norm(direction)
-    arrays = shapes_3d(shapes, np.array([True, True]))
+    arrays = pack_shapes_3d(shapes, np.array([True, True]))
 
     def least(distance: float, margin: float) -> float:
         position = np.array([np.zeros(3), distance * direction])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, friction_problem
+from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, make_problem
 
 GRAVITY = 9.81
 
@@ -24,7 +24,7 @@ def bodies_2d(contacts, centre, mass, inertia, load, friction) -> FrictionProble
                 jacobian[row, 3 * body : 3 * body + 3] += sign * np.array([d[0], d[1], spin])
     inverse = np.column_stack([1 / mass, 1 / mass, 1 / inertia]).ravel()
     space = BodySpace(sp.csr_array(jacobian), sp.csr_array(sp.diags_array(inverse)), 3)
-    return friction_problem(space, jacobian @ (inverse * np.ravel(load)), friction, 2)
+    return make_problem(space, jacobian @ (inverse * np.ravel(load)), friction, 2)
 
 
 def weights(mass, across=0.0):
@@ -80,7 +80,7 @@ def table(load_at=(0.1, 0.2)) -> FrictionProblem:
     inverse[3, 4] = inverse[4, 3] = 0.1
     space = BodySpace(sp.csr_array(np.array(rows)), sp.csr_array(inverse), 6)
     fall = np.array([0, 0, -GRAVITY, 0, 0, 0])
-    return friction_problem(space, np.array(rows) @ fall, 0.6, 3)
+    return make_problem(space, np.array(rows) @ fall, 0.6, 3)
 
 
 def difference(a, b) -> float:

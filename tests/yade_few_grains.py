@@ -29,11 +29,11 @@ import bed
 import record
 
 O = Omega()
-parameters = bed.parameters_read()
+parameters = bed.read_parameters()
 few = parameters["few"]
-bed.materials_add(parameters)
-bed.grains_add(parameters)
-bed.walls_add(parameters)
+bed.add_materials(parameters)
+bed.add_grains(parameters)
+bed.add_walls(parameters)
 count = parameters["grain_count"]
 """
 """How a script begins: grains and walls of the parameters are there."""
@@ -48,13 +48,13 @@ for state, velocity in zip(states, few["velocity"]):
         state.blockedDOFs = "xyzXYZ"
 if few["push"]:
     O.forces.setPermF(0, Vector3(*few["push"]))
-bed.engines_set(parameters)
+bed.set_engines(parameters)
 dumps = record.Dumps(parameters)
 force = open("force.txt", "w")
 
 
 def frame():
-    bed.forces_renew()
+    bed.renew_forces()
     dumps.frame()
     np.savetxt(force, [O.forces.f(number, True) for number in range(count)], fmt="%.17g")
 
@@ -67,7 +67,7 @@ for velocity, steps in few["legs"]:
         O.step()
         if O.iter % few["every"] == 0:
             frame()
-record.scene_save()
+record.save_scene()
 force.close()
 print(f"COMPLETE step {O.iter}", flush=True)
 """

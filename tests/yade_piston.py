@@ -14,7 +14,7 @@ from adapters.engines.yade import PARAMETERS, YadeEngine, cover_piston
 from adapters.scene.file import load_scene
 from adapters.scene.tables import Scene
 from tests.yade_few_grains import START
-from trackbed.scenes import scene_path
+from trackbed.scenes import find_scene_file
 
 SCRIPT = (
     START
@@ -25,8 +25,8 @@ for places in few:
     for number, place in enumerate(places):
         O.bodies[number].state.pos = Vector3(*place)
     changed = piston.grains_share()
-    bed.engines_set(parameters)
-    bed.forces_renew()
+    bed.set_engines(parameters)
+    bed.renew_forces()
     rows += [[*O.forces.f(number, True), changed] for number in range(count)]
 np.savetxt("force.txt", rows, fmt="%.17g")
 print("COMPLETE step 0", flush=True)
@@ -37,7 +37,7 @@ open("end.restart", "w").write("none")
 
 def scene_partial(*settings: str) -> Scene:
     """The shipped scene with a piston over a part of the bed, on YADE."""
-    return load_scene(scene_path("karrech-partial"), ['engine.name="yade"', *settings])
+    return load_scene(find_scene_file("karrech-partial"), ['engine.name="yade"', *settings])
 
 
 def piston_forces(

@@ -47,7 +47,7 @@ class TrackbedError(Exception):
             (f"{where}: " if where else "") + what + (f"\n  -> {remedy}" if remedy else "")
         )
 
-    def at(self, where: str) -> Self:
+    def relocate(self, where: str) -> Self:
         """The same error, of another place."""
         return type(self)(self.what, where=where, remedy=self.remedy)
 

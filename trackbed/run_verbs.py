@@ -82,7 +82,7 @@ def describe_run(path: Path, kind: Kind) -> dict[str, Any]:
     next_step = {
         "running": f"trackbed status {shlex.quote(str(path))}",
         "finished": str(path / "report.html"),
-        "stopped": _go_on(manifest),
+        "stopped": _format_resume(manifest),
     }
     return said | {"next": next_step[state]}
 
@@ -138,7 +138,7 @@ def _refuse_resume(arguments: argparse.Namespace, kind: Kind) -> int:
     )  # fmt: skip
 
 
-def _go_on(manifest: dict[str, Any]) -> str:
+def _format_resume(manifest: dict[str, Any]) -> str:
     """The command that goes on with a run that stopped, from where it was started."""
     origin = manifest.get("provenance", manifest)
     words = shlex.split(str(origin.get("command", "trackbed")))

@@ -147,7 +147,7 @@ def read_table(path: Path, wanted: Sequence[Collection[str]] = ()) -> Table:
         if path.is_char_device():
             raise OSError(EINVAL, "it is a device without an end")
         if path.suffix.lower() == SPREADSHEET:
-            return _shape_table(path, *_read_spreadsheet(path), wanted, comma=True)
+            return _make_table(path, *_read_spreadsheet(path), wanted, comma=True)
         text = _decode_text(path.read_bytes())
         skipped, separator = _find_header(text, wanted)
         lines, rows = _split_rows(text, separator, skipped)
@@ -159,7 +159,7 @@ def read_table(path: Path, wanted: Sequence[Collection[str]] = ()) -> Table:
             where=str(path),
             remedy="write text in UTF-8, one row a line; a dump must not be named .csv",
         ) from error
-    return _shape_table(path, lines, rows, wanted, comma=separator != ",")
+    return _make_table(path, lines, rows, wanted, comma=separator != ",")
 
 
 def read_columns(
@@ -264,12 +264,12 @@ def _find_header(text: str, wanted: Sequence[Collection[str]]) -> tuple[int, str
             break
         for separator in ";\t,":
             cells = line.split(separator)
-            if len(cells) >= len(wanted) and _names_all(cells, wanted):
+            if len(cells) >= len(wanted) and _has_all_names(cells, wanted):
                 return number, separator
     return 0, next((mark for mark in ";\t," if mark in first), " ")
 
 
-def _names_all(cells: Sequence[str], wanted: Sequence[Collection[str]]) -> bool:
+def _has_all_names(cells: Sequence[str], wanted: Sequence[Collection[str]]) -> bool:
     """Whether the cells of a line name all columns that are looked for."""
     names: set[str] = set()
     for cell in cells:
@@ -317,14 +317,14 @@ def _read_spreadsheet(path: Path) -> tuple[list[int], list[list[str]]]:
     return [number for number, _ in kept], [row for _, row in kept]
 
 
-def _shape_table(
+def _make_table(
     path: Path, lines: list[int], rows: list[list[str]], wanted: Sequence[Collection[str]],
     *, comma: bool,
 ) -> Table:  # fmt: skip
     """Rows as a table: header, units, and rows that are all as long."""
     remedy = "the first line names the columns, and every row below it has a cell for each"
     if path.suffix.lower() == SPREADSHEET and wanted:
-        first = next((i for i, row in enumerate(rows) if _names_all(row, wanted)), 0)
+        first = next((i for i, row in enumerate(rows) if _has_all_names(row, wanted)), 0)
         lines, rows = lines[first:], rows[first:]
     if not rows:
         raise UsageError("the file is empty", where=str(path), remedy=remedy)

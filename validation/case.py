@@ -16,7 +16,7 @@ from typing import Any
 from adapters.errors import UsageError
 from trackbed.scene_files.reader import suggest_word
 from validation import cases
-from validation.study import import_part, list_studies, read_record, record_path
+from validation.study import find_record, import_part, list_studies, read_record
 
 UNBARRED = ("reported", "measured", "finite")
 """In place of a bar: the value is only reported."""
@@ -72,7 +72,7 @@ class Check:
 BENCH = Path(__file__).with_name("bench")
 
 
-def live_cases() -> dict[str, str]:
+def list_live_cases() -> dict[str, str]:
     """Modules that measure now, by name: files of ``validation/cases``, and those of
     ``validation/bench`` that have a function ``run(quick)``."""
     found = {
@@ -84,37 +84,37 @@ def live_cases() -> dict[str, str]:
     return {name.replace("_", "-"): module for name, module in found.items()}
 
 
-def case_names() -> list[str]:
+def list_cases() -> list[str]:
     """Names of the studies, judged by their records, and of the cases that measure now."""
-    return sorted({*list_studies(), *live_cases()})
+    return sorted({*list_studies(), *list_live_cases()})
 
 
-def case_load(name: str) -> Callable[[bool], list[Check]]:
+def load_case(name: str) -> Callable[[bool], list[Check]]:
     """The function ``run(quick)`` of a case, or of a study its bars from the record; raises
     `UsageError` for a name that is none."""
-    live = live_cases()
+    live = list_live_cases()
     if name in live:
         run: Callable[[bool], list[Check]] = import_module(live[name]).run
         return run
     if name in list_studies():
         return partial(judge_study, name)
-    known = suggest_word(name, case_names())
+    known = suggest_word(name, list_cases())
     raise UsageError(f"there is no validation case {name}{known}")
 
 
 def judge_study(name: str, quick: bool) -> list[Check]:
     """Bars of a study from its record; there is nothing to make quicker."""
-    checks: list[Check] = import_part(name, "bars").check_bars(read_record(record_path(name)))
+    checks: list[Check] = import_part(name, "bars").check_bars(read_record(find_record(name)))
     return checks
 
 
-def case_report(name: str) -> Callable[[Path, Sequence[Check], dict[str, Any]], None] | None:
+def load_report(name: str) -> Callable[[Path, Sequence[Check], dict[str, Any]], None] | None:
     """The function ``report_write(path, checks, provenance)`` of a case, None where it has none."""
-    live = live_cases()
+    live = list_live_cases()
     return getattr(import_module(live[name]), "write_report", None) if name in live else None
 
 
-def record(name: str, checks: Sequence[Check], provenance: dict[str, Any]) -> dict[str, Any]:
+def build_record(name: str, checks: Sequence[Check], provenance: dict[str, Any]) -> dict[str, Any]:
     """What is written of a run of a case; a value that is no finite number becomes null."""
     rows = []
     for check in checks:
@@ -123,14 +123,14 @@ def record(name: str, checks: Sequence[Check], provenance: dict[str, Any]) -> di
     return {"case": name, "checks": rows, "provenance": provenance}
 
 
-def record_write(path: Path, content: dict[str, Any]) -> None:
+def write_record(path: Path, content: dict[str, Any]) -> None:
     """Write a record as JSON, atomically."""
     temporary = path.with_name(path.name + ".partial")
     temporary.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n")
     temporary.replace(path)
 
 
-def checks_told(checks: Sequence[Check]) -> str:
+def summarise_checks(checks: Sequence[Check]) -> str:
     """How many bars there are, how many are met, and how many known to be missed, in a sentence."""
     bars = [check for check in checks if check.barred]
     met, known = (sum(getattr(check, what) for check in bars) for what in ("holds", "known"))
@@ -139,7 +139,7 @@ def checks_told(checks: Sequence[Check]) -> str:
     return f"{said}; {failing} fail." if failing else f"{said}."
 
 
-def checks_table(checks: Sequence[Check]) -> str:
+def tabulate_checks(checks: Sequence[Check]) -> str:
     """The checks as text, a line each."""
     rows = [
         (

@@ -31,20 +31,20 @@ def validate_command(arguments: argparse.Namespace) -> int:
     from trackbed.run_files.provenance import record_provenance as provenance
     from validation.case import (
         Check,
-        case_load,
-        case_names,
-        case_report,
-        checks_table,
-        checks_told,
-        record,
-        record_write,
+        build_record,
+        list_cases,
+        load_case,
+        load_report,
+        summarise_checks,
+        tabulate_checks,
+        write_record,
     )
 
     name, path = arguments.case, arguments.json
     if name is None:
-        print("\n".join(case_names()))
+        print("\n".join(list_cases()))
         return 0
-    run = case_load(name)
+    run = load_case(name)
     if path is not None and not path.parent.is_dir():
         raise UsageError("the folder of --json does not exist", where=str(path))
     origin = provenance(["trackbed", "validate", name, *["--quick"] * arguments.quick])
@@ -54,16 +54,16 @@ def validate_command(arguments: argparse.Namespace) -> int:
     except Exception as error:  # a failure is a result too: it is recorded, then reported
         checks, failure = [Check("ran to its end", nan, f"no error; had: {error}", ok=False)], error
     if path is not None:
-        record_write(path, record(name, checks, origin))
+        write_record(path, build_record(name, checks, origin))
     if failure is not None:
         raise failure
-    print(checks_table(checks))
-    report, page = case_report(name), report_path(name, path)
+    print(tabulate_checks(checks))
+    report, page = load_report(name), find_report_path(name, path)
     if report is not None and page is not None:
         report(page, checks, origin)
         print(f"report: {page}")
     if any(check.known for check in checks):
-        print(checks_told(checks))
+        print(summarise_checks(checks))
     failed = [check.name for check in checks if not (check.holds or check.known)]
     if failed or not checks:
         raise NotCredible(
@@ -72,7 +72,7 @@ def validate_command(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def report_path(name: str, path: Path | None) -> Path | None:
+def find_report_path(name: str, path: Path | None) -> Path | None:
     """Where a case's report is written: beside its JSON at ``path``; without one in the folder
     TRACKBED_VALIDATION, and nowhere where that is not set."""
     if path is not None:

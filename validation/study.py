@@ -52,7 +52,7 @@ def import_part(name: str, part: str) -> Any:
     return import_module(f"validation.studies.{name.replace('-', '_')}.{part}")
 
 
-def record_path(name: str) -> Path:
+def find_record(name: str) -> Path:
     """Where the record of a study is."""
     return STUDIES / name.replace("-", "_") / "record.jsonl"
 
@@ -128,7 +128,7 @@ def summarise_bars(checks: Iterable[Check]) -> str:
     return "\n".join([head, "", *lines])
 
 
-def mean_interval(values: npt.ArrayLike, level: float = 0.95) -> tuple[float, float]:
+def estimate_mean(values: npt.ArrayLike, level: float = 0.95) -> tuple[float, float]:
     """Mean of values (k,) and half the width of Student's interval of it; nan for a single one."""
     found = np.asarray(values, dtype=float)
     count = len(found)
@@ -141,19 +141,19 @@ def mean_interval(values: npt.ArrayLike, level: float = 0.95) -> tuple[float, fl
 def describe_commits(commits: Iterable[str]) -> str:
     """The three commits that made most rows, with their numbers of rows, and how many others."""
 
-    def short(commit: str) -> str:
+    def shorten(commit: str) -> str:
         digits, _, modified = commit.partition("-")
         return f"`{digits[:10]}`" + (" with changed files" if modified else "")
 
-    counted = Counter(map(short, commits))
+    counted = Counter(map(shorten, commits))
     words = ", ".join(f"{name} ({count:,})" for name, count in counted.most_common(3))
     return words + (f" and {len(counted) - 3} more" if len(counted) > 3 else "")
 
 
 def write_page(name: str) -> None:
     """Write ``docs/NAME.md`` and its figure from the record of the study."""
-    rows, page = read_record(record_path(name)), import_part(name, "page")
-    template = record_path(name).with_name("page.md").read_text(encoding="utf-8")
+    rows, page = read_record(find_record(name)), import_part(name, "page")
+    template = find_record(name).with_name("page.md").read_text(encoding="utf-8")
     DOCS.joinpath(f"{name}.md").write_text(fill_page(template, page.describe(rows)), "utf-8")
     page.draw(rows, DOCS / f"{name}.png")
 
@@ -177,7 +177,7 @@ def main(words: Sequence[str] | None = None) -> None:
     only = arguments.only or list(parts)
     if unknown := [part for part in only if part not in parts]:
         parser.error(f"{arguments.name} has no part {unknown[0]}; its parts are {', '.join(parts)}")
-    measure_parts(arguments.name, parts, only, record_path(arguments.name))
+    measure_parts(arguments.name, parts, only, find_record(arguments.name))
 
 
 if __name__ == "__main__":

@@ -40,13 +40,13 @@ STILL = 1e-100
 velocities, which the law divides by the step, keep their digits."""
 
 
-def parameters_read():
+def read_parameters():
     """The JSON file named on the command line."""
     with open(sys.argv[1], encoding="utf-8") as stream:
         return json.load(stream)
 
 
-def materials_add(parameters):
+def add_materials(parameters):
     """Materials by name: grain, wall, and mirror where the scene has one."""
     return {
         name: O.materials.append(
@@ -56,14 +56,14 @@ def materials_add(parameters):
     }
 
 
-def grains_add(parameters):
+def add_grains(parameters):
     """Grains at rest at the places and with the radii of the parameters [m]."""
     grains = parameters["grains"]
     for position, radius in zip(grains["position"], grains["radius"]):
         O.bodies.append(sphere(position, radius, material="grain", mask=GRAIN_MASK))
 
 
-def walls_add(parameters):
+def add_walls(parameters):
     """Planes along the axes, and one triangle for each side of a cylinder."""
     for w in parameters["walls"]:
         if "vertices" in w:
@@ -183,7 +183,7 @@ class Piston:
         return self.mass * gravity - O.forces.f(self.clump, True)[2]
 
 
-def contact_law(parameters):
+def make_contact_law(parameters):
     """Hertz-Mindlin contacts; damping and friction are those of the pair of materials."""
 
     def of_pairs(key, value=float):
@@ -207,7 +207,7 @@ def contact_law(parameters):
     return InteractionLoop(shapes, [physics], [Law2_ScGeom_MindlinPhys_Mindlin()])
 
 
-def engines_set(parameters, forces=(), watch=(), behind=()):
+def set_engines(parameters, forces=(), watch=(), behind=()):
     """The engines of a step: neighbours, contacts, ``forces``, ``watch``, motion, ``behind``."""
     collider = InsertionSortCollider(
         [Bo1_Sphere_Aabb(), Bo1_Wall_Aabb(), Bo1_Facet_Aabb()],
@@ -218,7 +218,7 @@ def engines_set(parameters, forces=(), watch=(), behind=()):
     O.engines = [
         ForceResetter(),
         collider,
-        contact_law(parameters),
+        make_contact_law(parameters),
         *forces,
         *watch,
         motion,
@@ -227,7 +227,7 @@ def engines_set(parameters, forces=(), watch=(), behind=()):
     O.dt = parameters["time_step"]
 
 
-def forces_renew(forces=()):
+def renew_forces(forces=()):
     """Work out contacts and forces at the present positions, without a step in time.
 
     YADE keeps those of the positions a step before, and after a load none at all; it does not
@@ -241,7 +241,7 @@ def forces_renew(forces=()):
     O.dt = time_step
 
 
-def load_engine(load, piston):
+def make_load_engine(load, piston):
     """What the load adds to its mean force, in C++; cycles start at multiples of the period."""
     if load["waveform"] == "sine":
         return HarmonicForceEngine(
@@ -259,7 +259,7 @@ def load_engine(load, piston):
     )
 
 
-def drag_engine(piston, coefficient):
+def make_drag_engine(piston, coefficient):
     """Viscous drag on the piston: ``coefficient`` [N s/m] times its speed.
 
     YADE's Stokes drag 6 pi nu r v needs a sphere: the piston's ballast.

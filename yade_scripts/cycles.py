@@ -20,7 +20,7 @@ import bed
 import record
 
 O = Omega()
-parameters = bed.parameters_read()
+parameters = bed.read_parameters()
 gravity, window = parameters["gravity"], parameters["window"]
 record.load_scene()
 piston = bed.Piston(parameters)
@@ -33,7 +33,7 @@ def seat():
     half the bed.  A viscous drag holds it at ``speed`` or less.
     """
     press = window["seat"]
-    bed.engines_set(parameters, [bed.drag_engine(piston, press["force"] / press["speed"])])
+    bed.set_engines(parameters, [bed.make_drag_engine(piston, press["force"] / press["speed"])])
     piston.press(press["force"], gravity)
     O.run(press["steps"], True)
     piston.press(press["release_force"], gravity)
@@ -58,27 +58,27 @@ elif window["start"] == "moved":
 elif window["start"] == "perturbed":
     O.bodies[0].state.pos += Vector3(window["perturbation"], 0, 0)
 
-load = bed.load_engine(window["load"], piston)
+load = bed.make_load_engine(window["load"], piston)
 piston_record = record.PistonRecord(piston, gravity, window["track_steps"])
 
 
-def engines_set():
+def set_engines():
     """Those of a load cycle."""
-    bed.engines_set(parameters, [load], [piston_record.watch], [piston_record.watch_behind])
+    bed.set_engines(parameters, [load], [piston_record.watch], [piston_record.watch_behind])
 
 
-engines_set()
+set_engines()
 piston.press(window["load"]["mean_force"], gravity)
 dumps = record.Dumps(parameters, piston)
-bed.forces_renew([load])
+bed.renew_forces([load])
 dumps.frame()
 for _ in range(window["cycles"]):
     O.run(window["steps_per_cycle"], True)
     if piston.grains_share():
-        engines_set()
-    bed.forces_renew([load])
+        set_engines()
+    bed.renew_forces([load])
     dumps.frame()
-piston_record.last(record.grain_table(dumps.count))
+piston_record.last(record.tabulate_grains(dumps.count))
 loop_s = time.monotonic() - loop_s
-record.scene_save()
+record.save_scene()
 print(f"LOOP {loop_s:.6f} s\nCOMPLETE step {O.iter}", flush=True)

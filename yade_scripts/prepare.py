@@ -26,12 +26,12 @@ HISTORY = (
     "coordination_number floor_force_N\n"
 )
 
-parameters = bed.parameters_read()
+parameters = bed.read_parameters()
 settle = parameters["settle"]
 count = parameters["grain_count"]
-bed.materials_add(parameters)
-bed.grains_add(parameters)
-bed.walls_add(parameters)
+bed.add_materials(parameters)
+bed.add_grains(parameters)
+bed.add_walls(parameters)
 floor = count + [wall["name"] for wall in parameters["walls"]].index("floor")
 
 history = open("history.txt", "w", encoding="ascii")
@@ -39,34 +39,34 @@ history.write(HISTORY)
 rain = open("rain.dump", "w", encoding="ascii")
 
 
-def potential_energy(grains):
+def find_potential_energy(grains):
     """Weight times height of all grains [J]."""
     return parameters["gravity"] * grains[:, 10] @ grains[:, 2]
 
 
-def history_add():
+def add_history():
     """One line of ``history.txt`` and one frame of ``rain.dump``; called by an engine."""
-    grains = record.grain_table(count)
+    grains = record.tabulate_grains(count)
     pairs = sum(i.isReal and max(i.id1, i.id2) < count for i in O.interactions)
-    energies = (*record.kinetic_energies(grains), potential_energy(grains))
+    energies = (*record.sum_kinetic_energies(grains), find_potential_energy(grains))
     push = -O.forces.f(floor, True)[2]
     row = (O.iter, O.time, *energies, 2 * pairs / count, push)
     history.write(" ".join(f"{value:.9g}" for value in row) + "\n")
     history.flush()
     values = np.column_stack([np.arange(1, count + 1), grains[:, [0, 1, 2, 9]]])
-    record.frame_write(rain, "ATOMS", "id x y z radius", values, 1, parameters["box"], "%.9g")
+    record.write_frame(rain, "ATOMS", "id x y z radius", values, 1, parameters["box"], "%.9g")
 
 
-watch = PyRunner(command="history_add()", iterPeriod=settle["history_steps"])
-bed.engines_set(parameters, watch=[watch])
+watch = PyRunner(command="add_history()", iterPeriod=settle["history_steps"])
+bed.set_engines(parameters, watch=[watch])
 
 loop_s = time.monotonic()
 for _ in range(settle["check_limit"]):
     O.run(settle["check_steps"], True)
     # Translational energy only: a loose grain that spins about its contact normal has no
     # friction torque to stop it and keeps its rotational energy for ever.
-    grains = record.grain_table(count)
-    ratio = record.kinetic_energies(grains)[0] / potential_energy(grains)
+    grains = record.tabulate_grains(count)
+    ratio = record.sum_kinetic_energies(grains)[0] / find_potential_energy(grains)
     if ratio <= settle["equilibrium_ratio"] and O.iter >= settle["minimum_steps"]:
         break
     if not np.isfinite(ratio):
@@ -76,7 +76,7 @@ else:
     sys.exit(0)
 loop_s = time.monotonic() - loop_s
 
-bed.forces_renew()
+bed.renew_forces()
 record.Dumps(parameters).frame()
-record.scene_save()
+record.save_scene()
 print(f"LOOP {loop_s:.6f} s\nCOMPLETE step {O.iter}", flush=True)

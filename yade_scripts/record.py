@@ -18,7 +18,7 @@ SAVED = "end.yade.gz"
 STATE_COLUMNS = "id x y z vx vy vz omegax omegay omegaz radius mass"
 
 
-def components(vector):
+def split_vector(vector):
     """The three numbers of a vector of YADE.
 
     By index: to unpack one, or to make an array of it, ends in an exception of C++, which costs
@@ -27,21 +27,21 @@ def components(vector):
     return vector[0], vector[1], vector[2]
 
 
-def grain_table(count):
+def tabulate_grains(count):
     """x, v, omega, radius, mass of the grains [SI], shape (count, 11)."""
     rows = []
     for number in range(count):
         body = O.bodies[number]
         s = body.state
-        motion = components(s.pos) + components(s.vel) + components(s.angVel)
+        motion = split_vector(s.pos) + split_vector(s.vel) + split_vector(s.angVel)
         rows.append((*motion, body.shape.radius, s.mass))
     return np.array(rows)
 
 
-def contact_tables(grains):
+def tabulate_contacts(grains):
     """Contacts between grains, a row each, and the force of every other body on the grains.
 
-    ``grains`` as from `grain_table`.  A row holds both numbers, from 1 on, then on the first
+    ``grains`` as from `tabulate_grains`.  A row holds both numbers, from 1 on, then on the first
     grain the normal and the tangential force [N], the tangential spring [m], and the overlap [m];
     shape (m, 12).  The spring is the elastic part of the tangential force over the stiffness.
     The second result is a dictionary: number of a wall's body -> force [N], shape (count, 3).
@@ -52,9 +52,9 @@ def contact_tables(grains):
         if not contact.isReal:
             continue
         first, second, physics = contact.id1, contact.id2, contact.phys
-        force = components(physics.normalForce) + components(physics.shearForce)
+        force = split_vector(physics.normalForce) + split_vector(physics.shearForce)
         if first < count and second < count:
-            elastic = components(physics.shearElastic)
+            elastic = split_vector(physics.shearElastic)
             rows.append((first, second, *force, *elastic, physics.ks))
         else:
             of_walls.append((first, second, *force))
@@ -65,10 +65,10 @@ def contact_tables(grains):
     table[:, 8:11] /= table[:, 11:]
     table[:, 2:8] *= -1
     table[:, 11] = radius[first] + radius[second] - apart
-    return table, wall_forces(of_walls, count)
+    return table, sum_wall_forces(of_walls, count)
 
 
-def wall_forces(rows, count):
+def sum_wall_forces(rows, count):
     """Force of each wall on each grain [N] from rows of both numbers, normal and shear force."""
     forces = {}
     for first, second, *force in rows:
@@ -98,23 +98,23 @@ class Dumps:
         self.contacts = open("contacts.dump", "w", encoding="ascii")
 
     def frame(self):
-        """Append the present state; call `bed.forces_renew` before it."""
-        grains = grain_table(self.count)
-        rows, walls = contact_tables(grains)
+        """Append the present state; call `bed.renew_forces` before it."""
+        grains = tabulate_grains(self.count)
+        rows, walls = tabulate_contacts(grains)
         still = np.zeros((self.count, 3))
         forces = [sum((walls.get(b, still) for b in bodies), still) for bodies in self.bodies]
         identifier = np.arange(1, self.count + 1)
-        frame_write(
+        write_frame(
             self.states, "ATOMS", self.columns, np.column_stack([identifier, grains, *forces]),
             1, self.bounds,
         )  # fmt: skip
         if not self.friction:  # neither tangential force nor spring
             rows = rows[:, [0, 1, 2, 3, 4, 11]]
         names = " ".join(f"c_contact[{i + 1}]" for i in range(rows.shape[1]))
-        frame_write(self.contacts, "ENTRIES", names, rows, 2, self.bounds)
+        write_frame(self.contacts, "ENTRIES", names, rows, 2, self.bounds)
 
 
-def frame_write(stream, kind, columns, values, integers, bounds, number="%.17g"):
+def write_frame(stream, kind, columns, values, integers, bounds, number="%.17g"):
     """Append a frame to a text dump; the first ``integers`` columns are whole numbers."""
     counted = "ATOMS" if kind == "ATOMS" else "ENTRIES"
     stream.write(f"ITEM: TIMESTEP\n{O.iter}\nITEM: NUMBER OF {counted}\n{len(values)}\n")
@@ -126,7 +126,7 @@ def frame_write(stream, kind, columns, values, integers, bounds, number="%.17g")
     stream.flush()
 
 
-def kinetic_tracked():
+def track_kinetic():
     """Kinetic energies [J], translational and rotational, that YADE has tracked so far.
 
     It adds up those of all steps in which ``O.trackEnergy`` was True, for all bodies but walls.
@@ -157,21 +157,21 @@ class PistonRecord:
         self.row = (
             O.iter, piston.target_force(self.gravity), piston.contact_force(), piston.height,
         )  # fmt: skip
-        self.tracked = kinetic_tracked()
+        self.tracked = track_kinetic()
         O.trackEnergy = True  # in this step only: in every one it would cost
 
     def behind(self):
         """In the same step, behind the integrator."""
         O.trackEnergy = False
-        translational, rotational = np.subtract(kinetic_tracked(), self.tracked)
+        translational, rotational = np.subtract(track_kinetic(), self.tracked)
         translational -= 0.5 * self.piston.mass * self.piston.speed**2
         self._write(translational, rotational)
 
     def last(self, grains):
-        """The instant at which the run ends, between two steps; ``grains`` as `grain_table`."""
+        """The instant at which the run ends, between two steps; ``grains`` as `tabulate_grains`."""
         self.before()
         O.trackEnergy = False
-        self._write(*kinetic_energies(grains))
+        self._write(*sum_kinetic_energies(grains))
 
     def _write(self, translational, rotational):
         row = (*self.row, translational, rotational)
@@ -179,8 +179,8 @@ class PistonRecord:
         self.stream.flush()
 
 
-def kinetic_energies(grains):
-    """Translational and rotational kinetic energy [J] of the grains of `grain_table`."""
+def sum_kinetic_energies(grains):
+    """Translational and rotational kinetic energy [J] of the grains of `tabulate_grains`."""
     mass, radius = grains[:, 10], grains[:, 9]
     translational = 0.5 * mass @ (grains[:, 3:6] ** 2).sum(axis=1)
     return translational, 0.2 * (mass * radius**2) @ (grains[:, 6:9] ** 2).sum(axis=1)
@@ -192,7 +192,7 @@ SAVE_S = 600
 """Longest time to write one [s]."""
 
 
-def scene_save():
+def save_scene():
     """Write ``end.restart``; raises OSError or EOFError when it is not whole, as on a full disk.
 
     On a full disk YADE would try to write for ever: so the room is asked for before.  Should

@@ -6,31 +6,31 @@ from adapters.bed.contact_law import (
     DAMPING_FACTOR,
     OVERLAP_BOUND,
     HertzStiffness,
-    collision,
-    damping_of_rebound,
-    equivalent_modulus,
-    normal_force,
-    overlap_under_force,
-    rayleigh_time,
-    restitution_literal,
+    combine_moduli,
+    find_literal_restitution,
+    find_normal_force,
+    find_overlap_under_force,
+    find_rayleigh_time,
+    find_rebound_damping,
+    solve_collision,
 )
 from adapters.bed.container import GOLDEN_ANGLE, Container, Walls, count_sides
 from adapters.bed.overlaps import (
     Bed,
     Neighbours,
-    bed_measure,
     check_bed,
     find_behind_discs,
+    find_pairs,
+    list_wall_names,
     list_wall_rows,
+    measure_bed,
     measure_rows,
-    neighbours,
-    wall_names,
 )
 from adapters.bed.radii import (
     RadiusDistribution,
+    draw_radii,
     expect_grain_count,
     find_radius_that_fits,
-    sample_radii,
 )
 from adapters.bed.sample import (
     GRAVITY,
@@ -38,8 +38,8 @@ from adapters.bed.sample import (
     draw_sample_start,
     find_sample_mass,
     measure_bed_height,
+    measure_relative_density,
     measure_sample,
-    relative_density,
 )
 from adapters.bed.state import (
     BoolArray,
@@ -53,13 +53,13 @@ from adapters.bed.state import (
 )
 
 __all__ = [
-    "CHAIN_FACTOR", "DAMPING_FACTOR", "GOLDEN_ANGLE", "GRAVITY", "OVERLAP_BOUND",
-    "SURFACE_SHARE", "Bed", "BoolArray", "Contacts",
-    "Container", "FloatArray", "HertzStiffness", "IntArray", "Neighbours", "RadiusDistribution",
-    "State", "Walls", "bed_measure", "check_bed", "collision", "contact_law", "count_sides",
-    "damping_of_rebound", "draw_sample_start", "equivalent_modulus", "expect_grain_count",
-    "find_behind_discs", "find_radius_that_fits", "find_sample_mass", "list_wall_rows",
-    "load_state", "make_no_contacts", "measure_bed_height", "measure_rows", "measure_sample",
-    "neighbours", "normal_force", "overlap_under_force", "rayleigh_time", "relative_density",
-    "restitution_literal", "sample_radii", "save_state", "wall_names",
+    "CHAIN_FACTOR", "DAMPING_FACTOR", "GOLDEN_ANGLE", "GRAVITY", "OVERLAP_BOUND", "SURFACE_SHARE",
+    "Bed", "BoolArray", "Contacts", "Container", "FloatArray", "HertzStiffness", "IntArray",
+    "Neighbours", "RadiusDistribution", "State", "Walls", "check_bed", "combine_moduli",
+    "contact_law", "count_sides", "draw_radii", "draw_sample_start", "expect_grain_count",
+    "find_behind_discs", "find_literal_restitution", "find_normal_force",
+    "find_overlap_under_force", "find_pairs", "find_radius_that_fits", "find_rayleigh_time",
+    "find_rebound_damping", "find_sample_mass", "list_wall_names", "list_wall_rows", "load_state",
+    "make_no_contacts", "measure_bed", "measure_bed_height", "measure_relative_density",
+    "measure_rows", "measure_sample", "save_state", "solve_collision",
 ]  # fmt: skip

@@ -36,12 +36,12 @@ CONTACT_TIME_FACTOR = 2.943275
 """Contact time of an undamped Hertz collision times speed over greatest overlap, dimensionless."""
 
 
-def shear_modulus(young: float, poisson: float) -> float:
+def find_shear_modulus(young: float, poisson: float) -> float:
     """Shear modulus G = E/(2 (1 + nu)) [Pa] from Young's modulus [Pa] and Poisson's ratio."""
     return young / (2 * (1 + poisson))
 
 
-def equivalent_modulus(young_i: float, poisson_i: float, young_j: float, poisson_j: float) -> float:
+def combine_moduli(young_i: float, poisson_i: float, young_j: float, poisson_j: float) -> float:
     """E* [Pa] of two materials: 1/E* = (1 - nu_i^2)/E_i + (1 - nu_j^2)/E_j.
 
     E/(2 (1 - nu^2)) for two alike, as below eq. 5; ``young_j`` = inf is a rigid wall.
@@ -49,7 +49,7 @@ def equivalent_modulus(young_i: float, poisson_i: float, young_j: float, poisson
     return 1 / ((1 - poisson_i**2) / young_i + (1 - poisson_j**2) / young_j)
 
 
-def equivalent_shear_modulus(
+def combine_shear_moduli(
     young_i: float, poisson_i: float, young_j: float, poisson_j: float
 ) -> float:
     """G* [Pa] of two materials: 1/G* = (2 - nu_i)/G_i + (2 - nu_j)/G_j.
@@ -57,8 +57,8 @@ def equivalent_shear_modulus(
     G/(2 (2 - nu)) for two alike, as below eq. 6.
     """
     return 1 / (
-        (2 - poisson_i) / shear_modulus(young_i, poisson_i)
-        + (2 - poisson_j) / shear_modulus(young_j, poisson_j)
+        (2 - poisson_i) / find_shear_modulus(young_i, poisson_i)
+        + (2 - poisson_j) / find_shear_modulus(young_j, poisson_j)
     )
 
 
@@ -74,18 +74,18 @@ class HertzStiffness:
     """Between a grain and its own mirror image, that is, a rigid symmetry plane."""
 
 
-def hertz_stiffness(
+def make_hertz_stiffness(
     young: float, poisson: float, wall_young: float, wall_poisson: float
 ) -> HertzStiffness:
     """Moduli from Young's modulus [Pa] and Poisson's ratio of grains and walls."""
     return HertzStiffness(
-        equivalent_modulus(young, poisson, young, poisson),
-        equivalent_modulus(young, poisson, wall_young, wall_poisson),
-        equivalent_modulus(young, poisson, inf, poisson),
+        combine_moduli(young, poisson, young, poisson),
+        combine_moduli(young, poisson, wall_young, wall_poisson),
+        combine_moduli(young, poisson, inf, poisson),
     )
 
 
-def normal_force(
+def find_normal_force(
     overlap: float | FloatArray, modulus: float, radius: float | FloatArray
 ) -> FloatArray:
     """Elastic normal force 4/3 E* sqrt(R*) delta^(3/2) [N] (eq. 5); zero without overlap.
@@ -95,7 +95,7 @@ def normal_force(
     return 4 / 3 * modulus * np.sqrt(radius) * np.maximum(overlap, 0.0) ** 1.5
 
 
-def normal_stiffness(
+def find_normal_stiffness(
     overlap: float | FloatArray, modulus: float, radius: float | FloatArray
 ) -> FloatArray:
     """Tangent stiffness S_n = dF_n/d delta = 2 E* sqrt(R* delta) [N/m]; zero without overlap.
@@ -105,7 +105,7 @@ def normal_stiffness(
     return 2 * modulus * np.sqrt(radius * np.maximum(overlap, 0.0))
 
 
-def tangential_stiffness(
+def find_tangential_stiffness(
     overlap: float | FloatArray, shear: float, radius: float | FloatArray
 ) -> FloatArray:
     """Stiffness F_t/delta_t = 8 G* sqrt(R* delta) [N/m] (eq. 6); zero without overlap.
@@ -115,7 +115,7 @@ def tangential_stiffness(
     return 8 * shear * np.sqrt(radius * np.maximum(overlap, 0.0))
 
 
-def overlap_under_force(
+def find_overlap_under_force(
     force: float | FloatArray, modulus: float, radius: float | FloatArray
 ) -> FloatArray:
     """Overlap [m] that carries an elastic normal ``force`` [N]: the inverse of eq. 5.
@@ -125,52 +125,52 @@ def overlap_under_force(
     return (0.75 * np.asarray(force) / (modulus * np.sqrt(radius))) ** (2 / 3)
 
 
-def rayleigh_time(radius: float, density: float, young: float, poisson: float) -> float:
+def find_rayleigh_time(radius: float, density: float, young: float, poisson: float) -> float:
     """Time of a Rayleigh wave over a grain [s]: pi R sqrt(rho/G)/(0.1631 nu + 0.8766).
 
     ``radius`` [m] of the smallest grain, ``density`` [kg/m^3], ``young`` [Pa].  The formula of
     LIGGGHTS' ``check/timestep/gran``; time steps are chosen as a share of it.
     """
-    wave = sqrt(density / shear_modulus(young, poisson))
+    wave = sqrt(density / find_shear_modulus(young, poisson))
     return pi * radius * wave / (0.1631 * poisson + 0.8766)
 
 
-def restitution_of_alpha(alpha: float) -> float:
+def find_restitution(alpha: float) -> float:
     """Restitution e = exp(-pi alpha/sqrt(1 - alpha^2)) of a viscous coefficient, 0 <= alpha < 1."""
     return exp(-pi * alpha / sqrt(1 - alpha**2))
 
 
-def alpha_of_restitution(restitution: float) -> float:
+def find_alpha(restitution: float) -> float:
     """Viscous coefficient alpha = -ln e/sqrt(pi^2 + ln^2 e) of a restitution, 0 < e <= 1."""
     logarithm = log(restitution)
     return -logarithm / sqrt(pi**2 + logarithm**2)
 
 
-def restitution_literal(alpha: float) -> float:
+def find_literal_restitution(alpha: float) -> float:
     """Restitution that makes LIGGGHTS damp with c = 2 alpha sqrt(m* S_n), eq. 7 as printed.
 
     It is that of alpha/`DAMPING_FACTOR`, so ``alpha`` must be below 0.913.
     """
-    return restitution_of_alpha(alpha / DAMPING_FACTOR)
+    return find_restitution(alpha / DAMPING_FACTOR)
 
 
-def damping_of_rebound(restitution: float) -> float:
+def find_rebound_damping(restitution: float) -> float:
     """Damping ratio a of c = 2 a sqrt(m* S_n) with which a contact that cannot pull rebounds so.
 
     For an engine that ends a contact at the first tension; ``restitution`` 0 < e <= 1, the same at
     every speed, stiffness and size.  Without a pull some of the damping is missing, so a is above
-    `DAMPING_FACTOR` times `alpha_of_restitution`.
+    `DAMPING_FACTOR` times `find_alpha`.
     """
     from scipy.optimize import brentq
 
     if restitution == 1:
         return 0.0
-    least = DAMPING_FACTOR * alpha_of_restitution(restitution)
+    least = DAMPING_FACTOR * find_alpha(restitution)
 
-    def excess(ratio: float) -> float:
-        return collision(1.0, 1.0, 1.0, 1.0, ratio, may_pull=False).restitution - restitution
+    def find_excess(ratio: float) -> float:
+        return solve_collision(1.0, 1.0, 1.0, 1.0, ratio, may_pull=False).restitution - restitution
 
-    return float(brentq(excess, least, 10 * least, xtol=1e-12))
+    return float(brentq(find_excess, least, 10 * least, xtol=1e-12))
 
 
 @dataclass(frozen=True)
@@ -185,7 +185,7 @@ class Collision:
     """Time in contact [s]."""
 
 
-def hertz_collision(speed: float, modulus: float, radius: float, mass: float) -> Collision:
+def solve_hertz_collision(speed: float, modulus: float, radius: float, mass: float) -> Collision:
     """The undamped collision in closed form (Hertz; Johnson, Contact Mechanics, section 11.4).
 
     ``speed`` of approach [m/s], ``modulus`` E* [Pa], ``radius`` R* [m], ``mass`` m* [kg]:
@@ -195,7 +195,7 @@ def hertz_collision(speed: float, modulus: float, radius: float, mass: float) ->
     return Collision(1.0, overlap, CONTACT_TIME_FACTOR * overlap / speed)
 
 
-def collision(
+def solve_collision(
     speed: float, modulus: float, radius: float, mass: float, damping_ratio: float, *,
     may_pull: bool = True,
 ) -> Collision:  # fmt: skip
@@ -203,33 +203,41 @@ def collision(
 
     ``damping_ratio`` a is alpha for a literal eq. 7, `DAMPING_FACTOR` alpha for LIGGGHTS.
     ``may_pull``: the contact ends at delta = 0 (eq. 7; ``limitForce off``), else as soon as the
-    force would pull (``limitForce on``).  Units as in `hertz_collision`.  For verification:
+    force would pull (``limitForce on``).  Units as in `solve_hertz_collision`.  For verification:
     solve_ivp at a relative tolerance of 1e-10.
     """
     from scipy.integrate import solve_ivp
 
-    undamped = hertz_collision(speed, modulus, radius, mass)
+    undamped = solve_hertz_collision(speed, modulus, radius, mass)
     unit_time = undamped.overlap_max / speed
-    stiffness = normal_force(undamped.overlap_max, modulus, radius) * unit_time / (mass * speed)
+    stiffness = (
+        find_normal_force(undamped.overlap_max, modulus, radius) * unit_time / (mass * speed)
+    )
 
-    def repulsion(overlap: float, velocity: float) -> float:
+    def find_repulsion(overlap: float, velocity: float) -> float:
         open_overlap = max(overlap, 0.0)
         tangent = 1.5 * stiffness * sqrt(open_overlap)
         return float(stiffness * open_overlap**1.5 + 2 * damping_ratio * sqrt(tangent) * velocity)
 
-    def rate(_: float, state: FloatArray) -> list[float]:
-        return [state[1], -repulsion(state[0], state[1])]
+    def find_rate(_: float, state: FloatArray) -> list[float]:
+        return [state[1], -find_repulsion(state[0], state[1])]
 
-    def parts(_: float, state: FloatArray) -> float:
+    def detect_parting(_: float, state: FloatArray) -> float:
         overlap = float(state[0])
-        return overlap if may_pull else min(overlap, repulsion(overlap, float(state[1])))
+        return overlap if may_pull else min(overlap, find_repulsion(overlap, float(state[1])))
 
-    def turns(_: float, state: FloatArray) -> float:
+    def detect_turning(_: float, state: FloatArray) -> float:
         return float(state[1])
 
-    parts.terminal, parts.direction = True, -1  # type: ignore[attr-defined]
+    detect_parting.terminal, detect_parting.direction = True, -1  # type: ignore[attr-defined]
     solution = solve_ivp(
-        rate, (0.0, 1e3), [0.0, 1.0], method="DOP853", events=(parts, turns), rtol=1e-10, atol=1e-13
+        find_rate,
+        (0.0, 1e3),
+        [0.0, 1.0],
+        method="DOP853",
+        events=(detect_parting, detect_turning),
+        rtol=1e-10,
+        atol=1e-13,
     )
     overlap_max = float(solution.y_events[1][0][0])
     end_time, end_velocity = float(solution.t_events[0][0]), float(solution.y_events[0][0][1])

@@ -23,7 +23,9 @@ Geometry = tuple[FloatArray, FloatArray, FloatArray, float]
 
 
 @njit(cache=True)
-def cylinder_contact(x: FloatArray, radius: float, cylinder: float, normal: FloatArray) -> float:
+def find_cylinder_contact(
+    x: FloatArray, radius: float, cylinder: float, normal: FloatArray
+) -> float:
     """Overlap [m] of a grain at ``x`` with a ``cylinder`` of that radius [m]; fills ``normal``."""
     from_axis = np.hypot(x[0], x[1])
     normal[:] = 0.0
@@ -35,7 +37,7 @@ def cylinder_contact(x: FloatArray, radius: float, cylinder: float, normal: Floa
 
 
 @njit(cache=True)
-def wall_contact(
+def find_wall_contact(
     x: FloatArray, radius: float, wall: int, walls: Geometry, behind: BoolArray, normal: FloatArray
 ) -> float:
     """Overlap [m] of a grain at ``x`` with a wall; fills ``normal``, its direction at the grain.
@@ -45,7 +47,7 @@ def wall_contact(
     """
     points, normals, reaches, cylinder = walls
     if wall == len(reaches):
-        return cylinder_contact(x, radius, cylinder, normal)
+        return find_cylinder_contact(x, radius, cylinder, normal)
     point, plane_normal, reach = points[wall], normals[wall], reaches[wall]
     height = 0.0
     for a in range(3):
@@ -75,7 +77,9 @@ def fill_rows(
     for c in range(len(first)):
         i, j = first[c], second[c]
         if j < 0:
-            overlap[c] = wall_contact(position[i], radius[i], -1 - j, walls, behind[i], normal[c])
+            overlap[c] = find_wall_contact(
+                position[i], radius[i], -1 - j, walls, behind[i], normal[c]
+            )
             continue
         square = 0.0
         for a in range(3):
@@ -108,7 +112,7 @@ def find_wall_rows(
     m = 0
     for i in range(len(radius)):
         for wall in range(count):
-            if wall_contact(position[i], radius[i], wall, walls, behind[i], normal) > -gap:
+            if find_wall_contact(position[i], radius[i], wall, walls, behind[i], normal) > -gap:
                 first[m], second[m] = i, -1 - wall
                 m += 1
     return first[:m].copy(), second[:m].copy()

@@ -50,7 +50,7 @@ class Bed:
     """Mean height of the centres [m]."""
 
 
-def wall_names(walls: Walls) -> tuple[str, ...]:
+def list_wall_names(walls: Walls) -> tuple[str, ...]:
     """Names of the walls in the order of their numbers: the planes, then the cylinder."""
     return walls.plane_name + ((CYLINDER,) if np.isfinite(walls.cylinder_radius) else ())
 
@@ -114,7 +114,7 @@ def measure_rows(
     return Neighbours(first, second, normal, overlap)
 
 
-def neighbours(
+def find_pairs(
     position: FloatArray, radius: FloatArray, walls: Walls, gap: float = 0.0,
     behind: BoolArray | None = None,
 ) -> Neighbours:  # fmt: skip
@@ -150,8 +150,8 @@ def check_bed(position: FloatArray, radius: FloatArray) -> None:
         )
 
 
-def bed_measure(position: FloatArray, touching: Neighbours) -> Bed:
-    """Coordination number, penetration and height of a bed, from its `neighbours` in contact."""
+def measure_bed(position: FloatArray, touching: Neighbours) -> Bed:
+    """Coordination number, penetration and height of a bed, from its `find_pairs` in contact."""
     overlap = touching.overlap[touching.overlap > 0]
     pairs = int((touching.second[touching.overlap > 0] >= 0).sum())
     return Bed(

@@ -68,7 +68,7 @@ class RadiusDistribution:
         return 4 / 3 * pi * (self.mean**3 + 3 * self.mean * self.variance)
 
 
-def sample_radii(distribution: RadiusDistribution, count: int, seed: int) -> FloatArray:
+def draw_radii(distribution: RadiusDistribution, count: int, seed: int) -> FloatArray:
     """``count`` independent radii [m], shape (count,); the same for the same seed.
 
     They depend on nothing but the arguments: another container keeps the grains.

@@ -104,7 +104,7 @@ def measure_volume_below(position: FloatArray, radius: FloatArray, height: float
     return float(np.sum(pi * depth**2 * (3 * radius - depth) / 3))
 
 
-def relative_density(
+def measure_relative_density(
     position: FloatArray, radius: FloatArray, container: Container, height: float,
     bottom: float = 0.0,
 ) -> float:  # fmt: skip
@@ -141,7 +141,7 @@ class CoordinationNumber:
     """Part of the grains with fewer than two contacts."""
 
 
-def coordination_number(
+def measure_coordination(
     contacts: Contacts, identifier: IntArray, wall_force: dict[str, FloatArray]
 ) -> CoordinationNumber:
     """Coordination number of a bed; a contact with a wall is a force on the grain that is not zero.
@@ -183,8 +183,8 @@ def measure_sample(state: State, container: Container) -> SampleFigures:
     return SampleFigures(
         weight=float(state.mass.sum()) * GRAVITY,
         apparent_weight=0.0 if floor is None else float(floor[:, 2].sum()),
-        coordination=coordination_number(state.contacts, state.identifier, state.wall_force),
-        relative_density=relative_density(
+        coordination=measure_coordination(state.contacts, state.identifier, state.wall_force),
+        relative_density=measure_relative_density(
             state.position, state.radius, container, SURFACE_SHARE * height
         ),
         height=height,

@@ -76,7 +76,7 @@ class State:
     time_step: int = 0
     """The engine's own step count."""
 
-    def moved(self, position: FloatArray, **change: object) -> State:
+    def move_to(self, position: FloatArray, **change: object) -> State:
         """The same grains at other positions [m], shape (n, 3)."""
         return replace(self, position=np.asarray(position, float), **change)  # type: ignore[arg-type]
 

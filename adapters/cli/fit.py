@@ -75,8 +75,11 @@ def run_fit(arguments: argparse.Namespace) -> int:
         to_cycle = series.cycle.max(initial=0.0)
     ahead = to_cycle
     if arguments.load_change is not None:
-        series, ahead = series.after(arguments.load_change), to_cycle - arguments.load_change
-    series = series.since(arguments.from_cycle)
+        series, ahead = (
+            series.restart_after(arguments.load_change),
+            to_cycle - arguments.load_change,
+        )
+    series = series.keep_from(arguments.from_cycle)
     try:
         if auto:
             found = fit_auto(series, ahead, arguments.probability, arguments.fail_at)

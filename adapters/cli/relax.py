@@ -77,7 +77,7 @@ def run_relax(arguments: argparse.Namespace) -> int:
         )
     still = np.zeros_like(state.position)
     # Contacts and wall forces belong to the positions before and are left out.
-    relaxed = state.moved(
+    relaxed = state.move_to(
         relaxation.position, velocity=still, spin=still, contacts=make_no_contacts(), wall_force={}
     )
     write_state_file(relaxed, arguments.out)

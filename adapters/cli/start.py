@@ -26,9 +26,9 @@ def run_doctor(arguments: argparse.Namespace) -> int:
     """Print what is here and what is missing; `EngineMissing` when no engine is here."""
     from dataclasses import asdict
 
-    from adapters.engines import ENGINE_REMEDY, findings, has_usable_engine
+    from adapters.engines import ENGINE_REMEDY, has_usable_engine, list_findings
 
-    found = findings()
+    found = list_findings()
     if arguments.json:
         print_json({"ok": has_usable_engine(found), "findings": [asdict(one) for one in found]})
     else:

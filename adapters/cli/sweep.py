@@ -74,7 +74,7 @@ def run_sweep_command(arguments: argparse.Namespace) -> int:
     cluster = Cluster(arguments.scheduler, arguments.cluster_config, arguments.workers)
     progress = Progress()
     for warning in dict.fromkeys(text for one in sweep.members for text in one.scene.warnings):
-        progress.say(f"warning: {warning}")
+        progress.print_line(f"warning: {warning}")
     results = run_sweep(sweep, cluster, progress)
     bands, paths = write_results(sweep, results)
     bands = [band for band in bands if len(band.cycle)]

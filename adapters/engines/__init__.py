@@ -5,17 +5,17 @@ from adapters.engines.contract import (
     Engine,
     EngineRun,
     EngineStart,
+    allow_interrupts,
     find_engine,
     get_engine,
-    interruptible,
     list_real_engines,
 )
 from adapters.engines.decks import bound_section
-from adapters.engines.doctor import findings, has_usable_engine
+from adapters.engines.doctor import has_usable_engine, list_findings
 from adapters.engines.process import run_process
 
 __all__ = [
-    "ENGINE_REMEDY", "Engine", "EngineRun", "EngineStart", "bound_section",
-    "find_engine", "findings", "get_engine", "has_usable_engine", "interruptible",
-    "list_real_engines", "run_process",
+    "ENGINE_REMEDY", "Engine", "EngineRun", "EngineStart", "allow_interrupts", "bound_section",
+    "find_engine", "get_engine", "has_usable_engine", "list_findings", "list_real_engines",
+    "run_process",
 ]  # fmt: skip

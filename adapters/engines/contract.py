@@ -157,6 +157,6 @@ def find_engine() -> Engine:
     raise EngineMissing("no engine is installed, so nothing can be run", remedy=ENGINE_REMEDY)
 
 
-def interruptible() -> AbstractContextManager[None]:
+def allow_interrupts() -> AbstractContextManager[None]:
     """SIGTERM and Ctrl-C raise `Interrupted` inside, in the main thread; elsewhere a no-op."""
     return raise_on_signals("every finished window is saved", "go on with: trackbed resume RUN")

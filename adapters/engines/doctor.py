@@ -30,7 +30,7 @@ class Finding:
     """What to do; empty when nothing is wrong."""
 
 
-def _engine(name: str) -> Finding:
+def _check_engine(name: str) -> Finding:
     path = ""
     try:
         engine = get_engine(name)
@@ -42,19 +42,19 @@ def _engine(name: str) -> Finding:
         return Finding("engine", name, "", path, f"cannot be asked: {error}")
 
 
-def _library(name: str) -> Finding:
+def _check_library(name: str) -> Finding:
     try:
         return Finding("library", name, metadata.version(name))
     except metadata.PackageNotFoundError:
         return Finding("library", name, "", remedy=f"pip install {name}")
 
 
-def findings() -> list[Finding]:
+def list_findings() -> list[Finding]:
     """Everything looked for, engines first; a finding with a ``remedy`` asks for a hand."""
     return [
-        *(_engine(name) for name in list_real_engines()),
+        *(_check_engine(name) for name in list_real_engines()),
         Finding("python", "python", platform.python_version()),
-        *(_library(name) for name in LIBRARIES),
+        *(_check_library(name) for name in LIBRARIES),
     ]
 
 

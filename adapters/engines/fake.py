@@ -29,7 +29,7 @@ CYCLE_SAMPLES = 20
 """Samples of the piston's record in a cycle."""
 
 
-def logarithm(cycle: FloatArray) -> FloatArray:
+def find_logarithm(cycle: FloatArray) -> FloatArray:
     """u = a ln(1 + N) [m]."""
     return np.asarray(SETTLEMENT * np.log1p(cycle))
 
@@ -38,7 +38,7 @@ def logarithm(cycle: FloatArray) -> FloatArray:
 class FakeBed:
     """How the mean grain settles."""
 
-    law: Callable[[FloatArray], FloatArray] = logarithm
+    law: Callable[[FloatArray], FloatArray] = find_logarithm
     """u(N) [m]."""
     sinking: float = field(default=0.0, kw_only=True)
     """What the piston sinks further than the mean grain, each cycle [m]."""
@@ -117,22 +117,22 @@ class FakeEngine:
         if deck == "in.prepare":
             self._prepare(scene, values, folder)
         else:
-            self._cycles(scene, values, folder)
+            self._find_cycles(scene, values, folder)
         return EngineRun(("fake",), time.process_time() - started, 0.0, 0.0, digests)
 
     @staticmethod
     def _prepare(scene: Scene, values: dict[str, FloatArray], folder: Path) -> None:
         radius = values["radius"]
-        position = lattice(scene, len(radius), float(radius.max()))
+        position = place_lattice(scene, len(radius), float(radius.max()))
         write_fake_dumps(folder, radius, position[None], [0])
         header = "step time_s kinetic_translational_J kinetic_rotational_J potential_J "
         header += "coordination_number floor_force_N"
         np.savetxt(folder / "history.txt", np.array([[0, 0, 1e-9, 0, 1, 4, 1]]), header=header)
-        write_dump(folder / "rain.dump", [_frame(0, radius, position)])
+        write_dump(folder / "rain.dump", [_make_frame(0, radius, position)])
         write_fake_restart(folder, radius, position, 0)
 
     @staticmethod
-    def _cycles(scene: Scene, values: dict[str, FloatArray], folder: Path) -> None:
+    def _find_cycles(scene: Scene, values: dict[str, FloatArray], folder: Path) -> None:
         cycles, first = int(values["cycles"]), int(values["first_cycle"])
         radius, start = values["radius"], values["position"]
         steps = int(values["first_step"]) + scene.steps_per_cycle * np.arange(cycles + 1)
@@ -154,7 +154,7 @@ class FakeEngine:
         np.savetxt(folder / "piston.txt", track, fmt="%.17g", header="step ...")
 
 
-def lattice(scene: Scene, count: int, radius: float) -> FloatArray:
+def place_lattice(scene: Scene, count: int, radius: float) -> FloatArray:
     """Centres of a cubic lattice that fills the section from below [m], shape (count, 3)."""
     width = 2 * radius * SPACING
     size = scene.container.size_x if scene.container.shape == "box" else scene.container.radius
@@ -168,7 +168,7 @@ def lattice(scene: Scene, count: int, radius: float) -> FloatArray:
     return np.column_stack([x[place], y[place], radius + layer * width])
 
 
-def _frame(step: int, radius: FloatArray, position: FloatArray) -> Frame:
+def _make_frame(step: int, radius: FloatArray, position: FloatArray) -> Frame:
     names = (*STATE_COLUMNS.split(), *(f"f_force_floor[{axis}]" for axis in (1, 2, 3)))
     n = len(radius)
     still, mass = np.zeros((n, 6)), 4 / 3 * np.pi * 2710 * radius**3
@@ -180,7 +180,7 @@ def write_fake_dumps(
     folder: Path, radius: FloatArray, position: FloatArray, steps: list[int]
 ) -> None:
     """``states.dump``, and a ``contacts.dump`` without contacts."""
-    frames = [_frame(step, radius, x) for step, x in zip(steps, position, strict=True)]
+    frames = [_make_frame(step, radius, x) for step, x in zip(steps, position, strict=True)]
     write_dump(folder / "states.dump", frames)
     names = tuple(f"c_contact[{i}]" for i in range(1, 13))
     empty = [Frame(step, names, np.empty((0, 12)), kind="entries") for step in steps]

@@ -93,7 +93,7 @@ class LammpsEngine(DeckEngine):
         """``scene.in``, ``dump_states.in`` and, in load cycles, ``piston_wall.in``."""
         walls = {"piston_wall.in": lammps_decks.format_piston_wall(scene)} if piston else {}
         states = lammps_decks.format_dump_states(self.wall_names(scene, piston))
-        return {"scene.in": lammps_decks.scene_text(scene), "dump_states.in": states} | walls
+        return {"scene.in": lammps_decks.format_scene(scene), "dump_states.in": states} | walls
 
     def write_start(self, scene: Scene, start: EngineStart, folder: Path) -> Parameters:
         """Places of moved grains."""

@@ -41,19 +41,17 @@ def format_contact(modulus: float, shear: float, restitution: float, friction: f
 def format_wall_contact(scene: Scene) -> str:
     """`format_contact` between a grain and a wall."""
     grain, wall = scene.material.grain, scene.material.wall
-    shear = contact_law.equivalent_shear_modulus(
-        grain.young, grain.poisson, wall.young, wall.poisson
-    )
+    shear = contact_law.combine_shear_moduli(grain.young, grain.poisson, wall.young, wall.poisson)
     return format_contact(scene.stiffness.wall, shear, scene.restitution, wall.friction)
 
 
 def find_shear_modulus(scene: Scene) -> float:
     """G* between two grains [Pa]."""
     one = scene.material.grain.young, scene.material.grain.poisson
-    return contact_law.equivalent_shear_modulus(*one, *one)
+    return contact_law.combine_shear_moduli(*one, *one)
 
 
-def scene_text(scene: Scene) -> str:
+def format_scene(scene: Scene) -> str:
     """``scene.in``: contact law between grains, and every wall that stands still.
 
     The cylinder is curved for LAMMPS, which takes
@@ -173,8 +171,8 @@ def find_elastic_displacement(
     shear = find_shear_modulus(scene)
     radius, mass = grains.column("radius")[held], grains.column("mass")[held]
     reduced = radius.prod(axis=1) / radius.sum(axis=1)
-    stiffness = contact_law.tangential_stiffness(overlap, shear, reduced)
-    alpha = contact_law.alpha_of_restitution(scene.restitution)
+    stiffness = contact_law.find_tangential_stiffness(overlap, shear, reduced)
+    alpha = contact_law.find_alpha(scene.restitution)
     reduced_mass = mass.prod(axis=1) / mass.sum(axis=1)
     damping = 2 * contact_law.DAMPING_FACTOR * alpha * np.sqrt(reduced_mass * stiffness)
     position, velocity = grains.block("x", "y", "z")[held], grains.block("vx", "vy", "vz")[held]

@@ -9,7 +9,7 @@ from pathlib import Path
 from adapters.engines import liggghts_decks
 from adapters.engines.contract import EngineStart
 from adapters.engines.decks import PISTON_MARGIN, DeckEngine, Parameters
-from adapters.engines.plan import frictional
+from adapters.engines.plan import has_friction
 from adapters.scene import Scene
 
 BANNER = re.compile(r"(LIGGGHTS-PUBLIC (\d+)\.(\d+)[^,)]*)")
@@ -45,7 +45,7 @@ class LiggghtsEngine(DeckEngine):
     def format_scene(self, scene: Scene, piston: bool) -> dict[str, str]:
         """``scene.in`` and ``dump_states.in``."""
         states = liggghts_decks.format_dump_states(self.wall_names(scene, piston))
-        return {"scene.in": liggghts_decks.scene_text(scene), "dump_states.in": states}
+        return {"scene.in": liggghts_decks.format_scene(scene), "dump_states.in": states}
 
     def write_start(self, scene: Scene, start: EngineStart, folder: Path) -> Parameters:
         """The piston's mesh, and the moved grains."""
@@ -63,7 +63,7 @@ class LiggghtsEngine(DeckEngine):
 
     def name_parts(self, scene: Scene) -> Parameters:
         """Contact law and output, with or without friction."""
-        kind = "frictional" if frictional(scene) else "frictionless"
+        kind = "frictional" if has_friction(scene) else "frictionless"
         return {"contact_part": f"contact_{kind}.in", "output_part": f"output_{kind}.in"}
 
 

@@ -29,7 +29,7 @@ PISTON_EDGE = 0.02
 triangle with an angle below 0.0045 rad, half the edge in a fan about a corner."""
 
 
-def scene_text(scene: Scene) -> str:
+def format_scene(scene: Scene) -> str:
     """``scene.in``: material table and walls that the scene names.
 
     Without friction between grains and at walls there is no tangential law at all.
@@ -43,21 +43,21 @@ def scene_text(scene: Scene) -> str:
     friction[0, 0] = grain.friction
     friction[0, 1] = friction[1, 0] = wall.friction
 
-    def row(values: object) -> str:
+    def format_row(values: object) -> str:
         return " ".join(f"{v:.17g}" for v in np.ravel(values))  # type: ignore[call-overload]
 
     lines = [
         "# scene.in : generated; materials by atom type (1 grains, 2 walls"
         + (", 3 rigid mirror planes)" if mirrors else ")"),
-        f"fix young all property/global youngsModulus peratomtype {row(young)}",
-        f"fix poisson all property/global poissonsRatio peratomtype {row(poisson)}",
+        f"fix young all property/global youngsModulus peratomtype {format_row(young)}",
+        f"fix poisson all property/global poissonsRatio peratomtype {format_row(poisson)}",
         "fix restitution all property/global coefficientRestitution peratomtypepair "
-        f"{types} {row(np.full(types * types, scene.restitution))}",
+        f"{types} {format_row(np.full(types * types, scene.restitution))}",
     ]
     if friction.any():
         lines.append(
             f"fix friction all property/global coefficientFriction peratomtypepair "
-            f"{types} {row(friction)}"
+            f"{types} {format_row(friction)}"
         )
     lines += ["pair_style gran model ${contact_model}", "pair_coeff * *"]
     walls = scene.container.walls()
@@ -107,14 +107,14 @@ def write_piston_stl(path: Path, container: Container, reach: float, margin: flo
         angle = np.linspace(0.0, 2 * np.pi, 97)[:-1]
         circle = reach * np.column_stack([np.cos(angle), np.sin(angle)])
         floor = [-margin if axis in container.symmetry else -np.inf for axis in "xy"]
-        cut = corners_apart(clip_convex(circle, floor), floor, PISTON_EDGE * reach)
+        cut = drop_near_corners(clip_convex(circle, floor), floor, PISTON_EDGE * reach)
         corners = [tuple(point) for point in cut]
     fan = [[0, i + 1, i] for i in range(1, len(corners) - 1)]
     points = np.column_stack([np.array(corners), np.zeros(len(corners))])
     meshio.Mesh(points, [("triangle", np.array(fan))]).write(path, file_format="stl", binary=False)
 
 
-def corners_apart(polygon: FloatArray, floor: list[float], least: float) -> FloatArray:
+def drop_near_corners(polygon: FloatArray, floor: list[float], least: float) -> FloatArray:
     """Corners of a clipped polygon, shape (n, 2) [m], without those near to where it was cut.
 
     A corner of the polygon itself that is nearer than ``least`` [m] to one on ``floor`` goes.

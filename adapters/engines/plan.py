@@ -91,6 +91,6 @@ def plan_seating(scene: Scene) -> SeatPlan:
     )
 
 
-def frictional(scene: Scene) -> bool:
+def has_friction(scene: Scene) -> bool:
     """Whether the scene names any friction: without it no contact has a tangential force."""
     return scene.material.grain.friction > 0 or scene.material.wall.friction > 0

@@ -18,7 +18,7 @@ from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from adapters.bed import wall_names
+from adapters.bed import list_wall_names
 from adapters.engines.contract import EngineRun, EngineStart
 from adapters.engines.plan import SETTLE_TIMES
 from adapters.errors import EngineFailed, EngineMissing, NotConverged
@@ -226,7 +226,7 @@ class ProcessEngine(ABC):
 
     def wall_names(self, scene: Scene, piston: bool) -> tuple[str, ...]:
         """Names of the walls whose forces ``states.dump`` holds, in the order of its columns."""
-        names = wall_names(scene.container.walls())
+        names = list_wall_names(scene.container.walls())
         return (*names, self.piston_wall) if piston else names
 
     def program(self) -> list[str] | None:

@@ -17,12 +17,12 @@ from adapters.bed import (
     Container,
     FloatArray,
     RadiusDistribution,
-    damping_of_rebound,
+    find_rebound_damping,
 )
 from adapters.engines.contract import EngineStart
 from adapters.engines.decks import PISTON_MARGIN, bound_box, bound_section, clip_convex, copy_deck
 from adapters.engines.liggghts_decks import MIRROR_YOUNG
-from adapters.engines.plan import EQUILIBRIUM_RATIO, frictional, plan_seating, plan_settling
+from adapters.engines.plan import EQUILIBRIUM_RATIO, has_friction, plan_seating, plan_settling
 from adapters.engines.process import ProcessEngine
 from adapters.scene import Scene
 
@@ -84,7 +84,7 @@ class YadeEngine(ProcessEngine):
             "cycles": cycles,
             "steps_per_cycle": steps,
             "track_steps": steps // scene.samples_per_cycle,
-            "load": _load(scene),
+            "load": _describe_load(scene),
         }
         if start.first:
             content["window"]["seat"] = asdict(plan_seating(scene))
@@ -101,7 +101,7 @@ class YadeEngine(ProcessEngine):
         return copy_deck(folder, (script, "bed.py", "record.py"), "yade_scripts")
 
 
-def _load(scene: Scene) -> dict[str, Any]:
+def _describe_load(scene: Scene) -> dict[str, Any]:
     """The load as forces [N] on the piston: a mean and a sine, or a period of samples."""
     assert scene.loading is not None
     samples = scene.loading.samples
@@ -129,7 +129,7 @@ NO_WEIGHT = 1.0
 """Density of walls [kg/m^3]: nothing depends on it, and YADE wants one."""
 
 
-def damping_ratio(scene: Scene) -> float:
+def find_damping_ratio(scene: Scene) -> float:
     """YADE's ``betan`` = ``betas``, the a of c = 2 a sqrt(m* S) with S the tangent stiffness.
 
     YADE never lets a contact pull, so one damping cannot serve both of a scene's keys:
@@ -142,7 +142,7 @@ def damping_ratio(scene: Scene) -> float:
     grain = scene.material.grain
     if grain.viscous_alpha is not None:
         return DAMPING_FACTOR * grain.viscous_alpha
-    return damping_of_rebound(scene.restitution)
+    return find_rebound_damping(scene.restitution)
 
 
 def gather_shared_parameters(scene: Scene, height: float) -> dict[str, Any]:
@@ -162,21 +162,21 @@ def gather_shared_parameters(scene: Scene, height: float) -> dict[str, Any]:
         "time_step": scene.time_step,
         "gravity": GRAVITY,
         "verlet_distance": VERLET_SHARE * scene.sample.grain_radius.mean,
-        "frictional": frictional(scene),
+        "frictional": has_friction(scene),
         "materials": {m: dict(zip(names, values, strict=True)) for m, values in materials.items()},
-        "pairs": _pairs(scene),
+        "pairs": _list_pairs(scene),
         "box": np.column_stack(bound_box(container, radius, height)).tolist(),
         "walls": list_walls(container, height),
     }
 
 
-def _pairs(scene: Scene) -> list[dict[str, float | str]]:
+def _list_pairs(scene: Scene) -> list[dict[str, float | str]]:
     """Damping and friction of each pair of materials that can meet.
 
     A pair without friction has no tangential damping either: YADE takes a spring of length zero
     for one that sticks, and would brake what should slide freely.
     """
-    damping = damping_ratio(scene)
+    damping = find_damping_ratio(scene)
     friction = {"grain": scene.material.grain.friction, "wall": scene.material.wall.friction}
     if scene.container.symmetry:
         friction["mirror"] = 0.0

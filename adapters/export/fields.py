@@ -38,7 +38,7 @@ def gather_contact_fields(run: ExportedRun, instant: Instant) -> dict[str, Array
     ``normal_force`` [N], positive where it pushes the grains apart; ``tangential_force`` on the
     grain named first [N], where there is friction.
     """
-    contacts, pair = instant.state.contacts, contact_rows(instant)
+    contacts, pair = instant.state.contacts, list_contacts(instant)
     apart = instant.state.position[pair[:, 0]] - instant.state.position[pair[:, 1]]
     push = np.einsum("ma,ma->m", contacts.normal_force, apart)
     fields: dict[str, Array] = {"normal_force": push / np.linalg.norm(apart, axis=1)}
@@ -47,7 +47,7 @@ def gather_contact_fields(run: ExportedRun, instant: Instant) -> dict[str, Array
     return fields
 
 
-def contact_rows(instant: Instant) -> IntArray:
+def list_contacts(instant: Instant) -> IntArray:
     """Rows of the two grains of every contact among the grains, shape (m, 2)."""
     return np.searchsorted(instant.state.identifier, instant.state.contacts.pair)
 

@@ -12,7 +12,7 @@ from adapters.errors import UsageError
 from adapters.export.instants import ExportedRun
 from adapters.export.meshes import export_vtu
 from adapters.export.tables import export_csv, export_ovito
-from adapters.files import name_full_disk
+from adapters.files import explain_full_disk
 
 FORMATS = {"vtu": export_vtu, "ovito": export_ovito, "csv": export_csv}
 """Name of a format -> function of the run, a folder and the cycles between two instants."""
@@ -27,6 +27,6 @@ def export_run(run: ExportedRun, to: str, into: Path, every: int = 1) -> list[Pa
     """
     if every < 1:
         raise UsageError(f"every {every} cycles is no step", remedy="give a whole number from 1 on")
-    with name_full_disk(into):
+    with explain_full_disk(into):
         into.mkdir(parents=True, exist_ok=True)
         return FORMATS[to](run, into, every)

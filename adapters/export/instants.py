@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from adapters.bed import FloatArray, IntArray, State, neighbours
+from adapters.bed import FloatArray, IntArray, State, find_pairs
 from adapters.errors import UsageError
 from adapters.procedure import CONTROL, Track, read_run_record
 from adapters.scene import Scene
@@ -66,7 +66,7 @@ class ExportedRun:
         start = self.track.start().position
         walls = self.scene.container.walls()  # only pairs of grains are counted
         for state in self._states(every):
-            touching = neighbours(state.position, state.radius, walls)
+            touching = find_pairs(state.position, state.radius, walls)
             grains = touching.second >= 0
             both = np.concatenate([touching.first[grains], touching.second[grains]])
             coordination = np.bincount(both, minlength=len(state.radius))

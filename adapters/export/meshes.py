@@ -9,7 +9,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from adapters.bed import FloatArray, IntArray
-from adapters.export.fields import Array, contact_rows, gather_contact_fields, gather_grain_fields
+from adapters.export.fields import Array, gather_contact_fields, gather_grain_fields, list_contacts
 from adapters.export.instants import ExportedRun
 from trackbed.run_files import replace_file, write_whole
 
@@ -31,7 +31,7 @@ def export_vtu(run: ExportedRun, into: Path, every: int) -> list[Path]:
         of_grains = gather_grain_fields(run, instant)
         write_mesh(grains[-1][1], centres, "vertex", points, point_data=of_grains)
         of_contacts = gather_contact_fields(run, instant)
-        lines = contact_rows(instant)
+        lines = list_contacts(instant)
         write_mesh(contacts[-1][1], centres, "line", lines, cell_data=of_contacts)
     write_pvd(into / "grains.pvd", grains)
     write_pvd(into / "contacts.pvd", contacts)

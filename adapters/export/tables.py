@@ -30,24 +30,24 @@ def export_ovito(run: ExportedRun, into: Path, every: int) -> list[Path]:
     contacts for bonds when it is set that the first two columns are "Particle Identifiers"; the
     forces are magnitudes there, as a bond's colour and width ask for.
     """
-    box = _box(run)
+    box = _find_box(run)
 
-    def grains() -> Iterator[Frame]:
+    def make_grain_frames() -> Iterator[Frame]:
         for instant in run.instants(every):
             fields = gather_placed_grain_fields(run, instant)
             named = {ENGINE_NAME.get(name, name): values for name, values in fields.items()}
-            yield _frame(instant, dict(split_columns(named, "")), box, "atoms")
+            yield _make_frame(instant, dict(split_columns(named, "")), box, "atoms")
 
-    def contacts() -> Iterator[Frame]:
+    def make_contact_frames() -> Iterator[Frame]:
         for instant in run.instants(every):
-            yield _frame(instant, _contact_columns(run, instant), box, "entries")
+            yield _make_frame(instant, _gather_contact_columns(run, instant), box, "entries")
 
-    write_dump(into / "grains.dump", grains())
-    write_dump(into / "contacts.dump", contacts())
+    write_dump(into / "grains.dump", make_grain_frames())
+    write_dump(into / "contacts.dump", make_contact_frames())
     return [into / "grains.dump", into / "contacts.dump"]
 
 
-def _contact_columns(run: ExportedRun, instant: Instant) -> dict[str, Array]:
+def _gather_contact_columns(run: ExportedRun, instant: Instant) -> dict[str, Array]:
     fields = gather_contact_fields(run, instant)
     if run.frictional:
         fields["tangential_force"] = np.linalg.norm(fields["tangential_force"], axis=1)
@@ -55,12 +55,14 @@ def _contact_columns(run: ExportedRun, instant: Instant) -> dict[str, Array]:
     return {"id1": first, "id2": second, **fields}
 
 
-def _frame(instant: Instant, columns: Mapping[str, Array], box: FloatArray, kind: Kind) -> Frame:
+def _make_frame(
+    instant: Instant, columns: Mapping[str, Array], box: FloatArray, kind: Kind
+) -> Frame:
     values = np.column_stack([*columns.values()]).astype(float)
     return Frame(instant.cycle, tuple(columns), values, box, kind)
 
 
-def _box(run: ExportedRun) -> FloatArray:
+def _find_box(run: ExportedRun) -> FloatArray:
     """Low and high of the container, up to the settled bed's top [m], shape (3, 2)."""
     start = run.track.start()
     low, high = bound_section(run.scene.container)
@@ -75,18 +77,18 @@ def export_csv(run: ExportedRun, into: Path, every: int) -> list[Path]:
     run folder has a row a cycle already.  The piston's table holds all its samples.
     """
 
-    def grains() -> Iterator[dict[str, Array]]:
+    def list_grain_columns() -> Iterator[dict[str, Array]]:
         for instant in run.instants(every):
             fields = split_columns(gather_placed_grain_fields(run, instant), "_")
-            yield _at(instant, dict(fields))
+            yield _add_cycle(instant, dict(fields))
 
-    def contacts() -> Iterator[dict[str, Array]]:
+    def list_contact_columns() -> Iterator[dict[str, Array]]:
         for instant in run.instants(every):
             first, second = instant.state.contacts.pair.T
             fields = split_columns(gather_contact_fields(run, instant), "_")
-            yield _at(instant, {"id1": first, "id2": second, **dict(fields)})
+            yield _add_cycle(instant, {"id1": first, "id2": second, **dict(fields)})
 
-    tables = {"grains": grains(), "contacts": contacts()}
+    tables = {"grains": list_grain_columns(), "contacts": list_contact_columns()}
     if run.loaded:
         tables["piston"] = run.piston_samples()
     for name, parts in tables.items():
@@ -94,7 +96,7 @@ def export_csv(run: ExportedRun, into: Path, every: int) -> list[Path]:
     return [into / f"{name}.csv" for name in tables]
 
 
-def _at(instant: Instant, columns: Mapping[str, Array]) -> dict[str, Array]:
+def _add_cycle(instant: Instant, columns: Mapping[str, Array]) -> dict[str, Array]:
     """Columns with the number of the cycle before them."""
     length = len(next(iter(columns.values())))
     return {"cycle": np.full(length, instant.cycle), **columns}

@@ -38,7 +38,7 @@ _POWER = tabulate_powers_of_five()
 
 
 @njit(cache=True)
-def _product(a, b):  # type: ignore[no-untyped-def]
+def _multiply(a, b):  # type: ignore[no-untyped-def]
     """All 128 bits of the product of two uint64, as (high, low)."""
     low_half, half = np.uint64(0xFFFFFFFF), np.uint64(32)
     a_low, a_high, b_low, b_high = a & low_half, a >> half, b & low_half, b >> half
@@ -65,9 +65,9 @@ def round_to_bits(w, q):  # type: ignore[no-untyped-def]
         if w >> np.uint64(64 - shift) == zero:
             w = w << np.uint64(shift)
             leading_zeros += shift
-    high, low = _product(w, _POWER[q - _EXPONENT_LOWEST, 0])
+    high, low = _multiply(w, _POWER[q - _EXPONENT_LOWEST, 0])
     if high & np.uint64(0x1FF) == np.uint64(0x1FF):
-        carry, _ = _product(w, _POWER[q - _EXPONENT_LOWEST, 1])
+        carry, _ = _multiply(w, _POWER[q - _EXPONENT_LOWEST, 1])
         low = low + carry
         if low < carry:
             high = high + one

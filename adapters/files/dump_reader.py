@@ -88,12 +88,12 @@ class Reader:
         self.complete = 0
 
     # --- text and faults --------------------------------------------------------------------
-    def more(self) -> bool:
+    def read_more(self) -> bool:
         """Read on behind what is not yet used; False at the end of the file."""
         unused = self.end - self.begin
         if unused == TEXT_BLOCK:
             what = f"a line is longer than {TEXT_BLOCK} bytes: this is no text dump"
-            self.fault(what, WRITE_TEXT, line=self.line + 1)
+            self.refuse(what, WRITE_TEXT, line=self.line + 1)
         self.block[:unused] = self.block[self.begin : self.end]
         self.begin, self.end = 0, unused
         try:
@@ -102,14 +102,14 @@ class Reader:
             self.cut, count = True, 0
         except (OSError, zlib.error) as error:
             what = f"the file cannot be read further ({error})"
-            self.fault(what, "copy or write the file again", line=self.line + 1)
+            self.refuse(what, "copy or write the file again", line=self.line + 1)
         self.end += count
         return bool(count)
 
     def read_line(self) -> str | None:
         """The next line; None when the file ends first."""
         while (stop := self.block.find(b"\n", self.begin, self.end)) < 0:
-            if not self.more():
+            if not self.read_more():
                 return None
         line = self.block[self.begin : stop].decode(errors="backslashreplace")
         self.begin, self.line = stop + 1, self.line + 1
@@ -120,7 +120,7 @@ class Reader:
         line = self.read_line()
         return self.refuse_cut_header() if line is None else line
 
-    def fault(self, what: str, remedy: str, *, line: int | None = None) -> NoReturn:
+    def refuse(self, what: str, remedy: str, *, line: int | None = None) -> NoReturn:
         """Raise the error of a fault at a line, else at the last one used."""
         step = f"time step {self.step}"
         if self.step is None:
@@ -135,7 +135,7 @@ class Reader:
             f"the engine was stopped or is still writing: keep the {self.complete} whole frames"
             " before, or run again; a whole file ends with a line end"
         )
-        self.fault(what, remedy, line=self.line + 1)
+        self.refuse(what, remedy, line=self.line + 1)
 
     def refuse_cut_header(self) -> NoReturn:
         """Raise the error of a file that ends inside a header."""
@@ -145,14 +145,14 @@ class Reader:
     # --- header -----------------------------------------------------------------------------
     def check_opening(self) -> None:
         """Refuse what is no text dump, by its first bytes."""
-        self.more()
+        self.read_more()
         if self.block.startswith(b"\xef\xbb\xbf"):  # a mark that Windows editors leave
             self.begin = 3
         head = bytes(self.block[self.begin : min(self.end, 4096)])
         if self.cut and not head:
             self.refuse_cut_header()
         if not head.strip():
-            self.fault(
+            self.refuse(
                 "the file is empty",
                 "let the engine reach a dump step; 'dump_modify ID first yes' writes at the start",
                 line=1,
@@ -162,13 +162,13 @@ class Reader:
             known = [text for mark, text in _OTHER_FORMATS.items() if head.startswith(mark)]
             text = "it begins with " + repr(head[:16])[1:]
             remedy = known[0] if known else WRITE_TEXT
-            self.fault(f"this is no text dump: {text}", remedy, line=1)
+            self.refuse(f"this is no text dump: {text}", remedy, line=1)
 
     def read_whole(self, item: str) -> int:
         """The whole number on the line after an item of the header."""
         line = self.read_header_line()
         if not _WHOLE.fullmatch(line):
-            self.fault(f"a whole number should follow 'ITEM: {item}', not {line[:40]!r}", DAMAGED)
+            self.refuse(f"a whole number should follow 'ITEM: {item}', not {line[:40]!r}", DAMAGED)
         return int(line)
 
     def read_header(self) -> Header | None:
@@ -195,7 +195,7 @@ class Reader:
                 columns = tuple(item.removeprefix(label).split())
                 return self.check_header(Header(label, rows, columns, bounds, boundary))
             else:
-                self.fault(
+                self.refuse(
                     f"the line {line[:60]!r} has no place here in the header of a frame:"
                     " TIMESTEP, NUMBER OF ..., BOX BOUNDS, then the column names",
                     WRITE_TEXT,
@@ -212,18 +212,18 @@ class Reader:
             what = f"more rows than the {before.rows} of the frame's header: {line[:40]!r}"
         else:
             what = f"a line of the header should begin with 'ITEM:', not {line[:40]!r}"
-        self.fault(what, "the frame is damaged: run again, or cut it out")
+        self.refuse(what, "the frame is damaged: run again, or cut it out")
 
     def read_step(self) -> None:
         """Read the time step, which must grow from frame to frame."""
         if self.step is not None:
-            self.fault(
+            self.refuse(
                 "the next frame begins inside the header of this one",
                 "the engine was stopped here: cut this frame out",
             )
         self.step = self.read_whole("TIMESTEP")
         if self.step_before is not None and self.step <= self.step_before:
-            self.fault(
+            self.refuse(
                 f"time steps must increase, but {self.step} follows {self.step_before}",
                 "a run was appended to an older dump: give each run a file of its own",
             )
@@ -237,7 +237,7 @@ class Reader:
             numbers = all(_NUMBER.fullmatch(word) for word in words) and len(words) in (2, 3, 4)
             if not numbers or (table and len(words) != len(table[0])):
                 what = "box bounds should be two to four numbers, as many in each line"
-                self.fault(f"{what}, not {line[:60]!r}", DAMAGED)
+                self.refuse(f"{what}, not {line[:60]!r}", DAMAGED)
             table.append([float(word) for word in words])
         return np.array(table)
 
@@ -245,12 +245,12 @@ class Reader:
         """The header, when its columns can be those of this dump."""
         if header.rows < 0 or not header.columns:
             what = f"the header announces {header.rows} rows of {len(header.columns)} columns"
-            self.fault(what, DAMAGED)
+            self.refuse(what, DAMAGED)
         before = self.header_before
         if before is not None and (before.label, before.columns) != (header.label, header.columns):
             missing = [name for name in before.columns if name not in header.columns]
             new = [name for name in header.columns if name not in before.columns]
-            self.fault(
+            self.refuse(
                 f"the columns change from '{before.label} {' '.join(before.columns)}' to"
                 f" '{header.label} {' '.join(header.columns)}'"
                 f" (missing: {' '.join(missing) or 'none'}; new: {' '.join(new) or 'none'})",
@@ -287,7 +287,7 @@ class Reader:
                 values.resize((min(header.rows, 2 * row), columns), refcheck=False)
             stop = self.block.rfind(b"\n", self.begin, self.end) + 1
             if stop <= self.begin:
-                if not self.more():
+                if not self.read_more():
                     what = f"{row} of {header.rows} rows are whole"
                     self.refuse_incomplete(f"the file ends inside the frame: {what}")
                 continue
@@ -301,7 +301,7 @@ class Reader:
             elif status != kernel.BLOCK_READ:
                 what = f"row {row + 1} has {len(self.row_words())} values for {columns} columns"
                 remedy = "the row is damaged: run again, or cut this frame out"
-                self.fault(what, remedy, line=self.line + 1)
+                self.refuse(what, remedy, line=self.line + 1)
         return values
 
     def row_words(self) -> list[bytes]:
@@ -317,7 +317,7 @@ class Reader:
         token = bytes(match.group())
         if column == 0 and token.startswith(b"ITEM:"):
             lost = self.list_lost(header, values[:row])
-            self.fault(
+            self.refuse(
                 f"the frame is short: its header says {header.rows} rows, {row} are there{lost}",
                 "the engine lost grains or was stopped here: run again, or cut this frame out",
                 line=line,
@@ -325,7 +325,7 @@ class Reader:
         value = float(token) if _NUMBER.fullmatch(token) else np.nan
         if np.isnan(value) and not _NOT_FINITE.fullmatch(token):
             binary = any(byte < 32 or byte > 126 for byte in token)
-            self.fault(
+            self.refuse(
                 f"column {name} holds {'binary data' if binary else 'no number'}:"
                 f" {repr(token[:40])[1:]}",
                 "cut this frame out; dump columns of numbers only (no element, no mol names)",
@@ -335,7 +335,7 @@ class Reader:
             words, grain = self.row_words(), ""
             if header.label == "ATOMS" and "id" in header.columns[: len(words)]:
                 grain = f" of grain {words[header.columns.index('id')].decode('latin-1')}"
-            self.fault(
+            self.refuse(
                 f"column {name}{grain} is {token.decode('latin-1')}",
                 "the run blew up at or before this step: use a smaller time step, or look for"
                 " grains that coincide",
@@ -361,12 +361,12 @@ class Reader:
             if before is not None and header.rows < before.rows:
                 what = f"grains are lost: {before.rows} before, {header.rows} here"
                 remedy = "add id to the dump command; use a smaller time step"
-                self.fault(f"{what}; no column id says which", remedy, line=above)
+                self.refuse(f"{what}; no column id says which", remedy, line=above)
             return values
         number = values[:, header.columns.index("id")]
         odd = np.flatnonzero(~(np.abs(number) < _WHOLE_LARGEST) | (number != np.floor(number)))
         if len(odd):
-            self.fault(
+            self.refuse(
                 f"{number[odd[0]]!r} is no identifier of a grain: not whole, or 2^53 and more",
                 "write id as %d in dump_modify format",
                 line=above + 1 + int(odd[0]),
@@ -377,14 +377,14 @@ class Reader:
             identifier, values = identifier[order], np.take(values, order, axis=0)
             twice = np.flatnonzero(identifier[1:] == identifier[:-1])
             if len(twice):
-                self.fault(
+                self.refuse(
                     f"grains are there twice: {list_grains(np.unique(identifier[twice]))}",
                     "the dump is damaged, or two runs wrote to it: give each a file of its own",
                     line=above + 1 + int(max(order[twice[0] : twice[0] + 2])),
                 )
         if lost := self.list_lost(header, values):
             what = "grains are lost" if header.rows else "the frame holds no grains"
-            self.fault(
+            self.refuse(
                 what + lost,
                 "grains left the box or the step was too long: use a smaller time step, wider"
                 " bounds, and 'thermo_modify lost error'",

@@ -47,12 +47,12 @@ def read_dump_meshes(path: str | PathLike[str]) -> Iterator[meshio.Mesh]:
     places (a "dump local" of contacts).
     """
     for frame in read_frames(str(path)):
-        yield _mesh(frame, str(path))
+        yield _make_mesh(frame, str(path))
 
 
 def read_dump_mesh(path: str | PathLike[str]) -> meshio.Mesh:
     """The last frame of a text dump, as `read_dump_meshes`: a mesh is one instant."""
-    return _mesh(deque(read_frames(str(path)), maxlen=1).pop(), str(path))
+    return _make_mesh(deque(read_frames(str(path)), maxlen=1).pop(), str(path))
 
 
 def write_dump_mesh(path: str | PathLike[str], mesh: meshio.Mesh) -> None:
@@ -69,14 +69,14 @@ def write_dump_mesh(path: str | PathLike[str], mesh: meshio.Mesh) -> None:
         zip("xyz", points.T, strict=True)
     )
     for name, values in mesh.point_data.items():
-        columns |= _columns("_".join(name.split()), np.asarray(values))
+        columns |= _split_columns("_".join(name.split()), np.asarray(values))
     step = int(np.ravel(mesh.field_data.get(STEP, 0))[0])
     bounds = np.asarray(mesh.field_data.get(BOX, np.empty((0, 2))), float)
     frame = Frame(step, tuple(columns), np.column_stack([*columns.values()]), bounds)
     write_dump(str(path), [frame])
 
 
-def _mesh(frame: Frame, path: str) -> meshio.Mesh:
+def _make_mesh(frame: Frame, path: str) -> meshio.Mesh:
     if frame.kind != "atoms" or not {"x", "y", "z"} <= set(frame.columns):
         raise DumpError(
             f"there are no places x y z, only {' '.join(frame.columns)}",
@@ -107,7 +107,7 @@ def gather_point_data(frame: Frame) -> Iterator[tuple[str, NDArray[np.generic]]]
             yield column, values.astype(np.int64) if column in WHOLE else values
 
 
-def _columns(name: str, values: NDArray[np.generic]) -> dict[str, NDArray[np.generic]]:
+def _split_columns(name: str, values: NDArray[np.generic]) -> dict[str, NDArray[np.generic]]:
     """Columns of a scalar, or of a vector, under the names `gather_point_data` joins again."""
     if values.ndim == 1:
         return {name: values}

@@ -93,21 +93,21 @@ class RunFolder:
         """Of stages read before: identities of their files, whether their digests were looked at,
         outcome, and rows of the table."""
 
-    def locked(self) -> AbstractContextManager[object]:
+    def lock(self) -> AbstractContextManager[object]:
         """Hold the folder's only writer's lock; see `trackbed.run_files.lock_folder`."""
         return lock_folder(self.path, "lock")
 
-    def event(self, what: str, **details: object) -> None:
+    def add_event(self, what: str, **details: object) -> None:
         """Append one line to ``events.jsonl``."""
         now = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
         line = json.dumps({"time": now, "event": what, **details})
         append_line(self.path / "events.jsonl", line)
 
-    def asked_on(self, now: bool) -> bool:
+    def keep_cycle_by_cycle(self, now: bool) -> bool:
         """Whether this run was asked to compute where it may not jump, ``now`` or ever before."""
         before = any(event["event"] == ASKED_ON for event in self.events())
         if now and not before:
-            self.event(ASKED_ON)
+            self.add_event(ASKED_ON)
         return now or before
 
     def events(self) -> list[dict[str, Any]]:
@@ -137,7 +137,7 @@ class RunFolder:
             outcome = _read_outcome(folder)
             names = ("outcome.json", *outcome.notes.get("files", ()))
             files = [(path, _identify(path)) for path in (f"{folder}/{one}" for one in names)]
-            found = _sizes(folder)
+            found = _list_sizes(folder)
             whole = outcome.notes.get("files", found) == found
             digests = outcome.notes.get("digests", {}) if verify and whole else {}
             whole &= all(digest_file(folder / one) == digest for one, digest in digests.items())
@@ -192,7 +192,7 @@ class RunFolder:
         folder = self.path / name
         folder.mkdir(exist_ok=True)
         write_whole(folder / "failed.json", json.dumps({"why": why, **details}) + "\n")
-        self.event("jump failed", stage=name, why=why)
+        self.add_event("jump failed", stage=name, why=why)
         self.write_settlement()
 
     def begin(self, name: str) -> Path:
@@ -218,7 +218,7 @@ class RunFolder:
         The outcome's notes get the sizes and digests of the `NEEDED` files, which `outcome` looks
         for; all of it is on the disk when the stage is in its place.
         """
-        sizes = _sizes(folder)
+        sizes = _list_sizes(folder)
         digests = {name: seal_file(folder / name) for name in sizes}
         outcome = replace(outcome, notes=outcome.notes | {"files": sizes, "digests": digests})
         record = json.loads(json.dumps(asdict(outcome)))
@@ -242,7 +242,7 @@ class RunFolder:
         while (home / f"{folder.name}.{number}").exists():
             number += 1
         folder.rename(home / f"{folder.name}.{number}")
-        self.event("discarded", stage=folder.name, to=f"discarded/{folder.name}.{number}")
+        self.add_event("discarded", stage=folder.name, to=f"discarded/{folder.name}.{number}")
 
     def write_settlement(self) -> None:
         """Write ``settlement.csv`` from the outcomes of all finished stages."""
@@ -302,7 +302,7 @@ def _identify(path: str) -> tuple[int, ...]:
     return found.st_ino, found.st_size, found.st_mtime_ns
 
 
-def _sizes(folder: Path) -> dict[str, int]:
+def _list_sizes(folder: Path) -> dict[str, int]:
     """Size of each of the `NEEDED` files [bytes]."""
     paths = sorted(path for pattern in NEEDED for path in folder.glob(pattern))
     return {path.name: path.stat().st_size for path in paths}
@@ -316,7 +316,7 @@ def _link(source: str, target: str) -> None:
 
 
 @contextmanager
-def name_full_disk(path: Path) -> Iterator[None]:
+def explain_full_disk(path: Path) -> Iterator[None]:
     """Turn the system's "no space left" into a sentence that says what is safe.
 
     An engine does not always notice: what it left is cut short, and the disk tells why.
@@ -326,17 +326,17 @@ def name_full_disk(path: Path) -> Iterator[None]:
     except OSError as error:
         if error.errno not in NO_ROOM:
             raise
-        raise _disk_full(path, str(error.strerror)) from error
+        raise _make_disk_error(path, str(error.strerror)) from error
     except DiskFull as error:
-        raise _disk_full(path, f"{error.where} {error.what}") from error
+        raise _make_disk_error(path, f"{error.where} {error.what}") from error
     except (EngineFailed, NotCredible) as error:
         free = shutil.disk_usage(path).free
         if free >= FREE_LEAST or (isinstance(error, EngineFailed) and error.from_outside):
             raise
-        raise _disk_full(path, f"{free} bytes left") from error
+        raise _make_disk_error(path, f"{free} bytes left") from error
 
 
-def _disk_full(path: Path, why: str) -> EngineFailed:
+def _make_disk_error(path: Path, why: str) -> EngineFailed:
     full = EngineFailed(
         f"the disk is full ({why})",
         where=str(path),

@@ -15,7 +15,7 @@ from adapters.errors import UsageError
 from adapters.files.settlement_table import SUFFIXES, Series, read_table_series
 
 
-def too_few(
+def make_too_few_error(
     count: int, fewest: int, purpose: str, *, where: str, left_out: int = 0, else_do: str = ""
 ) -> UsageError:
     """The error of a series of ``count`` cycles, where ``purpose`` (to fit ..., to tell ...) needs
@@ -81,7 +81,7 @@ def read_dump_series(paths: Sequence[Path], steps_per_cycle: float | None = None
     steps: list[int] = []
     heights: list[float] = []
     grains: FloatArray | None = None
-    for path in sorted(paths, key=_natural):
+    for path in sorted(paths, key=_make_sort_key):
         for frame in read_frames(path):
             where = f"{path}, time step {frame.time_step}"
             identifiers = frame.column("id")
@@ -120,7 +120,7 @@ def _is_table(path: Path) -> bool:
         return not stream.read(64).lstrip().startswith(b"ITEM:")
 
 
-def _natural(path: Path) -> list[tuple[int, str]]:
+def _make_sort_key(path: Path) -> list[tuple[int, str]]:
     """Sorting key by which 2 comes before 10: digits as numbers, the rest as text."""
     parts = re.findall(r"\d+|\D+", str(path))
     return [(int(part), "") if part.isdecimal() else (-1, part) for part in parts]

@@ -36,21 +36,21 @@ class Series:
     left_out: int = 0
     """Rows that `since` and `after` left out."""
 
-    def since(self, cycle: float) -> Series:
+    def keep_from(self, cycle: float) -> Series:
         """The rows from the user's ``cycle`` on, to leave out a bedding-in that no law describes.
 
         Behind `after`, not before it: that takes what settled before the change from earlier rows.
         """
-        return self._kept(self.cycle + self.counted_from >= cycle)
+        return self._keep(self.cycle + self.counted_from >= cycle)
 
-    def after(self, cycle: float) -> Series:
+    def restart_after(self, cycle: float) -> Series:
         """The rows behind ``cycle``, counted from there: a changed load starts the law again."""
         rows = self.cycle > cycle
         begun = float(self.settlement[~rows][-1]) if not rows.all() else self.begun
-        kept, counted_from = self._kept(rows), self.counted_from + cycle
+        kept, counted_from = self._keep(rows), self.counted_from + cycle
         return replace(kept, cycle=kept.cycle - cycle, begun=begun, counted_from=counted_from)
 
-    def _kept(self, rows: NDArray[np.bool_]) -> Series:
+    def _keep(self, rows: NDArray[np.bool_]) -> Series:
         return replace(
             self,
             cycle=self.cycle[rows],
@@ -101,7 +101,7 @@ def read_table_series(path: Path, names: Sequence[str] = (), unit: str | None = 
             places = [find_column(table, one, UNITS) for one in wanted]
             kinds = [table.split_title(n, UNITS)[0] == "kind" for n in range(len(table.header))]
             if any(kinds):
-                table = _computed_rows(table, find_column(table, ("kind",), UNITS))
+                table = _select_computed(table, find_column(table, ("kind",), UNITS))
         except UsageError as error:
             remedy = REMEDY if "column" in error.what else error.remedy
             raise UsageError(error.what, where=error.where, remedy=remedy) from None
@@ -159,7 +159,7 @@ def _find_unit(table: Table, place: int, given: str | None) -> str:
     return unit or given or SETTLEMENT_NAMES.get(name, UNKNOWN)
 
 
-def _computed_rows(table: Table, place: int) -> Table:
+def _select_computed(table: Table, place: int) -> Table:
     """The table without rows that no engine computed and without transients."""
     kinds = [row[place].strip() for row in table.rows]
     for row, kind in enumerate(kinds):

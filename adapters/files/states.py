@@ -24,7 +24,7 @@ def read_state_file(path: Path, density: float) -> State:
     frame = deque(read_frames(path), maxlen=1).pop()
     radius = frame.column("radius")
 
-    def vectors(*columns: str) -> FloatArray:
+    def read_vectors(*columns: str) -> FloatArray:
         there = set(columns) <= set(frame.columns)
         return frame.block(*columns) if there else np.zeros((len(radius), 3))
 
@@ -33,8 +33,8 @@ def read_state_file(path: Path, density: float) -> State:
         frame.block("x", "y", "z"),
         radius,
         frame.column("mass") if "mass" in frame.columns else density * 4 / 3 * np.pi * radius**3,
-        vectors("vx", "vy", "vz"),
-        vectors("omegax", "omegay", "omegaz"),
+        read_vectors("vx", "vy", "vz"),
+        read_vectors("omegax", "omegay", "omegaz"),
         time_step=frame.time_step,
     )
 

@@ -17,12 +17,12 @@ from adapters.jumps.control import (
     Control,
     Decision,
     Settings,
-    joined,
+    join_stretch,
     trace_curve,
 )
 from adapters.jumps.forecast import Forecast, fit_forecast, integrate_gain
 from adapters.jumps.rates import Stretch, count_blocks, estimate_noise, measure_rates
-from adapters.jumps.slopes import Landing, estimate_slopes, reseating, unmoved
+from adapters.jumps.slopes import Landing, estimate_slopes, find_reseating, remove_moves
 
 ROLL_BACK = 2.0
 """Realised error over the tolerance from which a jump is taken back."""
@@ -76,7 +76,7 @@ def judge(
     """
     landings, windows, behind = join_by_jump(control, decision, settings, stretch)
     kappa, kappa_error = estimate_slopes(behind, landings).kappa()
-    every = tuple(unmoved(one, landings, kappa) for one in windows)
+    every = tuple(remove_moves(one, landings, kappa) for one in windows)
     window, noises = every[-1], estimate_noise(every).variance
     before, both = fit_forecast(measure_rates(every[:-1])), fit_forecast(measure_rates(every))
     start, end = float(control.cycle), float(window.first_cycle)
@@ -89,7 +89,7 @@ def judge(
         expected = expect_by_all(both, start, end)
     sources = list_sources(every, noises, expected.shares)
     by_kappa = sum(
-        source[3] * float(reseating(one, landings).sum())
+        source[3] * float(find_reseating(one, landings).sum())
         for source, one in zip(sources, windows, strict=True)
     )
     gained = settlement - float(window.gain.sum()) - control.settlement
@@ -228,8 +228,8 @@ def accept(
         control,
         cycle=stretch.last_cycle,
         settlement=settlement,
-        windows=joined(windows[:-1], windows[-1]),
-        behind=joined(behind[:-1], behind[-1]),
+        windows=join_stretch(windows[:-1], windows[-1]),
+        behind=join_stretch(behind[:-1], behind[-1]),
         landings=landings,
         kappa=check.kappa,
         ahead=control.ahead + check.gained - check.expected,

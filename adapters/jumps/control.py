@@ -35,7 +35,7 @@ from adapters.jumps.rates import (
     fit_state_trend,
     measure_rates,
 )
-from adapters.jumps.slopes import Landing, estimate_slopes, reseating, unmoved
+from adapters.jumps.slopes import Landing, estimate_slopes, find_reseating, remove_moves
 from adapters.laws.fit import FIRST_WINDOW, WHY_NOT, WHY_NOT_PISTON, BoolArray, Regime
 
 JUMP_PROBABILITY = 0.9
@@ -113,7 +113,7 @@ class Control:
     @cached_property
     def stretches(self) -> tuple[Stretch, ...]:
         """`windows` of the bed itself, without what jumps made it settle more."""
-        return tuple(unmoved(one, self.landings, self.kappa) for one in self.windows)
+        return tuple(remove_moves(one, self.landings, self.kappa) for one in self.windows)
 
     @property
     def share(self) -> float:
@@ -166,15 +166,15 @@ def observe(control: Control, stretch: Stretch, settlement: float) -> Control:
 
     Errors observed count less the longer ago they are: their limit doubles with every window.
     """
-    behind = joined(control.behind, stretch)
+    behind = join_stretch(control.behind, stretch)
     kappa = estimate_slopes(behind, control.landings).kappa()[0] if control.landings else 0.0
-    more = kappa * float(reseating(stretch, control.landings).sum())
+    more = kappa * float(find_reseating(stretch, control.landings).sum())
     cycles, curve = trace_curve(stretch, settlement)
     return replace(
         control,
         cycle=stretch.last_cycle,
         settlement=settlement,
-        windows=joined(control.windows, stretch),
+        windows=join_stretch(control.windows, stretch),
         behind=behind,
         kappa=kappa,
         ahead=control.ahead + more,
@@ -187,7 +187,7 @@ def observe(control: Control, stretch: Stretch, settlement: float) -> Control:
     )
 
 
-def joined(stretches: tuple[Stretch, ...], new: Stretch) -> tuple[Stretch, ...]:
+def join_stretch(stretches: tuple[Stretch, ...], new: Stretch) -> tuple[Stretch, ...]:
     """Memory with a new stretch; windows that follow one another become one stretch."""
     if stretches and stretches[-1].last_cycle == new.first_cycle:
         last = stretches[-1]
@@ -242,12 +242,12 @@ def decide(control: Control, settings: Settings, piston: Regime | None = None) -
         return replace(known, why="the end is too near for a jump")
     grid = np.unique(np.geomspace(1, room, 80).round())
     widths = estimate_widths(control, forecast, grid)
-    limits = limit_jump(control, settings, forecast, grid, widths)
+    limits = find_limits(control, settings, forecast, grid, widths)
     binding = min(limits, key=lambda name: limits[name])
     jump = int(min(limits[binding], room))
     if limits[binding] > room:
         binding = "end"
-    window = window_of(control, settings, forecast, limits)
+    window = choose_window(control, settings, forecast, limits)
     width = float(np.interp(jump, grid, np.hypot(*widths)))
     gain = float(forecast.gain(control.cycle, control.cycle + float(jump)))
     moved = (gain - control.ahead) / (1 + control.share)
@@ -272,7 +272,7 @@ def decide(control: Control, settings: Settings, piston: Regime | None = None) -
     )
 
 
-def limit_jump(
+def find_limits(
     control: Control, settings: Settings, forecast: Forecast, grid: FloatArray,
     widths: tuple[FloatArray, FloatArray],
 ) -> dict[str, float]:  # fmt: skip
@@ -303,21 +303,21 @@ def limit_jump(
     noise, law = widths
     both = np.hypot(noise, law)
     idle = noise[-1] <= allowed[-1]
-    last = _longest(grid, (both <= allowed) & ((noise <= gains) | idle))
+    last = _find_longest(grid, (both <= allowed) & ((noise <= gains) | idle))
     place = min(int(np.searchsorted(grid, max(last, 1.0))), len(grid) - 1)
     name = "noise" if noise[place] >= law[place] else "laws"
     first = control.last_jump == 0
     return {
-        "slope": _longest(grid, missed <= allowed),
+        "slope": _find_longest(grid, missed <= allowed),
         name: last,
-        "state": min(limit_by_state(control, name) for name in STATES),
+        "state": min(find_state_limit(control, name) for name in STATES),
         "observed": control.longest,
         "growth": float(control.window) if first else GROWTH * control.last_jump,
         "reach": here * (REACH - 1),
     }
 
 
-def _longest(grid: FloatArray, allowed: BoolArray) -> float:
+def _find_longest(grid: FloatArray, allowed: BoolArray) -> float:
     """Last of the ``grid`` up to which all are ``allowed``; inf where all are, 0 where none."""
     if allowed.all():
         return inf
@@ -325,7 +325,7 @@ def _longest(grid: FloatArray, allowed: BoolArray) -> float:
     return float(grid[first - 1]) if first else 0.0
 
 
-def limit_by_state(control: Control, name: str) -> float:
+def find_state_limit(control: Control, name: str) -> float:
     mean, slope, error = fit_state_trend(control.stretches, name)
     change = max(abs(slope) - error, 0.0)
     if change <= 0 or mean == 0:
@@ -350,7 +350,7 @@ def estimate_widths(
     return noise, np.maximum(form, np.where(np.isfinite(apart), apart, 0.0))
 
 
-def window_of(
+def choose_window(
     control: Control, settings: Settings, forecast: Forecast, limits: dict[str, float]
 ) -> int:
     """Cycles k of the next window: those with the most cycles gained for each one computed.

@@ -15,15 +15,15 @@ import numpy as np
 from scipy.special import stdtrit
 
 from adapters.bed import FloatArray
-from adapters.jumps.rates import Rates, spans
+from adapters.jumps.rates import Rates, integrate_powers
 from adapters.laws.fit import (
     EXPONENTS,
     PRIOR,
     ROWS_FEWEST,
     Regime,
+    find_increments,
     find_regime_of_weight,
-    increments,
-    thinned,
+    thin_rows,
 )
 
 
@@ -48,18 +48,18 @@ class Forecast:
 
         Negative where the bed rose: cut at zero, noise would settle a bed that is at rest.
         """
-        return np.asarray(spans(self.last_cycle, start, end) @ (self.weight * self.rate))
+        return np.asarray(integrate_powers(self.last_cycle, start, end) @ (self.weight * self.rate))
 
     def shares(self, start: float, end: float) -> FloatArray:
         """Derivative of that gain by the gain of each block it was fitted to, shape (b,)."""
-        span = spans(self.last_cycle, start, end)
+        span = integrate_powers(self.last_cycle, start, end)
         return np.asarray(self.influence @ (self.weight * span))
 
     def half_widths(
         self, start: float, end: float | FloatArray, probability: float
     ) -> tuple[FloatArray, FloatArray]:
         """Half-widths of the gain [m]: from the noise of the rates, from the unknown exponent."""
-        span = spans(self.last_cycle, start, end)
+        span = integrate_powers(self.last_cycle, start, end)
         student = stdtrit(self.freedom, (1 + probability) / 2)
         gains = span * self.rate
         mean = gains @ self.weight
@@ -80,7 +80,7 @@ def fit_forecast(rates: Rates) -> Forecast:
     rate 0 with no error.
     """
     last = rates.last_cycle
-    span = spans(last, rates.start, rates.end)
+    span = integrate_powers(last, rates.start, rates.end)
     prior = 1 / (1 + (EXPONENTS / PRIOR) ** 2)
     if not rates.gain.any() and not rates.variance.any():
         still = np.zeros_like(EXPONENTS)
@@ -108,9 +108,9 @@ def bound_gain_by_laws(
     if len(cycle) < 2 * ROWS_FEWEST or not np.ptp(settlement):
         wide = np.full(len(ends), np.inf if len(cycle) < 2 * ROWS_FEWEST else 0.0)
         return -wide, wide
-    few, means = thinned(cycle, settlement[:, None])
+    few, means = thin_rows(cycle, settlement[:, None])
     with np.errstate(over="ignore", invalid="ignore"):
-        found = increments(few, means, ends)
+        found = find_increments(few, means, ends)
     every = np.stack([gains[:, 0] for gains in found.values()])
     outer = (1 - probability) / 2, (1 + probability) / 2
     low, high = np.nanquantile(np.where(np.isfinite(every), every, np.nan), outer, axis=0)

@@ -130,10 +130,10 @@ def cut_slope_blocks(one: Stretch, landings: Sequence[Landing] = ()) -> list[tup
     edges = np.unique(np.geomspace(from_first, last - start, count + 1).round().astype(int))
     edges[0] = first - start
     parts = [one.part(a + start - first, b + start - first) for a, b in pairwise(edges.tolist())]
-    return [(part, float(reseating(part, landings).sum())) for part in parts]
+    return [(part, float(find_reseating(part, landings).sum())) for part in parts]
 
 
-def reseating(stretch: Stretch, landings: Sequence[Landing]) -> FloatArray:
+def find_reseating(stretch: Stretch, landings: Sequence[Landing]) -> FloatArray:
     """What kappa = 1 adds to the gain of each cycle of a stretch [m], shape (k,): sum of G / n."""
     cycle = stretch.first_cycle + 1.0 + np.arange(len(stretch.gain))
     more = np.zeros(len(cycle))
@@ -143,9 +143,9 @@ def reseating(stretch: Stretch, landings: Sequence[Landing]) -> FloatArray:
     return more
 
 
-def unmoved(stretch: Stretch, landings: Sequence[Landing], kappa: float) -> Stretch:
+def remove_moves(stretch: Stretch, landings: Sequence[Landing], kappa: float) -> Stretch:
     """The stretch of the bed itself, without what jumps made it settle more."""
-    return replace(stretch, gain=stretch.gain - kappa * reseating(stretch, landings))
+    return replace(stretch, gain=stretch.gain - kappa * find_reseating(stretch, landings))
 
 
 @dataclass(frozen=True, eq=False)

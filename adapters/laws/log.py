@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from adapters.bed import FloatArray
-from adapters.laws.form import check_training_data, log_ratio, outer
+from adapters.laws.form import check_training_data, find_log_ratio, outer
 
 
 class Log:
@@ -28,7 +28,7 @@ class Log:
     def fit(self, cycle: FloatArray, displacement: FloatArray) -> FloatArray:
         """Parameters c [m] and a [m per e-fold of N], shape (2, ...); see `Law.fit`."""
         cycle, displacement = check_training_data(self, cycle, displacement)
-        x = log_ratio(cycle[0], cycle)
+        x = find_log_ratio(cycle[0], cycle)
         x -= x.mean()
         a = np.tensordot(x, displacement, 1) / (x @ x)
         return np.stack([displacement.mean(axis=0) - a * np.log(cycle).mean(), a])
@@ -42,7 +42,7 @@ class Log:
         self, parameters: FloatArray, start: float, end: float | FloatArray
     ) -> FloatArray:
         """a ln(end / start) [m]; see `Law.increment`."""
-        return outer(log_ratio(start, end), parameters[1])
+        return outer(find_log_ratio(start, end), parameters[1])
 
 
 LAW = Log()

@@ -6,7 +6,7 @@ import numpy as np
 
 from adapters.bed import FloatArray
 from adapters.errors import UsageError
-from adapters.laws.form import centred, check_training_data, log_ratio, outer, unit_vectors
+from adapters.laws.form import centre, check_training_data, find_log_ratio, normalise, outer
 
 
 class LogLinear:
@@ -36,12 +36,12 @@ class LogLinear:
         """
         cycle, displacement = check_training_data(self, cycle, displacement)
         linear, slowing = (
-            centred((cycle - cycle[0]) / cycle[0]),
-            centred(log_ratio(cycle[0], cycle)),
+            centre((cycle - cycle[0]) / cycle[0]),
+            centre(find_log_ratio(cycle[0], cycle)),
         )
-        unit, norm = unit_vectors(linear)
+        unit, norm = normalise(linear)
         along = float((unit * slowing).sum())
-        rest, left = unit_vectors(slowing - along * unit)
+        rest, left = normalise(slowing - along * unit)
         if not left > len(cycle) * np.finfo(float).eps * np.sqrt((slowing**2).sum()):
             raise UsageError(
                 f"ln N and N are the same straight line over cycles {cycle[0]:g} to {cycle[-1]:g}",
@@ -66,7 +66,7 @@ class LogLinear:
     ) -> FloatArray:
         """a ln(end / start) + b (end - start) [m]; see `Law.increment`."""
         _, a, b = parameters
-        return outer(log_ratio(start, end), a) + outer(np.asarray(end) - start, b)
+        return outer(find_log_ratio(start, end), a) + outer(np.asarray(end) - start, b)
 
 
 def choose_one_sign(y: FloatArray, norm: float, along: float, left: float) -> FloatArray:

@@ -17,7 +17,7 @@ BLOCKS_MOST = 4
 """Parts of a window from which the scatter of a grain's move is taken, at most."""
 
 
-def displacement(jump: Jump) -> FloatArray:
+def find_displacement(jump: Jump) -> FloatArray:
     """u_z(z), piecewise linear and 0 on the floor, and u_r = c r from the axis [m], shape (n, 3).
 
     Both fitted to the moves of all grains' own laws, loose ones counting little
@@ -37,14 +37,14 @@ def displacement(jump: Jump) -> FloatArray:
     hats = np.column_stack([np.interp(place[:, 2], knots, row) for row in np.eye(layers + 1)[1:]])
     found = np.linalg.lstsq(root[:, None] * hats, root * own[:, 2], rcond=None)[0]
     move[:, 2] = hats @ found
-    outward = place[:, :2] - axis_of(jump.container)
+    outward = place[:, :2] - find_axis(jump.container)
     square = float(weight @ (outward**2).sum(axis=1))
     spread = float(weight @ (outward * own[:, :2]).sum(axis=1)) / square if square else 0.0
     move[:, :2] = spread * outward
     return restore_mean(place, move, jump.extrapolate_mean())
 
 
-def axis_of(container: Container) -> FloatArray:
+def find_axis(container: Container) -> FloatArray:
     """Where the bed spreads from, (x, y) [m]: mirrors and a cylinder's axis, else mid-box."""
     if container.shape != "box":
         return np.zeros(2)
@@ -87,4 +87,4 @@ def weigh_grains(moves: FloatArray) -> FloatArray:
     return np.asarray(weight / weight.mean())
 
 
-MOVE = Move("profile", displacement)
+MOVE = Move("profile", find_displacement)

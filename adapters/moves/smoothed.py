@@ -14,7 +14,7 @@ SMOOTHING_RADII = 2.5
 """Reach of the smoothing, in a grain's own radius."""
 
 
-def displacement(jump: Jump) -> FloatArray:
+def find_displacement(jump: Jump) -> FloatArray:
     """Estimated displacement of every grain [m], shape (n, 3).
 
     1. Each grain moves by the law's increment for its own path (eqs 16 to 21).
@@ -30,12 +30,12 @@ def displacement(jump: Jump) -> FloatArray:
     1, the law log grain by grain 1.2, linear 1.6.  Do not use it where grains are carried past
     their neighbours within one window.
     """
-    move = clipped(jump.extrapolate_grains(), CLIP_QUANTILE)
-    move = smoothed(jump.place, move, SMOOTHING_RADII * jump.radius)
+    move = clip_moves(jump.extrapolate_grains(), CLIP_QUANTILE)
+    move = smooth_moves(jump.place, move, SMOOTHING_RADII * jump.radius)
     return restore_mean(jump.place, move, jump.extrapolate_mean())
 
 
-def clipped(move: FloatArray, quantile: float) -> FloatArray:
+def clip_moves(move: FloatArray, quantile: float) -> FloatArray:
     """Moves [m], shape (n, 3), none longer than the ``quantile`` of their lengths; 1 keeps all."""
     length = np.linalg.norm(move, axis=1)
     bound = np.quantile(length, quantile, method="lower")
@@ -43,7 +43,7 @@ def clipped(move: FloatArray, quantile: float) -> FloatArray:
     return np.asarray(move * scale[:, None])
 
 
-def smoothed(position: FloatArray, move: FloatArray, reach: FloatArray) -> FloatArray:
+def smooth_moves(position: FloatArray, move: FloatArray, reach: FloatArray) -> FloatArray:
     """Weighted means of the moves [m], shape (n, 3), of all grains nearer than ``reach`` [m].
 
     Weights 1 - (d / reach)^2 with distances d between ``position`` [m], shape (n, 3); ``reach``
@@ -61,4 +61,4 @@ def smoothed(position: FloatArray, move: FloatArray, reach: FloatArray) -> Float
     )
 
 
-MOVE = Move("smoothed", displacement)
+MOVE = Move("smoothed", find_displacement)

@@ -8,7 +8,7 @@ from adapters.bed import FloatArray
 from adapters.moves.contract import Jump, Move
 
 
-def displacement(jump: Jump) -> FloatArray:
+def find_displacement(jump: Jump) -> FloatArray:
     """Zeros [m], shape (n, 3).
 
     The cycles are counted as jumped and the bed has not felt them: not for predictions.
@@ -16,4 +16,4 @@ def displacement(jump: Jump) -> FloatArray:
     return np.zeros_like(jump.place)
 
 
-MOVE = Move("still", displacement, moves_piston=False)
+MOVE = Move("still", find_displacement, moves_piston=False)

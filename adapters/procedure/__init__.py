@@ -12,17 +12,17 @@ from adapters.procedure.record import (
     find_comparable_cycle,
     list_checks,
     list_decisions,
+    make_plain,
     read_run_record,
-    to_plain,
 )
 from adapters.procedure.run import record_scene, refuse_differences
-from adapters.procedure.seating import HUNG, find_hung_cycles, spans
-from adapters.procedure.status import describe_result, judge_progress, status
+from adapters.procedure.seating import HUNG, find_hung_cycles, format_spans
+from adapters.procedure.status import describe_result, judge_progress, read_status
 
 __all__ = [
     "AVERAGED", "CONTROL", "FORCE_ERROR_GOAL", "FORCE_START_CYCLES", "HUNG", "History", "Progress",
     "Record", "Track", "describe_result", "estimate_band_of_run", "find_comparable_cycle",
-    "find_hung_cycles", "judge_progress", "list_checks", "list_decisions", "list_jumped_spans",
-    "read_run_record", "record_scene", "refuse_differences", "run", "spans", "status", "sum_cost",
-    "to_plain",
+    "find_hung_cycles", "format_spans", "judge_progress", "list_checks", "list_decisions",
+    "list_jumped_spans", "make_plain", "read_run_record", "read_status", "record_scene",
+    "refuse_differences", "run", "sum_cost",
 ]  # fmt: skip

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, fields
 
 import numpy as np
 
-from adapters.bed import GRAVITY, OVERLAP_BOUND, FloatArray, State, find_sample_mass, neighbours
+from adapters.bed import GRAVITY, OVERLAP_BOUND, FloatArray, State, find_pairs, find_sample_mass
 from adapters.errors import EngineFailed, NotCredible
 from adapters.files import Window
 from adapters.scene import Scene
@@ -91,7 +91,7 @@ def check_state(scene: Scene, state: State) -> None:
             where="preparation",
             remedy="a shorter time step",
         )
-    touching = neighbours(state.position, state.radius, scene.container.walls())
+    touching = find_pairs(state.position, state.radius, scene.container.walls())
     share = float(touching.overlap.max(initial=0.0)) / float(state.radius.min())
     if not share <= OVERLAP_BOUND:
         raise NotCredible(
@@ -101,12 +101,12 @@ def check_state(scene: Scene, state: State) -> None:
         )
 
 
-def figures_of_window(scene: Scene, window: Window) -> WindowFigures:
+def measure_window(scene: Scene, window: Window) -> WindowFigures:
     """The figures of `check_bounds`."""
     walls = scene.container.walls()
     # From the positions, not from the engine's list of contacts: it cannot hide one.
     overlaps = [
-        float(neighbours(position, window.radius, walls).overlap.max(initial=0.0))
+        float(find_pairs(position, window.radius, walls).overlap.max(initial=0.0))
         for position in window.position[1:]
     ]
     inertia = 0.4 * window.mass * window.radius**2
@@ -180,6 +180,6 @@ def check_rise(scene: Scene, height: FloatArray, rise: FloatArray) -> None:
 def check_window(scene: Scene, window: Window, cycles: int) -> dict[str, float]:
     """All checks of a window; returns the figures judged, for the record."""
     check_complete(scene, window, cycles)
-    figures = figures_of_window(scene, window)
+    figures = measure_window(scene, window)
     check_bounds(scene, figures)
     return asdict(figures)

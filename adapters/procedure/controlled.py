@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from adapters.errors import EngineFailed, JumpRefused, NotConverged, NotCredible
-from adapters.files import Outcome, name_full_disk
+from adapters.files import Outcome, explain_full_disk
 from adapters.jumps import (
     Control,
     Decision,
@@ -25,18 +25,18 @@ from adapters.jumps import (
     decide,
     estimate_slopes,
     fit_forecast,
-    joined,
+    join_stretch,
     judge,
     measure_rates,
     observe,
     reject,
-    unmoved,
+    remove_moves,
 )
 from adapters.laws.fit import Regime
 from adapters.procedure import stages
 from adapters.procedure.history import sum_cost
-from adapters.procedure.record import CHECK, DECISION, to_plain
-from adapters.procedure.seating import seat, warn_if_hung
+from adapters.procedure.record import CHECK, DECISION, make_plain
+from adapters.procedure.seating import seat_piston, warn_if_hung
 from adapters.procedure.stages import Bed, Run
 
 
@@ -56,7 +56,7 @@ def settle_controlled(run: Run, bed: Bed) -> Bed:
     rows = run.outcome(bed.window).rows
     control = Control(bed.cycle, float(rows[-1]["settlement"]))
     while True:
-        if (seated := seat(run, bed, procedure.carried_cycles)).cycle > bed.cycle:
+        if (seated := seat_piston(run, bed, procedure.carried_cycles)).cycle > bed.cycle:
             bed = seated
             control = Control(bed.cycle, float(run.outcome(bed.window).rows[-1]["settlement"]))
         decision = decide(control, settings, find_piston_regime(run, control))
@@ -64,7 +64,7 @@ def settle_controlled(run: Run, bed: Bed) -> Bed:
             return bed
         journal.write(DECISION, decision.cycle, decision.attempt, asdict(decision))
         if decision.action == "refuse":
-            raise refused(run, decision)
+            raise make_refusal(run, decision)
         if decision.action == "compute":
             bed = stages.compute(run, bed, decision.window)
             rows = run.outcome(bed.window).rows
@@ -91,7 +91,7 @@ def find_piston_regime(run: Run, control: Control) -> Regime | None:
     ]
     sunk: tuple[Stretch, ...] = ()
     for stretch in list_stretches(lowered, control.stretches[0].first_cycle, control.cycle):
-        sunk = joined(sunk, stretch)
+        sunk = join_stretch(sunk, stretch)
     return find_sinking_regime(sunk, control.landings)
 
 
@@ -100,7 +100,7 @@ def find_sinking_regime(sunk: Sequence[Stretch], landings: Sequence[Landing]) ->
     lower it by what they move the mean grain by.  That excess does not fall with N, and would pass
     for ratcheting where jumps grow.  None where it does not sink."""
     kappa = estimate_slopes(sunk, landings).kappa()[0] if landings else 0.0
-    forecast = fit_forecast(measure_rates([unmoved(one, landings, kappa) for one in sunk]))
+    forecast = fit_forecast(measure_rates([remove_moves(one, landings, kappa) for one in sunk]))
     return forecast.regime if forecast.rate @ forecast.weight > 0 else None
 
 
@@ -118,14 +118,16 @@ def jump_and_check(
         return bed, reject(control, decision, float(error), settings)
     healing = settings.healing
     try:
-        with name_full_disk(run.folder.path):
+        with explain_full_disk(run.folder.path):
             moved = stages.jump(run, bed, decision.jump, decision.attempt, decision.moved)
             after = stages.compute(run, moved, healing + decision.window, healing)
     except (EngineFailed, NotCredible, NotConverged) as error:
         if isinstance(error, EngineFailed) and error.from_outside:
             raise
         run.folder.give_up(name, str(error))
-        run.progress.say(f"the jump of {decision.jump} cycles from {bed.cycle} failed: {error}")
+        run.progress.print_line(
+            f"the jump of {decision.jump} cycles from {bed.cycle} failed: {error}"
+        )
         return bed, reject(control, decision, nan, settings)
     rows = run.outcome(after.window).rows
     settlement = float(rows[-1]["settlement"])
@@ -144,7 +146,7 @@ def jump_and_check(
     run.folder.give_up(name, why, error=check.error, **lost)
     run.folder.discard(run.folder.path / after.window)
     run.folder.write_settlement()
-    run.progress.say(f"the jump of {decision.jump} cycles from {bed.cycle} was {why}")
+    run.progress.print_line(f"the jump of {decision.jump} cycles from {bed.cycle} was {why}")
     return bed, reject(control, decision, check.error, settings)
 
 
@@ -181,7 +183,7 @@ def list_stretches(
     return tuple(stretches)
 
 
-def refused(run: Run, decision: Decision) -> JumpRefused:
+def make_refusal(run: Run, decision: Decision) -> JumpRefused:
     """The error of a run that may not jump."""
     return JumpRefused(
         f"up to cycle {decision.cycle} {decision.why}: it goes as N^(beta - 1) with beta = "
@@ -212,11 +214,11 @@ class Journal:
         if key in self._known:
             return
         self._known.add(key)
-        details = to_plain(content) | {"cycle": cycle, "attempt": attempt}
-        self._run.folder.event(what, **details)
+        details = make_plain(content) | {"cycle": cycle, "attempt": attempt}
+        self._run.folder.add_event(what, **details)
         why = str(content.get("why", ""))
         if what == DECISION and content["action"] == "compute" and content["binding"]:
             kind = why.partition(":")[0]
             if kind not in self._silent:
-                self._run.progress.say(f"cycle {cycle}: {why}; computing on")
+                self._run.progress.print_line(f"cycle {cycle}: {why}; computing on")
             self._silent.add(kind)

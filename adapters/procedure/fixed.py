@@ -14,11 +14,11 @@ from dataclasses import replace
 import numpy as np
 
 from adapters.errors import EngineFailed, NotConverged, NotCredible
-from adapters.files import Outcome, name_full_disk
+from adapters.files import Outcome, explain_full_disk
 from adapters.jumps import Jumped, find_asked_gain
 from adapters.procedure import stages
 from adapters.procedure.controlled import list_stretches
-from adapters.procedure.seating import SEATING, counted_from, seat, warn_if_hung
+from adapters.procedure.seating import SEATING, find_count_start, seat_piston, warn_if_hung
 from adapters.procedure.stages import Bed, Run
 
 RETRIES = 3
@@ -42,8 +42,8 @@ def settle_fixed(run: Run, bed: Bed) -> Bed:
     for number in range(p.total_cycles):
         if not run.variant.jumps:
             break
-        bed = seat(run, bed, p.carried_cycles + k)
-        shortest = max(p.healing_cycles, 1) if counted_from(run, bed) else min(p.h or (0,))
+        bed = seat_piston(run, bed, p.carried_cycles + k)
+        shortest = max(p.healing_cycles, 1) if find_count_start(run, bed) else min(p.h or (0,))
         longest = p.total_cycles - bed.cycle - p.healing_cycles - k
         h = 0 if run.variant.still else min(p.jump_cycles(number), longest)
         if longest < shortest:
@@ -70,7 +70,7 @@ def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
         why = run.folder.failure(name)
         if not why:
             try:
-                with name_full_disk(run.folder.path):
+                with explain_full_disk(run.folder.path):
                     gain = find_history_gain(run, bed, h)
                     share = 1.0
                     if gain is not None:
@@ -79,7 +79,7 @@ def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
                     new = run.folder.outcome(name) is None
                     moved = stages.jump(run, bed, h, attempt, gain, share)
                     if new and gain and share < 1:
-                        run.progress.say(
+                        run.progress.print_line(
                             f"the jump settles the bed by {1e6 * share * gain:.3g} um where it "
                             f"owes {1e6 * gain:.3g}: no room for more was found, by it or the one "
                             "before"
@@ -91,12 +91,12 @@ def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
                     raise
                 why = str(error)
                 run.folder.give_up(name, why)
-                run.progress.say(f"the jump of {h} cycles from {bed.cycle} failed: {why}")
+                run.progress.print_line(f"the jump of {h} cycles from {bed.cycle} failed: {why}")
         if p.settlement == "law":
             h = h // 2 if h > 1 else h
     failed = f"the jump from cycle {bed.cycle} failed {RETRIES + 1} times, the last time: {why}"
     if run.cycle_by_cycle:
-        run.progress.say(f"{failed}; computing on")
+        run.progress.print_line(f"{failed}; computing on")
         return compute_on(run, bed)
     raise NotCredible(
         failed,
@@ -133,7 +133,7 @@ def find_history_gain(run: Run, bed: Bed, h: int) -> float | None:
     p = run.procedure
     if p.settlement == "law" or h == 0:
         return None
-    hung, outcomes = counted_from(run, bed), run.folder.outcomes()
+    hung, outcomes = find_count_start(run, bed), run.folder.outcomes()
     left_out = max(1, round(SEATING * p.k_i))
     begin = hung + (min(left_out, p.carried_cycles) if hung else left_out)  # k cycles are left
     known = [

@@ -44,7 +44,7 @@ class History:
             raise UsageError(f"there is no row of cycle {cycle}")
         return int(found[0])
 
-    def computed(self, cycle: int) -> int:
+    def count_computed(self, cycle: int) -> int:
         """Cycles computed until ``cycle``: rows that are not jumps."""
         return int(((self.cycle <= cycle) & self.engine_rows).sum())
 
@@ -66,7 +66,7 @@ def sum_cost(cost: Mapping[str, float]) -> float:
     return sum(seconds for purpose, seconds in cost.items() if purpose != "start_up")
 
 
-def history_of(outcomes: Sequence[Outcome], lost: Sequence[tuple[int, float]] = ()) -> History:
+def make_history(outcomes: Sequence[Outcome], lost: Sequence[tuple[int, float]] = ()) -> History:
     """The table of a run from its stages; a window's cost is spread evenly over its cycles.
 
     ``lost``: after which cycle failed attempts lost how much CPU time [s].  The preparation has
@@ -83,7 +83,7 @@ def history_of(outcomes: Sequence[Outcome], lost: Sequence[tuple[int, float]] = 
             cpu.append(spent + failed + cost * number / len(outcome.rows))
         spent += cost
     columns = {
-        column.name: np.array([_number(row.get(column.name)) for row in rows])
+        column.name: np.array([_read_number(row.get(column.name)) for row in rows])
         for column in fields(History)[2:-1]
     }
     return History(
@@ -94,7 +94,7 @@ def history_of(outcomes: Sequence[Outcome], lost: Sequence[tuple[int, float]] = 
     )
 
 
-def _number(value: object) -> float:
+def _read_number(value: object) -> float:
     return float(value) if isinstance(value, int | float) else nan
 
 
@@ -114,7 +114,7 @@ class FailedJump:
     """What it cost and no finished stage bears [s]; see `find_lost_time`."""
 
 
-def failed_jumps(folder: RunFolder) -> tuple[FailedJump, ...]:
+def list_failed_jumps(folder: RunFolder) -> tuple[FailedJump, ...]:
     """The jumps of a run that were given up, in order."""
     events, found = folder.events(), []
     for stage in folder.stage_names():

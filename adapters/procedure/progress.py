@@ -23,12 +23,12 @@ class Progress:
         """Start to count time and cycles again, for another run."""
         self._first = None
 
-    def say(self, text: str) -> None:
+    def print_line(self, text: str) -> None:
         """A line that stays."""
         if not self.quiet:
             print(("\r\x1b[K" if self.terminal else "") + text, file=self.stream, flush=True)
 
-    def cycles(
+    def show_cycles(
         self, *, done: int, total: int, computed: int, settlement: float | None, computed_here: int,
         to_compute: int,
     ) -> None:  # fmt: skip

@@ -18,9 +18,9 @@ from adapters.jumps import Band, estimate_band
 from adapters.procedure.history import (
     FailedJump,
     History,
-    failed_jumps,
-    history_of,
+    list_failed_jumps,
     list_jumped_spans,
+    make_history,
 )
 from adapters.scene import Scene, load_scene
 
@@ -45,7 +45,7 @@ class Track:
     @cached_property
     def history(self) -> History:
         """The table of the run, with the CPU time at each row."""
-        return history_of(self.outcomes, [(j.first_cycle, j.lost_s) for j in self.failed_jumps])
+        return make_history(self.outcomes, [(j.first_cycle, j.lost_s) for j in self.failed_jumps])
 
     @property
     def preparation(self) -> Outcome | None:
@@ -124,7 +124,7 @@ def read_track(folder: RunFolder) -> Track:
         folder=folder,
         outcomes=tuple(outcome for _, outcome in stages),
         names=tuple(stage for stage, _ in stages),
-        failed_jumps=failed_jumps(folder),
+        failed_jumps=list_failed_jumps(folder),
         discarded=tuple(discarded),
         events=tuple(folder.events()),
     )
@@ -143,14 +143,14 @@ def find_comparable_cycle(record: Record) -> int:
     return 0 if spans and cycle <= spans[0][0] else cycle
 
 
-def to_plain(value: Any) -> Any:
+def make_plain(value: Any) -> Any:
     """The same in types that JSON has; None for numbers that are not finite."""
     if isinstance(value, dict):
-        return {key: to_plain(inner) for key, inner in value.items()}
+        return {key: make_plain(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple):
-        return [to_plain(inner) for inner in value]
+        return [make_plain(inner) for inner in value]
     if isinstance(value, np.generic):
-        return to_plain(value.item())
+        return make_plain(value.item())
     return None if isinstance(value, float) and not isfinite(value) else value
 
 

@@ -21,14 +21,14 @@ def find_room(
     `RelaxationNotConverged`.
     """
     try:
-        return *relaxed(scene, before, target, piston_height), piston_height
+        return *relax_target(scene, before, target, piston_height), piston_height
     except NotConverged:
         if not may_wait or piston_height >= before.piston_height:
             raise
     return relax_below(scene, before, target)
 
 
-def relaxed(
+def relax_target(
     scene: Scene, before: State, target: FloatArray, piston_height: float
 ) -> tuple[FloatArray, dict[str, Any]]:
     """Relaxed positions of the ``target`` ones, (n, 3) in metres, and the relaxation's record.
@@ -59,7 +59,7 @@ def relax_below(
 
     Where grains have no room under a piston that went down: the bed settles below one that waits.
     """
-    position, record = relaxed(scene, before, target, before.piston_height)
+    position, record = relax_target(scene, before, target, before.piston_height)
     top = find_top_under(position, before.radius, scene.piston_reach)
     return position, record | {"piston": "on the bed"}, min(top, before.piston_height)
 

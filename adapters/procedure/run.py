@@ -11,10 +11,10 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from adapters.bed import draw_sample_start, sample_radii
-from adapters.engines import find_engine, get_engine, interruptible, list_real_engines
+from adapters.bed import draw_radii, draw_sample_start
+from adapters.engines import allow_interrupts, find_engine, get_engine, list_real_engines
 from adapters.errors import EngineMissing, SceneError, UsageError
-from adapters.files import RunFolder, name_full_disk
+from adapters.files import RunFolder, explain_full_disk
 from adapters.procedure import stages
 from adapters.procedure.controlled import settle_controlled
 from adapters.procedure.fixed import settle_fixed
@@ -60,16 +60,16 @@ def run_scene(
             name = list_real_engines()[0]  # decks can be looked at without it
         overrides = [*overrides, f'engine.name="{name}"']
         scene = load_scene(scene_path, overrides)
-        progress.say(f"engine: {scene.engine.name}")
+        progress.print_line(f"engine: {scene.engine.name}")
     for warning in scene.warnings:
-        progress.say(f"warning: {warning}")
+        progress.print_line(f"warning: {warning}")
     if dry_run:
-        _dry_run(scene, run_path)
+        _write_dry_run(scene, run_path)
         return
     folder = RunFolder(run_path)
-    with interruptible(), name_full_disk(run_path), folder.locked():
-        settle_manifest(folder, scene, scene_path, overrides, control)
-        _run_all(folder, scene, control, folder.asked_on(cycle_by_cycle), progress)
+    with allow_interrupts(), explain_full_disk(run_path), folder.lock():
+        prepare_manifest(folder, scene, scene_path, overrides, control)
+        _run_all(folder, scene, control, folder.keep_cycle_by_cycle(cycle_by_cycle), progress)
 
 
 def resume(
@@ -79,10 +79,10 @@ def resume(
     folder = RunFolder(run_path)
     manifest = folder.manifest()
     scene = load_scene(run_path / "scene.toml", manifest["overrides"])
-    with interruptible(), name_full_disk(run_path), folder.locked():
+    with allow_interrupts(), explain_full_disk(run_path), folder.lock():
         refuse_differences(manifest["scene"], record_scene(scene), run_path)
-        folder.event("resumed")
-        asked = folder.asked_on(cycle_by_cycle)
+        folder.add_event("resumed")
+        asked = folder.keep_cycle_by_cycle(cycle_by_cycle)
         _run_all(folder, scene, manifest["control"], asked, progress or Progress())
 
 
@@ -94,8 +94,8 @@ def _run_all(
         if control:
             run_variant(folder, scene, CONTROL, progress)
     except BaseException as error:
-        with name_full_disk(folder.path):
-            folder.event("stopped", why=str(error) or type(error).__name__)
+        with explain_full_disk(folder.path):
+            folder.add_event("stopped", why=str(error) or type(error).__name__)
         raise
 
 
@@ -108,14 +108,14 @@ def run_variant(
     The control shares the stages before the first jump: the same work would give the same bits.
     """
     engine = get_engine(scene.engine.name)
-    folder.event("engine", name=engine.name, version=engine.version(), variant=variant.name)
+    folder.add_event("engine", name=engine.name, version=engine.version(), variant=variant.name)
     if variant.name == "procedure":
         here = folder
     else:
         here = RunFolder(folder.path / variant.name)
         here.path.mkdir(exist_ok=True)
         here.share_start(folder, count_shared_cycles(folder, scene, variant))
-        progress.say(variant.name.replace("_", " "))
+        progress.print_line(variant.name.replace("_", " "))
     run = Run(scene, here, engine, variant, progress, cycle_by_cycle)
     if variant.name == "procedure":
         run.clock = Clock(0.0)  # it bears the start-up of Python; the others come in its wake
@@ -155,7 +155,7 @@ def record_scene(scene: Scene) -> dict[str, Any]:
     return record
 
 
-def settle_manifest(
+def prepare_manifest(
     folder: RunFolder, scene: Scene, scene_path: Path, overrides: Sequence[str], control: bool
 ) -> None:
     """Write the manifest of a new run, or refuse a folder that holds another scene's run."""
@@ -165,7 +165,7 @@ def settle_manifest(
         refuse_differences(manifest["scene"], record_scene(scene), folder.path)
         if control and not manifest["control"]:
             write_whole(path, json.dumps(manifest | {"control": True}, indent=1) + "\n")
-        folder.event("resumed")
+        folder.add_event("resumed")
         return
     strangers = [p.name for p in folder.path.iterdir() if p.name not in OWN_FILES]
     if strangers:
@@ -187,7 +187,7 @@ def settle_manifest(
         "provenance": record_provenance(sys.argv),
     }
     write_whole(path, json.dumps(manifest, indent=1) + "\n")
-    folder.event("started")
+    folder.add_event("started")
 
 
 def refuse_differences(old: dict[str, Any], new: dict[str, Any], path: Path) -> None:
@@ -200,12 +200,12 @@ def refuse_differences(old: dict[str, Any], new: dict[str, Any], path: Path) -> 
         )
 
 
-def _dry_run(scene: Scene, run_path: Path) -> None:
+def _write_dry_run(scene: Scene, run_path: Path) -> None:
     """Write the decks of the rain of grains and print the command that runs them."""
     engine = get_engine(scene.engine.name)
     folder = run_path / "dry_run"
     folder.mkdir(parents=True, exist_ok=True)
-    radius = sample_radii(scene.sample.grain_radius.law, scene.grain_count, scene.sample.seed)
+    radius = draw_radii(scene.sample.grain_radius.law, scene.grain_count, scene.sample.seed)
     position, height = draw_sample_start(
         radius, scene.container, scene.sample.relative_density_start, scene.sample.seed
     )

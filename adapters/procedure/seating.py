@@ -110,16 +110,16 @@ def find_last_hung_cycle(run: Run, bed: Bed) -> int:
     return int(hung[hung <= bed.cycle].max(initial=0))
 
 
-def counted_from(run: Run, bed: Bed) -> int:
+def find_count_start(run: Run, bed: Bed) -> int:
     """Cycle from which the first k_i count: 0 unless the run waits and its piston hung."""
     return find_last_hung_cycle(run, bed) if run.procedure.seating == "waits" else 0
 
 
-def seat(run: Run, bed: Bed, cycles: int) -> Bed:
+def seat_piston(run: Run, bed: Bed, cycles: int) -> Bed:
     """Windows until the bed has carried its piston for so many ``cycles``, where the run waits."""
     p = run.procedure
-    while (hung := counted_from(run, bed)) and bed.cycle < min(hung + cycles, p.total_cycles):
-        run.progress.say(f"the piston hung on few grains until cycle {hung}: computing on")
+    while (hung := find_count_start(run, bed)) and bed.cycle < min(hung + cycles, p.total_cycles):
+        run.progress.print_line(f"the piston hung on few grains until cycle {hung}: computing on")
         bed = stages.compute(run, bed, min(p.window_cycles, p.total_cycles - bed.cycle))
     return bed
 
@@ -134,14 +134,14 @@ def warn_if_hung(run: Run, bed: Bed) -> None:
         return
     hung = find_last_hung_cycle(run, bed)
     if hung and bed.cycle < hung + p.k_i:
-        run.progress.say(
+        run.progress.print_line(
             f"warning: the piston hung on few grains until cycle {hung}: it gave way by more than "
             f"{HUNG:g} times what a bed of such grains does; a jump from cycle {bed.cycle} cannot "
             'predict when they let it go. procedure.seating = "waits" computes on instead'
         )
 
 
-def spans(cycles: IntArray) -> str:
+def format_spans(cycles: IntArray) -> str:
     """Ascending cycles in words, such as ``1 to 43, 68 to 87``; empty for none."""
     parts = np.split(cycles, np.flatnonzero(np.diff(cycles) > 1) + 1) if len(cycles) else []
     return ", ".join(f"{part[0]} to {part[-1]}" for part in parts)

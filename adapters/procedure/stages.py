@@ -18,14 +18,14 @@ from adapters.bed import (
     SURFACE_SHARE,
     FloatArray,
     State,
-    bed_measure,
+    draw_radii,
     draw_sample_start,
+    find_pairs,
     load_state,
+    measure_bed,
     measure_bed_height,
+    measure_relative_density,
     measure_sample,
-    neighbours,
-    relative_density,
-    sample_radii,
     save_state,
 )
 from adapters.engines import Engine, EngineRun, EngineStart
@@ -68,7 +68,7 @@ class Clock:
         self._parts: dict[str, float] = {}
 
     @contextmanager
-    def part(self, name: str) -> Iterator[None]:
+    def time_part(self, name: str) -> Iterator[None]:
         """Count the CPU time of a block under ``name`` [s]."""
         start = time.process_time()
         try:
@@ -76,7 +76,7 @@ class Clock:
         finally:
             self._parts[name] = self._parts.get(name, 0.0) + time.process_time() - start
 
-    def lap(self, engine_s: float = 0.0, start_up_s: float = 0.0) -> dict[str, float]:
+    def end_lap(self, engine_s: float = 0.0, start_up_s: float = 0.0) -> dict[str, float]:
         """Costs since the last lap [s], the engine's and its start-up's among them."""
         now = time.process_time()
         other = now - self._start - sum(self._parts.values())
@@ -130,15 +130,15 @@ def prepare(run: Run) -> Bed:
     scene, name = run.scene, "preparation"
     if run.folder.outcome(name) is None:
         sample = scene.sample
-        run.progress.say(f"rain of {scene.grain_count} grains")
-        radius = sample_radii(sample.grain_radius.law, scene.grain_count, sample.seed)
+        run.progress.print_line(f"rain of {scene.grain_count} grains")
+        radius = draw_radii(sample.grain_radius.law, scene.grain_count, sample.seed)
         position, height = draw_sample_start(
             radius, scene.container, sample.relative_density_start, sample.seed
         )
         folder = _begin(run, name)
         decks = run.engine.write_preparation(scene, position, radius, height, folder)
         done = run.engine.run(scene, "in.prepare", folder, lambda: None, decks)
-        with run.clock.part("parse"):
+        with run.clock.time_part("parse"):
             state = read_state(folder, run.engine.wall_names(scene, piston=False))
             checks.check_state(scene, state)
             save_state(state, folder / "state.npz")
@@ -148,9 +148,9 @@ def prepare(run: Run) -> Bed:
             "density_height": SURFACE_SHARE * bed,
             "mean_height": float(state.position[:, 2].mean()),
             "time_step": state.time_step,
-            **_run_notes(done),
+            **_make_run_notes(done),
         }
-        cost = run.clock.lap(done.cpu_s, done.start_up_s)
+        cost = run.clock.end_lap(done.cpu_s, done.start_up_s)
         _finish(run, folder, Outcome(name, 0, 0, [], cost, notes=notes))
     state = load_state(run.folder.path / name / "state.npz")
     top = find_top_under(state.position, state.radius, scene.piston_reach)
@@ -166,7 +166,7 @@ def compute(run: Run, bed: Bed, cycles: int, healing: int = 0) -> Bed:
         folder = _begin(run, name)
         decks = run.engine.write_cycles(run.scene, bed.start, cycles, folder)
         done = run.engine.run(run.scene, "in.cycles", folder, _watch(run, bed, folder), decks)
-        with run.clock.part("parse"):
+        with run.clock.time_part("parse"):
             window = read_window(
                 folder,
                 bed.cycle,
@@ -177,14 +177,14 @@ def compute(run: Run, bed: Bed, cycles: int, healing: int = 0) -> Bed:
             save_window(window, folder / "states.npz")
             for text in ("states.dump", "contacts.dump"):
                 (folder / text).unlink()
-            rows = settlement_rows(run, window, healing)
+            rows = make_settlement_rows(run, window, healing)
         notes = {
             "time_step": int(window.time_step[-1]),
             "piston_mesh": bed.start.piston_mesh,
             "piston_height": float(window.piston.height[-1]),
-            **_run_notes(done),
+            **_make_run_notes(done),
         }
-        cost = run.clock.lap(done.cpu_s, done.start_up_s)
+        cost = run.clock.end_lap(done.cpu_s, done.start_up_s)
         run.computed_here += cycles
         outcome = Outcome(
             "window", bed.cycle, bed.cycle + cycles, rows, cost, checks=figures, notes=notes
@@ -211,7 +211,7 @@ def jump(
     folder = run.folder.path / name
     if run.folder.outcome(name) is None:
         folder = _begin(run, name)
-        with run.clock.part("parse"):
+        with run.clock.time_part("parse"):
             window = load_window(run.folder.path / bed.window / "states.npz")
         before, target, piston_height = estimate(run, window, bed.healing, h)
         if gain is None:
@@ -221,24 +221,24 @@ def jump(
             target, piston_height = settle_by(gain, before, target)
             target = before.position + share * (target - before.position)
             piston_height = before.piston_height + share * (piston_height - before.piston_height)
-        with run.clock.part("relax"):
+        with run.clock.time_part("relax"):
             position, record, piston_height = find_room(
                 run.scene, before, target, piston_height, may_wait=gain is not None
             )
-        after = before.moved(
+        after = before.move_to(
             position,
             velocity=np.zeros_like(target),
             spin=np.zeros_like(target),
             piston_height=piston_height,
             cycle=bed.cycle + h,
         )
-        save_state(before.moved(target), folder / "estimated.npz")
+        save_state(before.move_to(target), folder / "estimated.npz")
         save_state(after, folder / "relaxed.npz")
         notes = {"h": h, "attempt": attempt, "relaxation": record}
         if gain is not None:
             notes |= {"gain": share * gain, "asked": gain}
-        rows = [_row(run, after, "jumped")] if h else []
-        cost = run.clock.lap()
+        rows = [_make_row(run, after, "jumped")] if h else []
+        cost = run.clock.end_lap()
         folder = _finish(
             run, folder, Outcome("jump", bed.cycle, bed.cycle + h, rows, cost, notes=notes)
         )
@@ -261,7 +261,7 @@ def estimate(run: Run, window: Window, healing: int, h: int) -> tuple[State, Flo
     never placed above where it is.
     """
     procedure = run.procedure
-    with run.clock.part("fit"):
+    with run.clock.time_part("fit"):
         law, move = get_law(procedure.law), get_move(procedure.move)
         cycle = window.cycle[healing:].astype(float)
         position, container = window.position[healing:], run.scene.container
@@ -291,32 +291,32 @@ def settle_by(gain: float, before: State, target: FloatArray) -> tuple[FloatArra
     return target, before.piston_height - max(gain, 0.0) * above / mean
 
 
-def settlement_rows(run: Run, window: Window, healing: int) -> list[dict[str, Any]]:
+def make_settlement_rows(run: Run, window: Window, healing: int) -> list[dict[str, Any]]:
     """One row of ``settlement.csv`` for each cycle of a window."""
     steps = run.scene.steps_per_cycle
     errors = window.piston.force_error(steps)
     deflections = window.piston.elastic_deflection(steps)
     rows = []
     for c in range(1, len(window) + 1):
-        row = _row(run, window.state(c), "healing" if c <= healing else "computed")
+        row = _make_row(run, window.state(c), "healing" if c <= healing else "computed")
         row["elastic_deflection"] = float(deflections[c - 1])
         row["force_error"] = float(errors[c - 1])
         rows.append(row)
     return rows
 
 
-def _row(run: Run, state: State, kind: str) -> dict[str, Any]:
+def _make_row(run: Run, state: State, kind: str) -> dict[str, Any]:
     preparation = run.outcome("preparation")
     container = run.scene.container
     walls = container.walls(state.piston_height, run.scene.piston_reach)
-    bed = bed_measure(state.position, neighbours(state.position, state.radius, walls))
+    bed = measure_bed(state.position, find_pairs(state.position, state.radius, walls))
     inertia = 0.4 * state.mass * state.radius**2
     return {
         "cycle": state.cycle,
         "settlement": preparation.notes["mean_height"] - float(state.position[:, 2].mean()),
         "kind": kind,
         "coordination_number": bed.coordination_number,
-        "relative_density": relative_density(
+        "relative_density": measure_relative_density(
             state.position, state.radius, container, preparation.notes["density_height"]
         ),
         "piston_height": state.piston_height,
@@ -326,24 +326,26 @@ def _row(run: Run, state: State, kind: str) -> dict[str, Any]:
     }
 
 
-def _run_notes(done: EngineRun) -> dict[str, Any]:
+def _make_run_notes(done: EngineRun) -> dict[str, Any]:
     return {"command": done.command, "wall_s": done.wall_s, "decks": done.decks}
 
 
 def _begin(run: Run, name: str) -> Path:
     if (run.folder.path / name).exists():
-        run.progress.say(f"{name} is damaged: it is computed again, the old is in discarded/")
+        run.progress.print_line(
+            f"{name} is damaged: it is computed again, the old is in discarded/"
+        )
     return run.folder.begin(name)
 
 
 def _finish(run: Run, folder: Path, outcome: Outcome) -> Path:
     place = run.folder.finish(folder, outcome)
-    run.folder.event(
+    run.folder.add_event(
         "finished", stage=folder.name, cycles=[outcome.first_cycle, outcome.last_cycle]
     )
     if outcome.rows:
         row = outcome.rows[-1]
-        run.progress.say(
+        run.progress.print_line(
             f"{folder.name}: cycle {row['cycle']}, settlement {1e6 * row['settlement']:.2f} um"
         )
     return place
@@ -359,7 +361,7 @@ def _watch(run: Run, bed: Bed, folder: Path) -> Callable[[], None]:
 
     def watch() -> None:
         here = run.engine.cycles_done(run.scene, bed.start, folder)
-        run.progress.cycles(
+        run.progress.show_cycles(
             done=bed.cycle + here,
             total=procedure.total_cycles,
             computed=computed + here,

@@ -49,7 +49,7 @@ class Status:
     """The command that goes on from here."""
 
 
-def status(run_folder: Path) -> Status:
+def read_status(run_folder: Path) -> Status:
     """How far the run in ``run_folder`` is; raises `UsageError` when it is no run folder."""
     return judge_progress(read_run_record(run_folder))
 
@@ -58,7 +58,7 @@ def judge_progress(record: Record) -> Status:
     """How far a run is."""
     run_folder, history = record.path, record.run.history
     cycle = int(history.cycle[-1]) if len(history.cycle) else 0
-    computed = history.computed(cycle)
+    computed = history.count_computed(cycle)
     state = "running" if is_written(run_folder, "lock") else "stopped"
     if state == "stopped" and _is_finished(record):
         state = "finished"
@@ -82,7 +82,7 @@ def judge_progress(record: Record) -> Status:
         speed_up_so_far=ratio if isfinite(ratio) else None,
         cpu_s=sum(sum_cost(outcome.cost) for outcome in record.run.outcomes),
         band_m=None if band is None else (band.low, band.high),
-        control_cycle=_cycle(record.control) if record.control is not None else None,
+        control_cycle=_find_last_cycle(record.control) if record.control is not None else None,
         next=f"trackbed {verb} {shlex.quote(str(run_folder))}",
     )
 
@@ -93,12 +93,12 @@ def describe_result(record: Record) -> list[str]:
     if not len(history.cycle):
         return []
     cycle, settled = int(history.cycle[-1]), float(history.settlement[-1])
-    computed = history.computed(cycle)
+    computed = history.count_computed(cycle)
     how = "all of them" if computed == cycle else f"{computed} of them"
-    said = [f"The bed settled {_millimetres(settled)} in {cycle} cycles, {how} computed."]
+    said = [f"The bed settled {_format_millimetres(settled)} in {cycle} cycles, {how} computed."]
     band = estimate_band_of_run(record.run)
     if band is not None:
-        ends = f"{_millimetres(band.low)} to {_millimetres(band.high)}"
+        ends = f"{_format_millimetres(band.low)} to {_format_millimetres(band.high)}"
         said.append(f"With probability {BAND_PROBABILITY:g} a full run settles {ends}.")
     at = find_comparable_cycle(record)
     if record.control is not None and at and record.run.jumps:
@@ -111,9 +111,9 @@ def compare_with_full(own: History, full: History, cycle: int) -> str:
     mine, truth = own.row(cycle), full.row(cycle)
     settled, of_full = float(own.settlement[mine]), float(full.settlement[truth])
     error = 100 * (settled - of_full) / abs(of_full) if of_full else nan
-    said = f"The full run beside it settled {_millimetres(of_full)}"
+    said = f"The full run beside it settled {_format_millimetres(of_full)}"
     if cycle != own.cycle[-1]:
-        said += f" in {cycle} cycles, this one {_millimetres(settled)}"
+        said += f" in {cycle} cycles, this one {_format_millimetres(settled)}"
     if isfinite(error):
         off = f"{abs(error):.0f} % {'short' if error < 0 else 'over'}"
         said += f": the jumps are {off if abs(error) >= 0.5 else 'within 0.5 %'}"
@@ -124,11 +124,11 @@ def compare_with_full(own: History, full: History, cycle: int) -> str:
     return said + "."
 
 
-def _millimetres(length: float) -> str:
+def _format_millimetres(length: float) -> str:
     return f"{1e3 * length:#.3g} mm"
 
 
-def _cycle(track: Track) -> int:
+def _find_last_cycle(track: Track) -> int:
     return int(track.history.cycle[-1])
 
 
@@ -139,6 +139,6 @@ def _is_finished(record: Record) -> bool:
     tracks = [record.run, record.control] if record.manifest.get("control") else [record.run]
     total = record.scene.procedure.total_cycles
     return all(
-        track is not None and len(track.history.cycle) > 0 and _cycle(track) == total
+        track is not None and len(track.history.cycle) > 0 and _find_last_cycle(track) == total
         for track in tracks
     )

@@ -18,14 +18,14 @@ from adapters.bed import (
     Neighbours,
     State,
     Walls,
-    bed_measure,
     check_bed,
     find_behind_discs,
+    find_normal_force,
+    find_overlap_under_force,
+    find_pairs,
+    list_wall_names,
+    measure_bed,
     measure_rows,
-    neighbours,
-    normal_force,
-    overlap_under_force,
-    wall_names,
 )
 from adapters.errors import NotConverged, UsageError
 
@@ -47,9 +47,9 @@ class Surroundings:
 
     def search(self, position: FloatArray, gap: float) -> Neighbours:
         """All rows nearer than ``gap`` [m] at ``position`` [m], (n, 3)."""
-        return neighbours(position, self.radius, self.walls, gap, self.behind)
+        return find_pairs(position, self.radius, self.walls, gap, self.behind)
 
-    def taken(self, order: IntArray) -> Surroundings:
+    def reorder(self, order: IntArray) -> Surroundings:
         """The same with the grains in another order."""
         return Surroundings(self.radius[order], self.walls, self.behind[order], self.stiffness)
 
@@ -68,7 +68,7 @@ class Surroundings:
             pair, self.stiffness.grain, modulus_of_wall[np.where(pair, 0, -1 - rows.second)]
         )
         radius = 1 / (1 / self.radius[rows.first] + 1 / other)
-        return np.asarray(normal_force(1.0, 1.0, radius) * modulus)
+        return np.asarray(find_normal_force(1.0, 1.0, radius) * modulus)
 
 
 @dataclass(frozen=True)
@@ -137,10 +137,10 @@ class Estimated:
     def length(self) -> float:
         """Overlap of two mean grains under the mean weight [m]."""
         stiffness, radius = self.scene.stiffness.grain, self.scene.radius.mean()
-        return float(overlap_under_force(self.mean_weight, stiffness, radius / 2))
+        return float(find_overlap_under_force(self.mean_weight, stiffness, radius / 2))
 
 
-def estimated(
+def make_estimate(
     position: FloatArray, before: State, walls: Walls, walls_after: Walls | None,
     stiffness: HertzStiffness,
 ) -> Estimated:  # fmt: skip
@@ -149,9 +149,9 @@ def estimated(
     radius = np.ascontiguousarray(before.radius, float)
     after = walls if walls_after is None else walls_after
     check_bed(position, radius)
-    if wall_names(after) != wall_names(walls):
+    if list_wall_names(after) != list_wall_names(walls):
         raise UsageError(
-            f"the walls before, {wall_names(walls)}, are not those after, {wall_names(after)}",
+            f"walls before, {list_wall_names(walls)}, are not {list_wall_names(after)} after",
             remedy="the same walls belong to both; a piston may only move",
         )
     if not len(radius):
@@ -174,9 +174,9 @@ def measure_relaxation(
         position=relaxed,
         method=method,
         converged=converged,
-        before=bed_measure(before.position, bed.carried),
-        estimated=bed_measure(bed.position, scene.search(bed.position, 0.0)),
-        relaxed=bed_measure(relaxed, scene.search(relaxed, 0.0)),
+        before=measure_bed(before.position, bed.carried),
+        estimated=measure_bed(bed.position, scene.search(bed.position, 0.0)),
+        relaxed=measure_bed(relaxed, scene.search(relaxed, 0.0)),
         evaluations=evaluations,
         cpu_s=time.process_time() - started,
         largest_move=float(move.max()),

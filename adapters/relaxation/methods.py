@@ -30,9 +30,9 @@ from adapters.bed import (
     State,
     Walls,
     check_bed,
+    find_overlap_under_force,
+    list_wall_names,
     list_wall_rows,
-    overlap_under_force,
-    wall_names,
 )
 from adapters.errors import UsageError
 from adapters.relaxation.measured import (
@@ -40,7 +40,7 @@ from adapters.relaxation.measured import (
     Relaxation,
     RelaxationNotConverged,
     Surroundings,
-    estimated,
+    make_estimate,
     measure_relaxation,
 )
 from adapters.relaxation.printed import minimise_energy
@@ -78,7 +78,7 @@ def relax(
     a bed that friction holds: it flows, or loses its contacts.
     """
     started = time.process_time()
-    bed = estimated(position, before, walls, walls_after, stiffness)
+    bed = make_estimate(position, before, walls, walls_after, stiffness)
     if method not in METHODS:
         raise UsageError(
             f"there is no relaxation '{method}'{explain_retired(method, RETIRED)}",
@@ -136,7 +136,7 @@ def bound_equilibrium_overlap(state: State, stiffness: HertzStiffness, load: flo
     top, bottom = state.position[:, 2] + state.radius, state.position[:, 2] - state.radius
     layer = len(state.radius) * 2 * state.radius.mean() / float(top.max() - bottom.min())
     force = (GRAVITY * state.mass.sum() + load) * min(1.0, CHAIN_FACTOR / layer)
-    return float(overlap_under_force(force, stiffness.grain, state.radius.min() / 2))
+    return float(find_overlap_under_force(force, stiffness.grain, state.radius.min() / 2))
 
 
 def relax_by_move(
@@ -148,12 +148,12 @@ def relax_by_move(
     scale = float(carried.mean()) if len(carried) else bed.length
     position_before = bed.before.position
     order = sort_in_space(position_before, bed.scene.radius)
-    before, after = bed.scene_before.taken(order), bed.scene.taken(order)
+    before, after = bed.scene_before.reorder(order), bed.scene.reorder(order)
     network = before.search(position_before[order], GAP_FACTOR * scale)
     estimate = bed.position[order]
     moved, converged, evaluations = find_smallest_move(
         estimate,
-        _inside(after, estimate),
+        _bring_inside(after, estimate),
         after,
         network,
         overlap_cap,
@@ -175,10 +175,10 @@ def sort_in_space(position: FloatArray, radius: FloatArray) -> IntArray:
     return np.lexsort((position[:, 0], cell[:, 0], cell[:, 1], cell[:, 2]))
 
 
-def _inside(scene: Surroundings, position: FloatArray) -> FloatArray:
+def _bring_inside(scene: Surroundings, position: FloatArray) -> FloatArray:
     """Positions [m] where grains with their centre beyond a wall are brought to touch it."""
     start = position.copy()
-    for wall in range(len(wall_names(scene.walls))):
+    for wall in range(len(list_wall_names(scene.walls))):
         rows = scene.rows(
             start, *list_wall_rows(start, scene.radius, scene.walls, scene.behind, 0.0)
         )

@@ -60,13 +60,13 @@ def minimise_energy(
     energy, start, length = Energy(bed), bed.position, bed.length
     position = start.copy()
 
-    def value(moves: FloatArray) -> tuple[float, FloatArray]:
+    def evaluate(moves: FloatArray) -> tuple[float, FloatArray]:
         position[free] = start[free] + length * moves.reshape(-1, 3)
         total, gradient = energy(position)
         return total / (force * length), gradient[free].ravel() / force
 
     found = minimize(
-        value,
+        evaluate,
         np.zeros(3 * int(free.sum())),
         jac=True,
         method="L-BFGS-B",
@@ -78,5 +78,5 @@ def minimise_energy(
             "gtol": 1.0,
         },
     )
-    value(found.x)
+    evaluate(found.x)
     return position, bool(np.abs(found.jac).max(initial=0.0) <= 1.0), energy.evaluations

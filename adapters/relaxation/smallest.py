@@ -110,7 +110,7 @@ def find_smallest_move(
         if iteration >= NEAREST_ITERATIONS:
             anchor, products_max = x, PRODUCTS_FIT
             if iteration >= OPEN_ITERATIONS:
-                _open(rows, excess, tolerance)
+                _release(rows, excess, tolerance)
             rows.multiplier[:] = 0.0
         # x = anchor - J^T mu in delta(x_k) + J (x - x_k) = target, the slack's share put back
         right = np.empty(len(rows.key) + 1)
@@ -141,7 +141,7 @@ def find_smallest_move(
     return x, False, evaluations
 
 
-def _key(first: IntArray, second: IntArray, n: int) -> IntArray:
+def _make_key(first: IntArray, second: IntArray, n: int) -> IntArray:
     """One number for each row of n grains, the same wherever the row is listed."""
     return (first << 32) + np.where(second >= 0, second, n - 1 - second)
 
@@ -149,7 +149,7 @@ def _key(first: IntArray, second: IntArray, n: int) -> IntArray:
 def start_rows(network: Neighbours, overlap_cap: float, bound: float, n: int) -> _Rows:
     """Members of the network, and its pairs above the cap with a bound instead."""
     member = network.overlap <= overlap_cap
-    key = _key(network.first, network.second, n)
+    key = _make_key(network.first, network.second, n)
     order = np.argsort(key)
     return _Rows(
         key[order],
@@ -163,7 +163,7 @@ def start_rows(network: Neighbours, overlap_cap: float, bound: float, n: int) ->
 
 def renew_rows(rows: _Rows, near: Neighbours, gap: float, n: int) -> _Rows:
     """Rows nearby, and those of ``rows`` whose target is not that of any pair."""
-    key = _key(near.first, near.second, n)
+    key = _make_key(near.first, near.second, n)
     own = rows.member | (rows.target != -gap)
     extra = own & ~np.isin(rows.key, key)
     key = np.concatenate([key, rows.key[extra]])
@@ -201,7 +201,7 @@ def _swap(rows: _Rows, gap: float) -> int:
     return swapped
 
 
-def _open(rows: _Rows, excess: FloatArray, tolerance: float) -> None:
+def _release(rows: _Rows, excess: FloatArray, tolerance: float) -> None:
     """Let go of the widest open members of the network; their overlap stays an upper bound."""
     gaping = np.flatnonzero(rows.member & (excess < -tolerance) & (rows.multiplier[:-1] < 0))
     count = int(np.ceil(OPEN_SHARE * len(gaping)))

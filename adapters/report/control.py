@@ -6,7 +6,14 @@ from html import escape
 
 from adapters.jumps import BAND_PROBABILITY
 from adapters.procedure import Record, estimate_band_of_run, list_checks, list_decisions
-from trackbed.report import micrometres, paragraph, per_cent, plain, section, table
+from trackbed.report import (
+    format_number,
+    format_share,
+    format_um,
+    make_paragraph,
+    make_section,
+    make_table,
+)
 
 HEADER = (
     "cycle", "", "<i>k</i>", "<i>h</i>", "gain expected (µm)", "moved by (µm)", "half-width (µm)",
@@ -15,7 +22,7 @@ HEADER = (
 """Columns of the table of decisions."""
 
 
-def control(record: Record) -> str:
+def describe_control(record: Record) -> str:
     """Decisions and checks of a controlled run; empty for another."""
     procedure, track = record.scene.procedure, record.run
     band = estimate_band_of_run(track)
@@ -27,54 +34,54 @@ def control(record: Record) -> str:
         lengths = [""] * 4
         if decision["jump"]:
             moved = "moved" if "moved" in decision else "gain"  # older runs have one for both
-            lengths = [plain(decision["jump"], "d")]
-            lengths += [micrometres(decision[name]) for name in ("gain", moved, "half_width")]
+            lengths = [format_number(decision["jump"], "d")]
+            lengths += [format_um(decision[name]) for name in ("gain", moved, "half_width")]
         came = [""] * 3
         check = checks.get((decision["cycle"], decision["attempt"]))
         if check and decision["action"] == "jump":
-            came = [per_cent(check["error"], "+.2f"), plain(check["deviation"], "+.1f")]
+            came = [format_share(check["error"], "+.2f"), format_number(check["deviation"], "+.1f")]
             came.append("kept" if check["accepted"] else "taken back")
         finite = [(name, h) for name, h in decision["limits"] if h is not None]
         others = ", ".join(f"{name} {h:.0f}" for name, h in finite if h < 1e6)
         rows.append(
             (
-                plain(decision["cycle"], "d"),
+                format_number(decision["cycle"], "d"),
                 escape(decision["action"]),
-                plain(decision["window"], "d"),
+                format_number(decision["window"], "d"),
                 *lengths,
                 *came,
                 escape(decision["why"]) + (f" ({escape(others)})" if others else ""),
             )
         )
-    definition = paragraph(
-        f"Tolerance: {per_cent(procedure.tolerance)}, on the error of the settlement gained from "
-        "the start of a jump to the end of its healing cycles, over the total settlement since "
-        "the preparation. The realised error compares that gain with the rates computed on both "
-        "sides of the jump; above twice the tolerance the jump is taken back. Jumps taken back: "
+    definition = make_paragraph(
+        f"Tolerance: {format_share(procedure.tolerance)}, on the error of the settlement gained "
+        "from the start of a jump to the end of its healing cycles, over the total settlement "
+        "since the preparation. The realised error compares that gain with the rates computed on "
+        "both sides of the jump; above twice the tolerance it is taken back. Jumps taken back: "
         f"{sum(not check['accepted'] for check in checks.values())}."
     )
     kept = [check for check in checks.values() if check["accepted"] and "kappa" in check]
     if kept:  # older runs have no kappa
-        definition += paragraph(
+        definition += make_paragraph(
             f"Behind its {len(kept)} jumps the bed settled by "
-            f"{micrometres(sum(check['reseated'] for check in kept))} µm more because it was moved "
+            f"{format_um(sum(check['reseated'] for check in kept))} µm more because it was moved "
             f"(in the n-th cycle {kept[-1]['kappa']:.3f} / n of what it was moved by)."
         )
-    ends = f"{micrometres(band.low)} to {micrometres(band.high)} µm"
-    mean = f"{micrometres(band.mean_low)} to {micrometres(band.mean_high)} µm"
-    return section(
+    ends = f"{format_um(band.low)} to {format_um(band.high)} µm"
+    mean = f"{format_um(band.mean_low)} to {format_um(band.mean_high)} µm"
+    return make_section(
         "Jump control",
         definition,
-        paragraph(
-            f"At cycle {band.cycle} the bed has settled by {micrometres(band.settlement)} µm; with "
-            f"the errors observed behind its jumps taken out, {micrometres(band.corrected)} µm. "
+        make_paragraph(
+            f"At cycle {band.cycle} the bed has settled by {format_um(band.settlement)} µm; with "
+            f"the errors observed behind its jumps taken out, {format_um(band.corrected)} µm. "
             f"With probability {BAND_PROBABILITY:g} a full run from the same state ends within "
             f"{ends}, the mean of many within {mean}. Standard deviations: "
-            f"{micrometres(band.jumps)} µm from the noise of the computed rates, "
-            f"{micrometres(band.laws)} µm from the form of the law, {micrometres(band.scatter)} µm "
+            f"{format_um(band.jumps)} µm from the noise of the computed rates, "
+            f"{format_um(band.laws)} µm from the form of the law, {format_um(band.scatter)} µm "
             "from the bursts of the other run."
         ),
-        table(
+        make_table(
             "Every decision. <i>k</i>: cycles computed next. <i>Moved by</i>: the gain expected "
             "less what the bed is ahead of its own rates by, and what it will settle more because "
             "it was moved. The last column names the rule that set <i>h</i>, and the longest jump "

@@ -25,12 +25,12 @@ HEIGHT_BAR = 0.05
 """Greatest change of the mean height by a relaxation over the jump's own settlement."""
 
 
-def relative_error(value: float, reference: float) -> float:
+def find_relative_error(value: float, reference: float) -> float:
     """(value - reference) / |reference|; nan when the reference is zero or unknown."""
     return (value - reference) / abs(reference) if reference else nan
 
 
-def speed_up(full_s: float, procedure_s: float) -> float:
+def find_speed_up(full_s: float, procedure_s: float) -> float:
     """S = T_full / T_procedure."""
     return full_s / procedure_s if procedure_s > 0 else nan
 
@@ -64,7 +64,7 @@ class Comparison:
     speed_up_with_preparation: float = nan
 
 
-def comparison(
+def compare_runs(
     name: str, own: History, own_cycle: int, full: History, full_cycle: int, preparation_s: float,
     beds: tuple[FloatArray | None, FloatArray, FloatArray] | None = None,
 ) -> Comparison:  # fmt: skip
@@ -90,18 +90,18 @@ def comparison(
             displacement = measure_displacement_error(before_jump, in_full, in_own)
     return Comparison(
         name=name,
-        computed=own.computed(own_cycle),
+        computed=own.count_computed(own_cycle),
         settlement=float(own.settlement[mine]),
-        settlement_error=relative_error(own.settlement[mine], full.settlement[truth]),
+        settlement_error=find_relative_error(own.settlement[mine], full.settlement[truth]),
         coordination_number=coordination[0],
-        coordination_number_error=relative_error(*coordination),
+        coordination_number_error=find_relative_error(*coordination),
         elastic_deflection=deflection[0],
-        elastic_deflection_error=relative_error(*deflection),
+        elastic_deflection_error=find_relative_error(*deflection),
         jump_displacement_error=displacement,
         coordinates_error=coordinates,
         cpu_s=cost,
-        speed_up=speed_up(full_cost, cost),
-        speed_up_with_preparation=speed_up(full_cost + preparation_s, cost + preparation_s),
+        speed_up=find_speed_up(full_cost, cost),
+        speed_up_with_preparation=find_speed_up(full_cost + preparation_s, cost + preparation_s),
     )
 
 
@@ -153,7 +153,7 @@ def measure_jump(stage: str, jump: Outcome, own: History, full: History | None) 
         heights = {when: record[when]["mean_height"] for when in ("before", "estimated", "relaxed")}
         estimated = heights["before"] - heights["estimated"]
         change = heights["estimated"] - heights["relaxed"]
-        coordination = relative_error(
+        coordination = find_relative_error(
             record["relaxed"]["coordination_number"], record["before"]["coordination_number"]
         )
         height = abs(change) / abs(estimated) if estimated else nan
@@ -161,15 +161,17 @@ def measure_jump(stage: str, jump: Outcome, own: History, full: History | None) 
     for cycle, kind in zip(own.cycle, own.kind, strict=True):
         if kind == "healing" and cycle == healed + 1:
             healed = int(cycle)
-    truth = _settled(full, jump.first_cycle, jump.last_cycle)
-    healing = _settled(own, jump.last_cycle, healed) - _settled(full, jump.last_cycle, healed)
+    truth = _measure_settlement(full, jump.first_cycle, jump.last_cycle)
+    healing = _measure_settlement(own, jump.last_cycle, healed) - _measure_settlement(
+        full, jump.last_cycle, healed
+    )
     return JumpFigures(
         stage, jump.first_cycle, jump.last_cycle, estimated, truth, estimated - truth, change,
         healing, coordination, height,
     )  # fmt: skip
 
 
-def _settled(history: History | None, first: int, last: int) -> float:
+def _measure_settlement(history: History | None, first: int, last: int) -> float:
     """Settlement between two cycles [m]; nan unless the table has both."""
     if history is None or not {first, last} <= {0, *history.cycle.tolist()}:
         return nan

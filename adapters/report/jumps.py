@@ -4,10 +4,17 @@ from __future__ import annotations
 
 from math import isnan
 
-from adapters.procedure import HUNG, Record, find_hung_cycles, spans
+from adapters.procedure import HUNG, Record, find_hung_cycles, format_spans
 from adapters.report.error import COORDINATION_BAR, HEIGHT_BAR
 from adapters.report.numbers import Numbers
-from trackbed.report import micrometres, paragraph, per_cent, section, table, verdict
+from trackbed.report import (
+    format_share,
+    format_um,
+    format_verdict,
+    make_paragraph,
+    make_section,
+    make_table,
+)
 
 HEADER = (
     "cycles jumped", "settlement by the law", "full run, same cycles", "law", "relaxation",
@@ -19,23 +26,27 @@ HEADER = (
 def describe_jumps(record: Record, numbers: Numbers) -> str:
     """What each step of a jump adds to the error, and what the bed made of it."""
     if not numbers.jumps:
-        return section("Jumps and relaxation", paragraph("No jump was made."), hung(record))
+        return make_section(
+            "Jumps and relaxation",
+            make_paragraph("No jump was made."),
+            describe_hung_cycles(record),
+        )
     rows = [
         (
             f"{jump.first_cycle} → {jump.last_cycle}",
-            micrometres(jump.estimated),
-            micrometres(jump.truth),
-            micrometres(jump.law_error, "+.1f"),
-            micrometres(jump.relaxation_change, "+.3f"),
-            micrometres(jump.healing_error, "+.1f"),
-            show_judged(jump.coordination_change, "+.2f", COORDINATION_BAR),
-            show_judged(jump.height_change, ".2f", HEIGHT_BAR),
+            format_um(jump.estimated),
+            format_um(jump.truth),
+            format_um(jump.law_error, "+.1f"),
+            format_um(jump.relaxation_change, "+.3f"),
+            format_um(jump.healing_error, "+.1f"),
+            show_with_verdict(jump.coordination_change, "+.2f", COORDINATION_BAR),
+            show_with_verdict(jump.height_change, ".2f", HEIGHT_BAR),
         )
         for jump in numbers.jumps
     ]
-    return section(
+    return make_section(
         "Jumps and relaxation",
-        table(
+        make_table(
             "What each step of a jump adds to the error of the settlement (µm, positive: too "
             "much). The full run is no twin of this one after the first jump: where the beds have "
             "parted, its increment is another bed's. Bars: coordination number, walls counted, "
@@ -44,17 +55,21 @@ def describe_jumps(record: Record, numbers: Numbers) -> str:
             HEADER,
             rows,
         ),
-        owed(record),
-        hung(record),
+        describe_shortfall(record),
+        describe_hung_cycles(record),
     )
 
 
-def show_judged(share: float, form: str, bar: float) -> str:
+def show_with_verdict(share: float, form: str, bar: float) -> str:
     """A share in per cent, and whether it meets its bar."""
-    return per_cent(share, form) + " " + verdict(None if isnan(share) else abs(share) <= bar)
+    return (
+        format_share(share, form)
+        + " "
+        + format_verdict(None if isnan(share) else abs(share) <= bar)
+    )
 
 
-def hung(record: Record) -> str:
+def describe_hung_cycles(record: Record) -> str:
     """In which cycles the piston hung on few grains, and whether jumps were made then."""
     procedure = record.scene.procedure
     if procedure is None or record.scene.loading is None:
@@ -74,21 +89,21 @@ def hung(record: Record) -> str:
         if early
         else f"No jump was made {behind}."
     )
-    return paragraph(
-        f"<strong>The piston hung on few grains in cycles {spans(cycles)}:</strong> it gave way by "
-        f"more than {HUNG:g} times what the mean field of Walton (1987) gives a bed of such "
-        f"grains. {advice}"
+    return make_paragraph(
+        f"<strong>The piston hung on few grains in cycles {format_spans(cycles)}:</strong> it gave "
+        f"way by more than {HUNG:g} times what the mean field of Walton (1987) gives a bed of "
+        f"such grains. {advice}"
     )
 
 
-def owed(record: Record) -> str:
+def describe_shortfall(record: Record) -> str:
     """What jumps by history asked for and the bed did not settle by, where anything is left."""
     notes = [jump.notes for _, jump in record.run.jumps if "asked" in jump.notes]
     left = notes[-1]["asked"] - notes[-1]["gain"] if notes else 0.0
     if left == 0:
         return ""
-    return paragraph(
-        f"<strong>The bed has settled {micrometres(left)} µm less than its jumps were to move it:"
+    return make_paragraph(
+        f"<strong>The bed has settled {format_um(left)} µm less than its jumps were to move it:"
         "</strong> no room for more was found without overlaps. The settlement predicted is that "
         "much greater; shorter jumps, or more of them, leave the bed the cycles to make room."
     )

@@ -17,19 +17,19 @@ from adapters.procedure import (
     estimate_band_of_run,
     find_comparable_cycle,
     list_jumped_spans,
+    make_plain,
     sum_cost,
-    to_plain,
 )
 from adapters.report.error import (
     Comparison,
     JumpFigures,
-    comparison,
+    compare_runs,
     extrapolate_curve,
+    find_relative_error,
     measure_jump,
-    relative_error,
 )
-from adapters.report.verdict import FITTED, FULL, NOTHING, PROCEDURE, list_fails, split_cost
-from adapters.scene import flatten_keys, left_out
+from adapters.report.verdict import FITTED, FULL, NOTHING, PROCEDURE, list_failures, split_cost
+from adapters.scene import flatten_keys, list_omissions
 
 
 @dataclass(frozen=True)
@@ -83,19 +83,19 @@ class Numbers:
 
     def to_json(self) -> str:
         """JSON text; a number that is not finite is null."""
-        return json.dumps(to_plain(asdict(self)), indent=1, allow_nan=False) + "\n"
+        return json.dumps(make_plain(asdict(self)), indent=1, allow_nan=False) + "\n"
 
 
-def numbers_of(record: Record) -> Numbers:
+def gather_numbers(record: Record) -> Numbers:
     """All numbers of the report of a run, as far as it has come."""
     scene, run, control = record.scene, record.run, record.control
     history, prepared = run.history, run.preparation
     cycle = int(history.cycle[-1]) if len(history.cycle) else 0
     procedure = scene.procedure if scene.loading is not None else None
     total = procedure.total_cycles if procedure is not None else 0
-    computed = history.computed(cycle)
+    computed = history.count_computed(cycle)
     compared_at = find_comparable_cycle(record)
-    rows = error_rows(record, compared_at)
+    rows = tabulate_errors(record, compared_at)
     jumps = tuple(
         measure_jump(name, jump, history, None if control is None else control.history)
         for name, jump in run.jumps
@@ -118,8 +118,8 @@ def numbers_of(record: Record) -> Numbers:
         jumps=jumps,
         preparation={} if prepared is None else flatten_keys(prepared.notes["figures"]),
         costs=costs,
-        fails=tuple(list_fails(record, rows, jumps)),
-        left_out=left_out(scene),
+        fails=tuple(list_failures(record, rows, jumps)),
+        left_out=list_omissions(scene),
         failed_jumps=tuple((jump.stage, jump.why) for jump in run.failed_jumps),
         stops=tuple((e["time"], e.get("why", "")) for e in run.events if e["event"] == "stopped"),
         discarded=run.discarded + (() if control is None else control.discarded),
@@ -127,11 +127,11 @@ def numbers_of(record: Record) -> Numbers:
         provenance=dict(record.manifest.get("provenance", {})),
         parameters={key: value for key, value in parameters.items() if value is not None},
         decks={k: v for o in run.outcomes for k, v in o.notes.get("decks", {}).items()},
-        reproduce=_reproduce(record),
+        reproduce=_format_command(record),
     )
 
 
-def error_rows(record: Record, cycle: int) -> tuple[Comparison, ...]:
+def tabulate_errors(record: Record, cycle: int) -> tuple[Comparison, ...]:
     """The table of error against speed-up at ``cycle``; empty without a control (cycle 0).
 
     Beside run and control two cheaper ways, both from as many cycles of the control as the run
@@ -146,11 +146,11 @@ def error_rows(record: Record, cycle: int) -> tuple[Comparison, ...]:
     truth = control.position(cycle)
     before_jump = run.position(spans[0][0]) if spans else None
     beds = (before_jump, truth, run.position(cycle))
-    rows = [comparison(PROCEDURE, run.history, cycle, full, cycle, preparation_s, beds)]
+    rows = [compare_runs(PROCEDURE, run.history, cycle, full, cycle, preparation_s, beds)]
     if spans:
-        early = run.history.computed(cycle)
+        early = run.history.count_computed(cycle)
         beds = (before_jump, truth, control.position(early))
-        still = comparison(NOTHING, full, early, full, cycle, preparation_s, beds)
+        still = compare_runs(NOTHING, full, early, full, cycle, preparation_s, beds)
         rows.append(still)
         settled = extrapolate_curve(full, get_law(procedure.law), procedure.k_i, early, cycle)
         if isfinite(settled):
@@ -159,14 +159,14 @@ def error_rows(record: Record, cycle: int) -> tuple[Comparison, ...]:
                     FITTED,
                     early,
                     settled,
-                    relative_error(settled, full.settlement[full.row(cycle)]),
+                    find_relative_error(settled, full.settlement[full.row(cycle)]),
                     cpu_s=still.cpu_s,
                     speed_up=still.speed_up,
                     speed_up_with_preparation=still.speed_up_with_preparation,
                 )
             )
     beds = (before_jump, truth, truth)
-    rows.append(comparison(FULL, full, cycle, full, cycle, preparation_s, beds))
+    rows.append(compare_runs(FULL, full, cycle, full, cycle, preparation_s, beds))
     return tuple(rows)
 
 
@@ -184,7 +184,7 @@ def describe_scene(record: Record) -> str:
     return f"{text}, engine {scene.engine.name}"
 
 
-def _reproduce(record: Record) -> str:
+def _format_command(record: Record) -> str:
     """The command that makes the run again, from inside its folder."""
     words = ["trackbed", "run", "scene.toml", "--run-folder", "../again"]
     words += ["--control"] if record.manifest.get("control") else []

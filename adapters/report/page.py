@@ -10,28 +10,28 @@ from collections.abc import Iterator
 from html import escape
 from pathlib import Path
 
-from adapters.files import name_full_disk
+from adapters.files import explain_full_disk
 from adapters.procedure import AVERAGED, Record, list_jumped_spans, read_run_record
-from adapters.report.control import control
+from adapters.report.control import describe_control
 from adapters.report.error import Comparison
 from adapters.report.figure import draw_settlement
 from adapters.report.jumps import describe_jumps
-from adapters.report.numbers import Numbers, numbers_of
+from adapters.report.numbers import Numbers, gather_numbers
 from adapters.report.verdict import FITTED, FULL, NOTHING, PROCEDURE, PURPOSES
 from trackbed.report import (
     MINUS,
     TIMES,
-    bullets,
-    folded,
-    micrometres,
-    page,
-    paragraph,
-    per_cent,
-    picture,
-    plain,
+    format_number,
+    format_share,
+    format_um,
+    make_folded,
+    make_list,
+    make_page,
+    make_paragraph,
+    make_picture,
+    make_section,
+    make_table,
     save_figure,
-    section,
-    table,
 )
 from trackbed.run_files import write_whole
 
@@ -43,11 +43,11 @@ def write_report(run_folder: Path) -> Path:
     left, so it may be called while the run goes on.
     """
     record = read_run_record(run_folder)
-    numbers = numbers_of(record)
-    with name_full_disk(run_folder):
+    numbers = gather_numbers(record)
+    with explain_full_disk(run_folder):
         figure = write_figure(record, numbers) if numbers.cycle else None
         write_whole(run_folder / "report.json", numbers.to_json())
-        html = page(f"Settlement of {numbers.scene}", body(record, numbers, figure))
+        html = make_page(f"Settlement of {numbers.scene}", list_sections(record, numbers, figure))
         write_whole(run_folder / "report.html", html)
     return run_folder / "report.html"
 
@@ -66,35 +66,37 @@ def write_figure(record: Record, numbers: Numbers) -> Path:
     )
 
 
-def body(record: Record, numbers: Numbers, figure: Path | None) -> Iterator[str]:
+def list_sections(record: Record, numbers: Numbers, figure: Path | None) -> Iterator[str]:
     """All sections; those that the run has not reached are left out."""
     yield f'<h1>Settlement under cyclic load</h1><p class="scene">{escape(numbers.scene)}</p>'
-    yield from _claim(record, numbers)
+    yield from _describe_claim(record, numbers)
     if numbers.cycle:
-        yield _settlement(numbers, figure)
+        yield _describe_settlement(numbers, figure)
         if numbers.error_rows:
-            yield _error(numbers)
-        yield _cost(numbers)
-        yield control(record)
+            yield _describe_error(numbers)
+        yield _describe_cost(numbers)
+        yield describe_control(record)
         yield describe_jumps(record, numbers)
-    yield _failures(numbers)
-    yield section("What the model leaves out", bullets(map(escape, numbers.left_out)))
-    yield _provenance(numbers)
-    yield section(
-        "Make it again", paragraph("In this run folder:"), f"<pre>{escape(numbers.reproduce)}</pre>"
+    yield _describe_failures(numbers)
+    yield make_section("What the model leaves out", make_list(map(escape, numbers.left_out)))
+    yield _describe_provenance(numbers)
+    yield make_section(
+        "Make it again",
+        make_paragraph("In this run folder:"),
+        f"<pre>{escape(numbers.reproduce)}</pre>",
     )
 
 
-def _claim(record: Record, numbers: Numbers) -> Iterator[str]:
+def _describe_claim(record: Record, numbers: Numbers) -> Iterator[str]:
     """One falsifiable sentence, and where it fails."""
     row = numbers.row(PROCEDURE)
     full = numbers.row(FULL)
     if not numbers.cycle:
         state = "is settled" if numbers.preparation else "is not settled yet"
-        yield paragraph(f"The bed {state}; no load cycle has been computed.", "claim")
+        yield make_paragraph(f"The bed {state}; no load cycle has been computed.", "claim")
         return
     begun = (
-        f"{numbers.cycle} load cycles settle the mean grain by {micrometres(numbers.settlement)} µm"
+        f"{numbers.cycle} load cycles settle the mean grain by {format_um(numbers.settlement)} µm"
     )
     if not numbers.finished:
         begun = f"Unfinished, at cycle {numbers.cycle} of {numbers.total_cycles}: {begun}"
@@ -105,27 +107,27 @@ def _claim(record: Record, numbers: Numbers) -> Iterator[str]:
         claim = (
             f"{begun}, computing {numbers.cycles_computed} of them. The error is unknown: "
             f"{why}. Counted in cycles, the speed-up is at most "
-            f"{plain(numbers.speed_up_of_cycles, '.2f')}."
+            f"{format_number(numbers.speed_up_of_cycles, '.2f')}."
         )
     else:
         at = ""
         if numbers.compared_at != numbers.cycle:
-            at = f" At cycle {numbers.compared_at} it is {micrometres(row.settlement)} µm."
+            at = f" At cycle {numbers.compared_at} it is {format_um(row.settlement)} µm."
         claim = (
             f"{begun}.{at} The full run, every cycle computed, gives "
-            f"{micrometres(full.settlement)} µm, so the error is {per_cent(row.settlement_error)}, "
-            f"at a speed-up of {plain(row.speed_up, '.2f')} "
-            f"({plain(row.cpu_s, '.1f')} s of CPU time instead of {plain(full.cpu_s, '.1f')} s "
-            "from the start of loading; "
-            f"{plain(row.speed_up_with_preparation, '.2f')} with preparation)."
+            f"{format_um(full.settlement)} µm, so the error is "
+            f"{format_share(row.settlement_error)}, at a speed-up of "
+            f"{format_number(row.speed_up, '.2f')} ({format_number(row.cpu_s, '.1f')} s of CPU "
+            f"time instead of {format_number(full.cpu_s, '.1f')} s from the start of loading; "
+            f"{format_number(row.speed_up_with_preparation, '.2f')} with preparation)."
         )
-    yield paragraph(claim, "claim")
+    yield make_paragraph(claim, "claim")
     if numbers.fails:
-        fails = bullets(escape(sentence) + "." for sentence in numbers.fails)
+        fails = make_list(escape(sentence) + "." for sentence in numbers.fails)
         yield f'<div class="fails"><p>Where it fails:</p>{fails}</div>'
 
 
-def _settlement(numbers: Numbers, figure: Path | None) -> str:
+def _describe_settlement(numbers: Numbers, figure: Path | None) -> str:
     """The curve: the picture of the report."""
     caption = (
         "Drop of the mean height of the grains since the preparation, at the end of each load "
@@ -136,12 +138,12 @@ def _settlement(numbers: Numbers, figure: Path | None) -> str:
             "Dotted: the same jumps with nothing moved, which is the full run with the jumped "
             "cycles cut out."
         )
-    return section("Settlement", picture(figure, "Settlement curve", caption))
+    return make_section("Settlement", make_picture(figure, "Settlement curve", caption))
 
 
-def _error(numbers: Numbers) -> str:
+def _describe_error(numbers: Numbers) -> str:
     """Error against speed-up: definitions, table, and what it cannot show."""
-    definition = paragraph(
+    definition = make_paragraph(
         "Speed-up <i>S</i> = <i>T</i><sub>full</sub> / <i>T</i><sub>procedure</sub>: CPU time of "
         "engine and Python with everything in it, from the start of loading. The paper's gained "
         f"time of 180 % is <i>S</i> {MINUS} 1 = 1.8."
@@ -156,22 +158,22 @@ def _error(numbers: Numbers) -> str:
         (
             row.name,
             str(row.computed),
-            show_with_error(row, micrometres(row.settlement), row.settlement_error),
+            show_with_error(row, format_um(row.settlement), row.settlement_error),
             show_with_error(
-                row, plain(row.coordination_number, ".3f"), row.coordination_number_error
+                row, format_number(row.coordination_number, ".3f"), row.coordination_number_error
             ),
-            show_with_error(row, micrometres(row.elastic_deflection), row.elastic_deflection_error),
-            plain(row.jump_displacement_error, ".2f"),
-            plain(row.coordinates_error, ".4f"),
-            plain(row.cpu_s, ".1f"),
-            plain(row.speed_up, ".2f"),
+            show_with_error(row, format_um(row.elastic_deflection), row.elastic_deflection_error),
+            format_number(row.jump_displacement_error, ".2f"),
+            format_number(row.coordinates_error, ".4f"),
+            format_number(row.cpu_s, ".1f"),
+            format_number(row.speed_up, ".2f"),
         )
         for row in numbers.error_rows
     ]
-    return section(
+    return make_section(
         "Error against speed-up",
         definition,
-        table(
+        make_table(
             "Errors are signed and relative to the full run at the same cycle. Coordination number "
             f"(contacts with grains) and deflection are means over the last {AVERAGED} computed "
             f"cycles. “{NOTHING}” is the full run after as many cycles as this run "
@@ -183,7 +185,7 @@ def _error(numbers: Numbers) -> str:
             rows,
             PROCEDURE,
         ),
-        folded("What this comparison cannot show", bullets(LIMITS)),
+        make_folded("What this comparison cannot show", make_list(LIMITS)),
     )
 
 
@@ -202,19 +204,19 @@ LIMITS = (
 
 def show_with_error(row: Comparison, value: str, error: float) -> str:
     """A value and its error; the full run has none."""
-    shown = "" if row.name == FULL else per_cent(error)
+    shown = "" if row.name == FULL else format_share(error)
     return f'{value} <span class="error">{shown}</span>'
 
 
-def _cost(numbers: Numbers) -> str:
+def _describe_cost(numbers: Numbers) -> str:
     """Where the time went, and the work that no machine changes."""
     rows = [
-        (label, *(plain(cost[purpose], form) for cost in numbers.costs))
+        (label, *(format_number(cost[purpose], form) for cost in numbers.costs))
         for purpose, (label, form) in PURPOSES.items()
     ]
-    return section(
+    return make_section(
         "Cost",
-        table(
+        make_table(
             f"CPU time in s from the start of loading. Grain-steps (grains {TIMES} time steps "
             "computed) are work that no machine changes.",
             ("", *(cost["name"] for cost in numbers.costs)),
@@ -224,9 +226,9 @@ def _cost(numbers: Numbers) -> str:
     )
 
 
-def _failures(numbers: Numbers) -> str:
+def _describe_failures(numbers: Numbers) -> str:
     """Failures named and counted."""
-    counted = paragraph(
+    counted = make_paragraph(
         f"Failed attempts at a jump: {len(numbers.failed_jumps)}; stops before the end: "
         f"{len(numbers.stops)}; unfinished or superseded stages moved to discarded/: "
         f"{len(numbers.discarded)}."
@@ -234,10 +236,10 @@ def _failures(numbers: Numbers) -> str:
     items = [f"<code>{escape(stage)}</code>: {escape(why)}" for stage, why in numbers.failed_jumps]
     items += [f"stopped {escape(time)}: {escape(why)}" for time, why in numbers.stops]
     items += [f"discarded <code>{escape(name)}</code>" for name in numbers.discarded]
-    return section("Failures", counted, bullets(items) if items else "")
+    return make_section("Failures", counted, make_list(items) if items else "")
 
 
-def _provenance(numbers: Numbers) -> str:
+def _describe_provenance(numbers: Numbers) -> str:
     """Where the result comes from."""
     source = numbers.provenance
     versions = source.get("versions", {})
@@ -251,26 +253,26 @@ def _provenance(numbers: Numbers) -> str:
         ("seed", escape(str(numbers.parameters.get("sample.seed", "")))),
     ]
     bed = [
-        (name.replace("_", " ").replace(".", ": "), plain(value, ".4g"))
+        (name.replace("_", " ").replace(".", ": "), format_number(value, ".4g"))
         for name, value in numbers.preparation.items()
     ]
     parameters = [
-        (f"<code>{escape(key)}</code>", escape(_shown(value)))
+        (f"<code>{escape(key)}</code>", escape(_format_value(value)))
         for key, value in numbers.parameters.items()
     ]
     decks = [(f"<code>{escape(k)}</code>", f"<code>{v}</code>") for k, v in numbers.decks.items()]
     words = frozenset({1})
-    parts = [table("", (), rows, words=words)]
+    parts = [make_table("", (), rows, words=words)]
     for title, caption, found in (
         ("The settled bed before loading", "SI units.", bed),
         ("Effective parameters", "SI units.", parameters),
         ("Decks", "SHA-256.", decks),
     ):
         if found:
-            parts.append(folded(title, table(caption, (), found, words=words)))
-    return section("Provenance", *parts)
+            parts.append(make_folded(title, make_table(caption, (), found, words=words)))
+    return make_section("Provenance", *parts)
 
 
-def _shown(value: object) -> str:
+def _format_value(value: object) -> str:
     text = f"{value:.6g}" if isinstance(value, float) else str(value)
     return text if len(text) < 80 else text[:77] + "..."

@@ -64,13 +64,13 @@ def split_cost(record: Record, track: Track) -> dict[str, Any]:
     )
 
 
-def list_fails(
+def list_failures(
     record: Record, rows: Sequence[Comparison], jumps: Sequence[JumpFigures]
 ) -> Iterator[str]:
     """Where the claim fails: cheaper ways that do as well, bars missed, a bed too small."""
     if not len(record.run.history.cycle):
         return
-    yield from _beaten({row.name: row for row in rows})
+    yield from _list_cheaper_ways({row.name: row for row in rows})
     force = [
         row["force_error"]
         for _, window in record.run.windows
@@ -106,7 +106,7 @@ def list_fails(
         )
 
 
-def _beaten(rows: dict[str, Comparison]) -> Iterator[str]:
+def _list_cheaper_ways(rows: dict[str, Comparison]) -> Iterator[str]:
     """Where a cheaper way does as well as this run; nothing without a control."""
     run = rows.get(PROCEDURE)
     if run is None:

@@ -1,7 +1,7 @@
 """A settlement scene: its tables, its file, and what is checked before anything runs."""
 
 from adapters.scene.file import load_scene
-from adapters.scene.model import left_out
+from adapters.scene.model import list_omissions
 from adapters.scene.tables import Procedure, Scene, flatten_keys
 
-__all__ = ["Procedure", "Scene", "flatten_keys", "left_out", "load_scene"]
+__all__ = ["Procedure", "Scene", "flatten_keys", "list_omissions", "load_scene"]

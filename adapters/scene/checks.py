@@ -50,7 +50,7 @@ MPI_STARTERS = {"mpirun", "mpiexec", "mpiexec.hydra", "orterun", "srun"}
 """Programs that start the program behind them several times."""
 
 
-def _alternatives(scene: Values) -> Iterator[Problem]:
+def _check_alternatives(scene: Values) -> Iterator[Problem]:
     for first, second in ALTERNATIVES:
         given = [key for key in (first, second) if scene.has(key)]
         name = second.rpartition(".")[2]
@@ -60,7 +60,7 @@ def _alternatives(scene: Values) -> Iterator[Problem]:
             yield Problem(first, f"give this or {name}, not both")
 
 
-def _owned(
+def _check_owned_keys(
     choice: str, owners: Mapping[str, tuple[str, ...]], missing: str, idle: str, scene: Values
 ) -> Iterator[Problem]:
     table = choice.partition(".")[0]
@@ -75,13 +75,13 @@ def _owned(
                 yield Problem(f"{table}.{name}", said.format(owner=chosen, key=name))
 
 
-def _symmetry(scene: Values) -> Iterator[Problem]:
+def _check_symmetry(scene: Values) -> Iterator[Problem]:
     planes = scene.get("sample.symmetry") or ()
     if len(set(planes)) != len(planes):
         yield Problem("sample.symmetry", "each mirror plane only once")
 
 
-def _grain_radius(scene: Values) -> Iterator[Problem]:
+def _check_grain_radius(scene: Values) -> Iterator[Problem]:
     radii = find_radii(scene)
     key = "sample.grain_radius.standard_deviation"
     if radii.name == "constant" and radii.standard_deviation > 0:
@@ -92,19 +92,19 @@ def _grain_radius(scene: Values) -> Iterator[Problem]:
         yield Problem(key, f"too wide: the smallest radius would be {radii.smallest:g} m")
 
 
-def _series(scene: Values) -> Iterator[Problem]:
+def _check_series(scene: Values) -> Iterator[Problem]:
     try:
         read_load_series(Path(scene.need("loading.series")))
     except SceneError as error:
         yield Problem("loading.series", error.what, error.where)
 
 
-def _partial_piston(scene: Values) -> Iterator[Problem]:
+def _check_partial_piston(scene: Values) -> Iterator[Problem]:
     if scene.need("loading.area_share") < 1 and scene.need("sample.container") == "box":
         yield Problem("loading.area_share", "a piston on a part of the section needs a cylinder")
 
 
-def _procedure(scene: Values) -> Iterator[Problem]:
+def _check_procedure(scene: Values) -> Iterator[Problem]:
     if scene.has_table("procedure") and not scene.has_table("loading"):
         yield Problem("procedure", "there are no cycles without a loading table")
     first, total = scene.need("procedure.k_i"), scene.need("procedure.total_cycles")
@@ -112,7 +112,7 @@ def _procedure(scene: Values) -> Iterator[Problem]:
         yield Problem("procedure.total_cycles", f"must exceed k_i = {first}, is {total}")
 
 
-def _jumps(scene: Values) -> Iterator[Problem]:
+def _check_jumps(scene: Values) -> Iterator[Problem]:
     """Either k and h, or a tolerance by which they choose themselves."""
     if not scene.has_table("procedure"):
         return
@@ -127,7 +127,7 @@ def _jumps(scene: Values) -> Iterator[Problem]:
                 yield Problem(key, "missing: give k and h, or a tolerance instead of both")
 
 
-def _settlement(scene: Values) -> Iterator[Problem]:
+def _check_settlement(scene: Values) -> Iterator[Problem]:
     if not scene.has_table("procedure") or scene.need("procedure.settlement") == "law":
         return
     key = "procedure.settlement"
@@ -137,7 +137,7 @@ def _settlement(scene: Values) -> Iterator[Problem]:
         yield Problem(key, "move 'still' moves nothing, so no settlement: leave one of them out")
 
 
-def _seating(scene: Values) -> Iterator[Problem]:
+def _check_seating(scene: Values) -> Iterator[Problem]:
     key = "procedure.seating_cycles"
     if scene.has(key) and scene.get("procedure.seating") in (None, "any"):
         yield Problem(key, 'only a run that waits for its piston counts them: seating = "waits"')
@@ -145,7 +145,7 @@ def _seating(scene: Values) -> Iterator[Problem]:
         yield Problem(key, "with no fewer than total_cycles a run that waits never jumps")
 
 
-def _launcher(scene: Values) -> Iterator[Problem]:
+def _check_launcher(scene: Values) -> Iterator[Problem]:
     words = [Path(word).name for word in scene.get("engine.launcher") or ()]
     if scene.need("engine.name") == "yade" and set(words) & MPI_STARTERS:
         yield Problem(
@@ -153,7 +153,7 @@ def _launcher(scene: Values) -> Iterator[Problem]:
         )
 
 
-def _choice(
+def _check_choice(
     scene: Values, key: str, what: str, known: Sequence[str], retired: Mapping[str, str]
 ) -> Iterator[Problem]:
     """A name that must be one of ``known``; ``retired`` ones left trackbed."""
@@ -163,34 +163,37 @@ def _choice(
         yield Problem(key, f"unknown {what} {name!r}{hint}")
 
 
-def _engine(scene: Values) -> Iterator[Problem]:
+def _check_engine(scene: Values) -> Iterator[Problem]:
     known = ("auto", *find_choices(ENGINES, "ENGINE"))
-    return _choice(scene, "engine.name", "engine", known, {})
+    return _check_choice(scene, "engine.name", "engine", known, {})
 
 
-def _law(scene: Values) -> Iterator[Problem]:
+def _check_law(scene: Values) -> Iterator[Problem]:
     from adapters.laws import RETIRED, list_laws
 
-    return _choice(scene, "procedure.law", "law", list_laws(), RETIRED)
+    return _check_choice(scene, "procedure.law", "law", list_laws(), RETIRED)
 
 
-def _move(scene: Values) -> Iterator[Problem]:
+def _check_move(scene: Values) -> Iterator[Problem]:
     from adapters.moves import RETIRED, list_moves
 
-    return _choice(scene, "procedure.move", "way", list_moves(), RETIRED)
+    return _check_choice(scene, "procedure.move", "way", list_moves(), RETIRED)
 
 
-def _relaxation(scene: Values) -> Iterator[Problem]:
+def _check_relaxation(scene: Values) -> Iterator[Problem]:
     if scene.need("procedure.relaxation") not in ("smallest-move", "none"):
         from adapters.relaxation import METHODS, RETIRED  # loads the compiler
 
-        yield from _choice(scene, "procedure.relaxation", "relaxation", (*METHODS, "none"), RETIRED)
+        yield from _check_choice(
+            scene, "procedure.relaxation", "relaxation", (*METHODS, "none"), RETIRED
+        )
 
 
 CHECKS: tuple[Check, ...] = (
-    _alternatives, *(partial(_owned, *row) for row in OWNED), _symmetry, _grain_radius, _series,
-    _partial_piston, _procedure, _jumps, _settlement, _seating, _launcher, _engine, _law,
-    _move, _relaxation, *mechanics.CHECKS,
+    _check_alternatives, *(partial(_check_owned_keys, *row) for row in OWNED), _check_symmetry,
+    _check_grain_radius, _check_series, _check_partial_piston, _check_procedure, _check_jumps,
+    _check_settlement, _check_seating, _check_launcher, _check_engine, _check_law, _check_move,
+    _check_relaxation, *mechanics.CHECKS,
 )  # fmt: skip
 
 
@@ -200,15 +203,15 @@ def find_problems(values: Mapping[str, Any], invalid: Iterable[str] = ()) -> lis
     ``values`` by dotted key, defaults included; ``invalid`` names keys and tables that are not
     valid in themselves.
     """
-    return _found(CHECKS, Values(values, invalid))
+    return _run_checks(CHECKS, Values(values, invalid))
 
 
 def find_warnings(values: Mapping[str, Any]) -> list[Problem]:
     """All that is doubtful in a valid scene; ``values`` by dotted key, defaults included."""
-    return _found(mechanics.DOUBTS, Values(values, ()))
+    return _run_checks(mechanics.DOUBTS, Values(values, ()))
 
 
-def _found(checks: Iterable[Check], scene: Values) -> list[Problem]:
+def _run_checks(checks: Iterable[Check], scene: Values) -> list[Problem]:
     problems: list[Problem] = []
     for check in checks:
         with suppress(NotValid):

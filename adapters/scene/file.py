@@ -33,7 +33,7 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
     loading = data.get("loading")
     if isinstance(loading, dict) and isinstance(loading.get("series"), str):
         loading["series"] = str(text.path.parent.absolute() / loading["series"])
-    problems = list(_spell_out_schedule(data))
+    problems = list(_expand_schedule(data))
     text.check(Scene)
     if text.problems:
         problems += [problem for problem in text.problems if problem.key]
@@ -54,7 +54,7 @@ def _drop_alternatives(data: dict[str, Any], key: str) -> None:
         table.pop(name, None)
 
 
-def _spell_out_schedule(data: dict[str, Any]) -> Iterator[Problem]:
+def _expand_schedule(data: dict[str, Any]) -> Iterator[Problem]:
     """Put the cycles of each jump in place of a procedure.h such as ``"5 growing"``.
 
     What can not be so is a problem, and stands as one jump while the other keys are looked at.

@@ -8,11 +8,11 @@ from pathlib import Path
 from adapters.bed import (
     CHAIN_FACTOR,
     OVERLAP_BOUND,
-    equivalent_modulus,
+    combine_moduli,
     expect_grain_count,
+    find_overlap_under_force,
     find_radius_that_fits,
-    overlap_under_force,
-    rayleigh_time,
+    find_rayleigh_time,
 )
 from adapters.errors import SceneError
 from adapters.files import read_load_series
@@ -31,7 +31,7 @@ JUMP_DOUBTFUL = 10
 """Cycles of a jump for each cycle fitted, above which noise is extrapolated and not a law."""
 
 
-def _room(scene: Values) -> Iterator[Problem]:
+def _check_room(scene: Values) -> Iterator[Problem]:
     largest_grain = find_radii(scene).greatest
     room = find_radius_that_fits(find_geometry(scene))
     if largest_grain > room:
@@ -42,7 +42,7 @@ def _room(scene: Values) -> Iterator[Problem]:
         )
 
 
-def _no_tension(scene: Values) -> Iterator[Problem]:
+def _check_tension(scene: Values) -> Iterator[Problem]:
     trough = scene.need("loading.mean") - scene.need("loading.amplitude") / 2
     if trough < 0:
         yield Problem(
@@ -51,12 +51,12 @@ def _no_tension(scene: Values) -> Iterator[Problem]:
         )
 
 
-def _rayleigh_time(scene: Values) -> float:
+def _find_rayleigh_time(scene: Values) -> float:
     grain = "material.grain."
     radii = find_radii(scene)
     if radii.smallest <= 0:
         raise NotValid
-    return rayleigh_time(
+    return find_rayleigh_time(
         radii.smallest,
         scene.need(grain + "density"),
         scene.need(grain + "young"),
@@ -64,30 +64,30 @@ def _rayleigh_time(scene: Values) -> float:
     )
 
 
-def _rayleigh_share(scene: Values) -> float:
+def _find_rayleigh_share(scene: Values) -> float:
     if scene.get("engine.time_step") is None:
         return float(scene.need("engine.rayleigh_share"))
-    return float(scene.need("engine.time_step")) / _rayleigh_time(scene)
+    return float(scene.need("engine.time_step")) / _find_rayleigh_time(scene)
 
 
-def _time_step(scene: Values) -> Iterator[Problem]:
-    share = _rayleigh_share(scene)
+def _check_time_step(scene: Values) -> Iterator[Problem]:
+    share = _find_rayleigh_share(scene)
     if share > 1:
         yield Problem(
             "engine.time_step",
             f"{share:.3g} Rayleigh times of the smallest grain "
-            f"({_rayleigh_time(scene):.3g} s): the grains would explode",
+            f"({_find_rayleigh_time(scene):.3g} s): the grains would explode",
         )
 
 
-def _fill_height(scene: Values) -> Iterator[Problem]:
+def _check_fill_height(scene: Values) -> Iterator[Problem]:
     height = scene.need("sample.fill_height")
     count = expect_grain_count(find_radii(scene), find_geometry(scene), height)
     if not 1 <= count <= COUNT_GREATEST:
         yield Problem("sample.fill_height", f"{height:g} m would take {count:.3g} grains")
 
 
-def _overlap_share(scene: Values) -> tuple[str, float, float]:
+def _find_overlap_share(scene: Values) -> tuple[str, float, float]:
     """Key of the load, its greatest stress [Pa], mean overlap under it over the smallest radius.
 
     A grain of a layer carries the stress on the square that it fills, (2 r)^2.
@@ -106,13 +106,13 @@ def _overlap_share(scene: Values) -> tuple[str, float, float]:
     if radii.smallest <= 0:
         raise NotValid
     young, poisson = scene.need(grain + "young"), scene.need(grain + "poisson")
-    modulus = equivalent_modulus(young, poisson, young, poisson)
-    overlap = overlap_under_force(stress * (2 * radii.mean) ** 2, modulus, radii.mean / 2)
+    modulus = combine_moduli(young, poisson, young, poisson)
+    overlap = find_overlap_under_force(stress * (2 * radii.mean) ** 2, modulus, radii.mean / 2)
     return key, stress, float(overlap) / radii.smallest
 
 
-def _great_load(scene: Values) -> Iterator[Problem]:
-    key, stress, share = _overlap_share(scene)
+def _check_load(scene: Values) -> Iterator[Problem]:
+    key, stress, share = _find_overlap_share(scene)
     if share > OVERLAP_BOUND:
         yield Problem(
             key,
@@ -122,12 +122,14 @@ def _great_load(scene: Values) -> Iterator[Problem]:
         )
 
 
-CHECKS: tuple[Check, ...] = (_room, _fill_height, _no_tension, _time_step, _great_load)
+CHECKS: tuple[Check, ...] = (
+    _check_room, _check_fill_height, _check_tension, _check_time_step, _check_load,
+)  # fmt: skip
 """What is wrong."""
 
 
-def _long_time_step(scene: Values) -> Iterator[Problem]:
-    share = _rayleigh_share(scene)
+def _warn_of_long_step(scene: Values) -> Iterator[Problem]:
+    share = _find_rayleigh_share(scene)
     if RAYLEIGH_SHARE_DOUBTFUL < share <= 1:
         key = "rayleigh_share" if scene.get("engine.time_step") is None else "time_step"
         yield Problem(
@@ -137,7 +139,7 @@ def _long_time_step(scene: Values) -> Iterator[Problem]:
         )
 
 
-def _narrow(scene: Values) -> Iterator[Problem]:
+def _warn_of_narrow_bed(scene: Values) -> Iterator[Problem]:
     container = find_geometry(scene)
     is_box = container.shape == "box"
     width = min(container.size_x, container.size_y) if is_box else 2 * container.radius
@@ -149,15 +151,15 @@ def _narrow(scene: Values) -> Iterator[Problem]:
         )
 
 
-def _few_steps(scene: Values) -> Iterator[Problem]:
-    longest = _rayleigh_share(scene) * _rayleigh_time(scene)
+def _warn_of_few_steps(scene: Values) -> Iterator[Problem]:
+    longest = _find_rayleigh_share(scene) * _find_rayleigh_time(scene)
     steps = 1 / (scene.need("loading.frequency") * longest)
     if steps < STEPS_DOUBTFUL:
         yield Problem("loading.frequency", f"a cycle is only {steps:.3g} time steps long")
 
 
-def _deep_chains(scene: Values) -> Iterator[Problem]:
-    key, stress, share = _overlap_share(scene)
+def _warn_of_deep_chains(scene: Values) -> Iterator[Problem]:
+    key, stress, share = _find_overlap_share(scene)
     deepest = CHAIN_FACTOR ** (2 / 3) * share
     if deepest > OVERLAP_BOUND:
         yield Problem(
@@ -167,7 +169,7 @@ def _deep_chains(scene: Values) -> Iterator[Problem]:
         )
 
 
-def _far_jump(scene: Values) -> Iterator[Problem]:
+def _warn_of_far_jump(scene: Values) -> Iterator[Problem]:
     if scene.get("procedure.settlement") == "history":  # by all cycles computed so far
         return
     h, k = max(scene.need("procedure.h")), scene.need("procedure.k")
@@ -179,5 +181,8 @@ def _far_jump(scene: Values) -> Iterator[Problem]:
         )
 
 
-DOUBTS: tuple[Check, ...] = (_long_time_step, _narrow, _few_steps, _deep_chains, _far_jump)
+DOUBTS: tuple[Check, ...] = (
+    _warn_of_long_step, _warn_of_narrow_bed, _warn_of_few_steps,
+    _warn_of_deep_chains, _warn_of_far_jump,
+)  # fmt: skip
 """What is doubtful."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from adapters.bed import DAMPING_FACTOR, collision, restitution_literal
+from adapters.bed import DAMPING_FACTOR, find_literal_restitution, solve_collision
 from adapters.scene.tables import Scene
 
 ENGINE_TITLES = {"auto": "LIGGGHTS", "liggghts": "LIGGGHTS", "lammps": "LAMMPS", "yade": "YADE"}
@@ -17,12 +17,13 @@ KEPT = {
 """What engines without the paper's rule keep when the normal force decreases."""
 
 
-def left_out(scene: Scene) -> tuple[str, ...]:
+def list_omissions(scene: Scene) -> tuple[str, ...]:
     """Sentences on what the model of ``scene`` does not have; read before the result is used."""
-    return tuple([*_grains(scene), *_contacts(scene), *_bed(scene), *_load(scene), *_jumps(scene)])
+    parts = (_list_grains, _list_contacts, _list_bed, _list_load, _list_jumps)
+    return tuple(text for part in parts for text in part(scene))
 
 
-def _grains(scene: Scene) -> Iterator[str]:
+def _list_grains(scene: Scene) -> Iterator[str]:
     if scene.engine.name == "fake":
         yield "Mechanics: the engine is the fake one of the tests, and no figure here is a result."
     yield "Stones: grains are spheres, without edges that interlock."
@@ -34,7 +35,7 @@ def _grains(scene: Scene) -> Iterator[str]:
         yield "Fines and water."
 
 
-def _contacts(scene: Scene) -> Iterator[str]:
+def _list_contacts(scene: Scene) -> Iterator[str]:
     grain = scene.material.grain
     yield "Plastic and adhesive contacts: Hertz's law is elastic, for overlaps far below a radius."
     if grain.friction or scene.material.wall.friction:
@@ -49,11 +50,11 @@ def _contacts(scene: Scene) -> Iterator[str]:
     if not scene.material.wall.friction:
         yield "Friction at the walls: its coefficient is 0."
     if grain.viscous_alpha is not None and grain.viscous_alpha < DAMPING_FACTOR:
-        literal = restitution_literal(grain.viscous_alpha)
+        literal = find_literal_restitution(grain.viscous_alpha)
         rebound, why = scene.restitution, ""
         if scene.engine.name == "yade":
             ratio = DAMPING_FACTOR * grain.viscous_alpha
-            rebound = collision(1.0, 1.0, 1.0, 1.0, ratio, may_pull=False).restitution
+            rebound = solve_collision(1.0, 1.0, 1.0, 1.0, ratio, may_pull=False).restitution
             why = ", since its contacts never pull"
         yield (
             f"A literal eq. 7: {ENGINE_TITLES.get(scene.engine.name, 'the engine')} damps by "
@@ -62,7 +63,7 @@ def _contacts(scene: Scene) -> Iterator[str]:
         )
 
 
-def _bed(scene: Scene) -> Iterator[str]:
+def _list_bed(scene: Scene) -> Iterator[str]:
     if scene.container.sides:
         yield (
             f"The round wall: YADE has none, and {scene.container.sides} planes about the whole "
@@ -80,7 +81,7 @@ def _bed(scene: Scene) -> Iterator[str]:
     yield f"Times below the step of {step}."
 
 
-def _load(scene: Scene) -> Iterator[str]:
+def _list_load(scene: Scene) -> Iterator[str]:
     if scene.loading is None:
         yield "A load: the scene names none, so only the preparation was run."
         return
@@ -92,7 +93,7 @@ def _load(scene: Scene) -> Iterator[str]:
         yield "A thick piston: it is a disc, and grains may rise beside it and above it."
 
 
-def _jumps(scene: Scene) -> Iterator[str]:
+def _list_jumps(scene: Scene) -> Iterator[str]:
     if (
         scene.procedure is None
         or scene.loading is None

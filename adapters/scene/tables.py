@@ -43,9 +43,7 @@ FLAT_WALLED = ("yade",)
 Share = Annotated[float, Field(ge=1e-6, le=1, allow_inf_nan=False)]
 Poisson = Annotated[float, Field(ge=0, lt=0.5, allow_inf_nan=False)]
 Restitution = Annotated[float, Field(gt=0.05, le=1, allow_inf_nan=False)]
-ViscousAlpha = Annotated[
-    float, Field(ge=0, lt=contact_law.alpha_of_restitution(0.05), allow_inf_nan=False)
-]
+ViscousAlpha = Annotated[float, Field(ge=0, lt=contact_law.find_alpha(0.05), allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=1, le=COUNT_GREATEST)]
 
 
@@ -205,7 +203,7 @@ class Procedure(Table):
     """Cycles computed and jumped at the end."""
 
     @model_serializer(mode="wrap")
-    def _without_newer_defaults(self, whole: SerializerFunctionWrapHandler) -> dict[str, Any]:
+    def _drop_newer_defaults(self, whole: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Stored runs are older than these keys: at their defaults they are left out."""
         newer = {"move": MOVE_DEFAULT, "tolerance": None, "settlement": "law"}
         newer |= {"seating": "any", "seating_cycles": None, "jammed": "less"}
@@ -253,7 +251,7 @@ class Scene(Table):
     engine: Engine
 
     @model_validator(mode="after")
-    def _checked(self) -> Scene:
+    def _check(self) -> Scene:
         problems = find_problems(flatten_keys(self.model_dump(exclude_none=True)))
         if problems:
             text = "; ".join(f"{problem.key}: {problem.what}" for problem in problems)
@@ -298,19 +296,21 @@ class Scene(Table):
         if grain.restitution is not None:
             return grain.restitution
         assert grain.viscous_alpha is not None
-        return contact_law.restitution_of_alpha(grain.viscous_alpha)
+        return contact_law.find_restitution(grain.viscous_alpha)
 
     @property
     def stiffness(self) -> contact_law.HertzStiffness:
         """Equivalent moduli of grains, walls and mirror planes."""
         grain, wall = self.material.grain, self.material.wall
-        return contact_law.hertz_stiffness(grain.young, grain.poisson, wall.young, wall.poisson)
+        return contact_law.make_hertz_stiffness(
+            grain.young, grain.poisson, wall.young, wall.poisson
+        )
 
     @property
     def rayleigh_time(self) -> float:
         """Rayleigh time [s] of the smallest grain the radius distribution allows."""
         grain = self.material.grain
-        return contact_law.rayleigh_time(
+        return contact_law.find_rayleigh_time(
             self.sample.grain_radius.law.smallest, grain.density, grain.young, grain.poisson
         )
 

@@ -7,7 +7,7 @@ from qdem_fem.bodies.conditions import (
     Held,
     NodalLoad,
     Roller,
-    take_out_held,
+    remove_held,
 )
 from qdem_fem.bodies.deformable import Body, Rigid
 from qdem_fem.bodies.mass_scaling import find_element_step, find_mass_scaling_factor
@@ -24,5 +24,5 @@ __all__ = [
     "COMPONENTS", "EVERY", "NOTHING", "Assembly", "Body", "Conditions", "Given", "Held",
     "NodalLoad", "Rigid", "RigidMass", "Roller", "find_element_step", "find_mass_scaling_factor",
     "fit_rigid_displacement", "fit_rigid_velocity", "make_cross_matrix", "make_stiffness_six",
-    "make_turn_matrix", "take_out_held",
+    "make_turn_matrix", "remove_held",
 ]  # fmt: skip

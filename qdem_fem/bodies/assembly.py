@@ -9,7 +9,7 @@ import numba
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from qdem_fem.bodies.conditions import Conditions, take_out_held
+from qdem_fem.bodies.conditions import Conditions, remove_held
 from qdem_fem.bodies.deformable import Body
 from qdem_fem.bodies.frames import BodyFrames
 from qdem_fem.element import MEASURES, Strain
@@ -106,7 +106,7 @@ class Assembly:
         inverse = np.zeros(self.n_nodes)
         used = self.mass > 0
         inverse[self.packed.node_place[used]] = 1 / self.mass[used]
-        self.state = self._state(inverse)
+        self.state = self._make_state(inverse)
         self._scratch: Fields | None = None
         self.frames: BodyFrames | None = None
         """Of free bodies in single precision."""
@@ -116,7 +116,7 @@ class Assembly:
         self._joined = master != np.arange(self.n_nodes)
         self._joined[master[self._joined]] = True
 
-    def _state(self, inverse_mass: Floats) -> Fields:
+    def _make_state(self, inverse_mass: Floats) -> Fields:
         numbers = 4 * self.n_nodes
         inverse = make_aligned_zeros(self.n_nodes, self.dtype)
         inverse[:] = inverse_mass
@@ -152,9 +152,9 @@ class Assembly:
         else:
             fields = {each: self.field(each) for each in FIELDS}
             fields[name][nodes] = values
-            self._fields_frame(**fields)
+            self._set_frame_fields(**fields)
 
-    def _fields_frame(self, displacement: Floats, velocity: Floats) -> None:
+    def _set_frame_fields(self, displacement: Floats, velocity: Floats) -> None:
         """Renew the frames for these fields of all nodes, (n, 3)."""
         assert self.frames is not None
         if np.isfinite(displacement).all() and np.isfinite(velocity).all():
@@ -162,7 +162,7 @@ class Assembly:
         self._write(self.state.displacement, self.frames.displacement_own(displacement))
         self._write(self.state.velocity, self.frames.velocity_own(velocity))
 
-    def kinetic(self) -> float:
+    def kinetic_energy(self) -> float:
         """Kinetic energy of the velocities as they are [J].
 
         No BLAS here, in what is called between windows: its threads go on spinning for a while
@@ -199,20 +199,20 @@ class Assembly:
             self._nodes, self.mass, self._first_node, self._sizes, self._turning
         )
         self.frames.choose(tied, gravity)
-        self._fields_frame(displacement, velocity)
+        self._set_frame_fields(displacement, velocity)
 
-    def steps_most(self, step: float) -> int:
+    def find_most_steps(self, step: float) -> int:
         """Steps to take before frames are looked at again."""
         if self.frames is None:
             return self.window_work
-        return self.frames.steps_near(self._read(self.state.velocity), step)
+        return self.frames.count_near_steps(self._read(self.state.velocity), step)
 
     def renew_frames(self) -> None:
         """Take new frames where a body has moved far in its own."""
         if self.frames is not None and self.frames.is_far(self._read(self.state.displacement)):
-            self._fields_frame(**{name: self.field(name) for name in FIELDS})
+            self._set_frame_fields(**{name: self.field(name) for name in FIELDS})
 
-    def stored(self) -> dict[str, NDArray[Any]]:
+    def pack_state(self) -> dict[str, NDArray[Any]]:
         """The state as it is kept, to the bit: fields by the user's numbers, and frames."""
         arrays: dict[str, NDArray[Any]] = {
             name: self._read(getattr(self.state, name)).astype(self.dtype) for name in FIELDS
@@ -231,23 +231,25 @@ class Assembly:
         for name, values in fields.items():
             self._write(getattr(self.state, name), values)
 
-    def window(self, steps: int, step: float, given: Given, work: Floats) -> tuple[int, float]:
+    def advance_window(
+        self, steps: int, step: float, given: Given, work: Floats
+    ) -> tuple[int, float]:
         """Compute steps, and add to the ``work`` (3,) [J]; returns steps done, bad elements."""
         frames, user_node = self.frames, self.packed.node_order
         if frames is None:
             return self.run_kernel(self.state, steps, step, given, work)
         journey = frames.journey(steps, step, given.gravity)
-        seen = self._seen_from_frames(frames, given)
+        seen = self._turn_to_frames(frames, given)
         done, bad = self.run_kernel(self.state, steps, step, seen, work)
-        frames.probes_world(given.probes, user_node, done, step, journey)
-        work[0] += frames.carried_work(given.loads, user_node, given.table[:done], step, journey)
+        frames.turn_probes(given.probes, user_node, done, step, journey)
+        work[0] += frames.find_frame_work(given.loads, user_node, given.table[:done], step, journey)
         frames.advance(done, step, journey)
         return done, bad
 
-    def _seen_from_frames(self, frames: BodyFrames, given: Given) -> Given:
+    def _turn_to_frames(self, frames: BodyFrames, given: Given) -> Given:
         """The same in the directions of the frames, and without what they fall by themselves."""
         return given._replace(
-            loads=frames.loads_turned(given.loads, self.packed.node_order),
+            loads=frames.turn_loads(given.loads, self.packed.node_order),
             gravity=None if frames.falls else given.gravity,
         )
 
@@ -283,9 +285,9 @@ class Assembly:
         own = self.accelerations_own(
             frames.displacement_own(displacement),
             frames.velocity_own(velocity),
-            self._seen_from_frames(frames, given),
+            self._turn_to_frames(frames, given),
         )
-        seen = frames.turned(own)
+        seen = frames.turn_vectors(own)
         return seen if given.gravity is None or not frames.falls else seen + given.gravity
 
     def accelerations_own(
@@ -306,7 +308,7 @@ class Assembly:
     def scratch(self) -> Fields:
         """A state beside that of the bodies, with their masses."""
         if self._scratch is None:
-            self._scratch = self._state(np.asarray(self.state.inverse_mass, dtype=float))
+            self._scratch = self._make_state(np.asarray(self.state.inverse_mass, dtype=float))
         return self._scratch
 
     def viscous_power(self) -> float:
@@ -323,15 +325,15 @@ class Assembly:
 
     def hold(self, values: Floats, held: Constraints) -> Floats:
         """``values`` (n, 3) without their parts along held components and roller normals."""
-        return take_out_held(self.by_place(values), held).reshape(-1, 4)[self.place, :3]
+        return remove_held(self.pack_field(values), held).reshape(-1, 4)[self.place, :3]
 
-    def by_place(self, field: Floats) -> Floats:
+    def pack_field(self, field: Floats) -> Floats:
         """A nodal field (n, 3) in the kernel's order, four numbers a node."""
         flat = np.zeros(4 * self.n_nodes)
         flat.reshape(-1, 4)[self.place, :3] = field
         return flat
 
-    def lists(self, conditions: Conditions, gravity: bool) -> tuple[Loads, Constraints]:
+    def pack_lists(self, conditions: Conditions, gravity: bool) -> tuple[Loads, Constraints]:
         """The kernel's lists of loads and constraints; in single precision, frames to suit."""
         if self.dtype == np.float32:
             self._choose_frames(conditions, gravity)

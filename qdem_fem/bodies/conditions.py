@@ -77,7 +77,7 @@ class Conditions:
                 weight.append(load.weights[acting, c])
                 series.append(np.full(acting.sum(), column + c * several))
             column += load.driver.components
-        node_at, all_series, weights = _joined(at), _joined(series), _joined(weight)
+        node_at, all_series, weights = _join(at), _join(series), _join(weight)
         return Loads(
             force_at=node_at + packed.node_window[node_at // 4],
             node_at=node_at,
@@ -145,7 +145,7 @@ class Conditions:
         return np.array(nodes, dtype=np.int64), np.array(normals).reshape(-1, 3)
 
 
-def take_out_held(flat: Floats, held: Constraints) -> Floats:
+def remove_held(flat: Floats, held: Constraints) -> Floats:
     """A field in the kernel's order, in place without its parts along held components and normals.
 
     A node of several rollers is there several times; its normals are orthogonal.
@@ -157,5 +157,5 @@ def take_out_held(flat: Floats, held: Constraints) -> Floats:
     return flat
 
 
-def _joined(parts: Sequence[NDArray[np.generic]]) -> NDArray[np.int64]:
+def _join(parts: Sequence[NDArray[np.generic]]) -> NDArray[np.int64]:
     return np.concatenate([*parts, np.zeros(0, np.int64)])

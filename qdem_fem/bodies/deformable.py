@@ -53,7 +53,7 @@ class Body:
             )
         self.name, self.rigid = name, rigid
         self.mesh = mesh if isinstance(mesh, TetMesh) else read_mesh(mesh, where=name)
-        self.material = material.per_element(len(self.mesh.elements))
+        self.material = material.broadcast(len(self.mesh.elements))
         self._displacement = np.zeros_like(self.mesh.nodes)
         self._velocity = np.zeros_like(self.mesh.nodes)
         self.mover: Any = None
@@ -97,7 +97,7 @@ class Body:
 
     @displacement.setter
     def displacement(self, value: ArrayLike) -> None:
-        field = self._checked(value, "displacement")
+        field = self._check_field(value, "displacement")
         if self.mover is not None:
             self.mover.set_field(self, "displacement", field)
         self._displacement = field
@@ -111,7 +111,7 @@ class Body:
 
     @velocity.setter
     def velocity(self, value: ArrayLike) -> None:
-        field = self._checked(value, "velocity")
+        field = self._check_field(value, "velocity")
         if self.mover is not None:
             self.mover.set_field(self, "velocity", field)
         self._velocity = field
@@ -194,7 +194,7 @@ class Body:
             )
         return np.setdiff1d(chosen, unused)
 
-    def _checked(self, value: ArrayLike, what: str) -> Floats:
+    def _check_field(self, value: ArrayLike, what: str) -> Floats:
         try:
             field = np.array(value, dtype=float)
         except (TypeError, ValueError):

@@ -123,18 +123,18 @@ class BodyFrames:
 
     def velocity_world(self, own: Floats, nodes: slice = slice(None)) -> Floats:
         """``v`` of ``v'`` (n, 3) [m/s] of all nodes or some."""
-        return self.turned(own, nodes) + self.velocity[self.of_node[nodes]]
+        return self.turn_vectors(own, nodes) + self.velocity[self.of_node[nodes]]
 
     def velocity_own(self, world: Floats) -> Floats:
         """``v'`` of ``v`` (n, 3) [m/s]."""
         back = self.rotation[self.of_node].transpose(0, 2, 1)
         return np.einsum("nij,nj->ni", back, world - self.velocity[self.of_node])
 
-    def turned(self, own: Floats, nodes: slice = slice(None)) -> Floats:
+    def turn_vectors(self, own: Floats, nodes: slice = slice(None)) -> Floats:
         """Vectors of the frames (n, 3), at all nodes or some, as the laboratory sees them."""
         return np.einsum("nij,nj->ni", self.rotation[self.of_node[nodes]], own)
 
-    def loads_turned(self, loads: Loads, user_node: Integers) -> Loads:
+    def turn_loads(self, loads: Loads, user_node: Integers) -> Loads:
         """Loads in the directions of the frames; ``user_node`` (n,): number by kernel number.
 
         Each component that acts on a node of a turned frame becomes three.
@@ -171,7 +171,7 @@ class BodyFrames:
         faster = np.where(self.moving[:, None], journey.fall_velocity[steps - 1], 0.0)
         self.velocity = self.velocity + faster
 
-    def probes_world(
+    def turn_probes(
         self, probes: Probes, user_node: Integers, done: int, step: float, journey: Journey
     ) -> None:
         """Turn the samples of a window of ``done`` steps into displacements of the laboratory."""
@@ -183,7 +183,7 @@ class BodyFrames:
             shift = self.shift_after(steps, step, journey)
             probes.record[sample] = self._displacement_at(nodes, probes.record[sample], shift)
 
-    def carried_work(
+    def find_frame_work(
         self, loads: Loads, user_node: Integers, table: Floats, step: float, journey: Journey
     ) -> float:
         """Work of the loads along the frames' own way [J]: ``dt sum_k F(t_k) (V- + V+)/2``.
@@ -205,7 +205,7 @@ class BodyFrames:
         mean = self.velocity[loaded] + (0.5 * (before + after))[:, None, :]
         return float(step * (force * mean).sum())
 
-    def steps_near(self, own_velocity: Floats, step: float) -> int:
+    def count_near_steps(self, own_velocity: Floats, step: float) -> int:
         """Steps in which no node moves further than `FAR` in its frame; at least one."""
         speed = np.sqrt((own_velocity**2).sum(axis=1))
         fastest = np.maximum.reduceat(speed, self.first_node[:-1])[self.moving[:-1]]

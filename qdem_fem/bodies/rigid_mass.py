@@ -76,14 +76,14 @@ def make_stiffness_six(body: Integers, arm: Floats, stiffness: Floats, count: in
     [N/m]: in all directions.
     """
 
-    def summed(each: Floats) -> Floats:
+    def sum_by_body(each: Floats) -> Floats:
         return np.asarray(np.bincount(body, each, count), dtype=float)
 
-    total, pulls = summed(stiffness), stiffness * arm.T
-    first = np.stack([summed(pull) for pull in pulls], axis=-1)
+    total, pulls = sum_by_body(stiffness), stiffness * arm.T
+    first = np.stack([sum_by_body(pull) for pull in pulls], axis=-1)
     second = np.empty((count, 3, 3))
     for i, j in np.ndindex(3, 3):  # bincount is ten times as fast as np.add.at on rows
-        second[:, i, j] = summed(pulls[i] * arm[:, j])
+        second[:, i, j] = sum_by_body(pulls[i] * arm[:, j])
     spring = np.zeros((count, 6, 6))
     spring[:, :3, :3] = total[:, None, None] * np.eye(3)
     spring[:, 3:, :3] = make_cross_matrix(first)

@@ -37,11 +37,11 @@ def run_qdem(arguments: argparse.Namespace) -> int:
     refuse_both(arguments)
     prepared = load_scene(arguments.scene, arguments.overrides)
     if arguments.dry_run:
-        _print(_outlook(prepared), arguments.json)
+        _print(_preview_run(prepared), arguments.json)
         return 0
     path = place_run(arguments)
     with warnings.catch_warnings():
-        warnings.showwarning = _warning_show
+        warnings.showwarning = _show_warning
         summary = _run(prepared, path, arguments)
     _print(summary, arguments.json)
     return 0
@@ -67,8 +67,8 @@ def _run(prepared: Prepared, path: Path, arguments: argparse.Namespace) -> dict[
         "overrides": arguments.overrides,
         **record_provenance(["trackbed", *sys.argv[1:]]),
     }
-    with folder.locked():
-        goes_on = folder.settle(
+    with folder.lock():
+        goes_on = folder.prepare(
             manifest, prepared.text.text, resume=arguments.resume, force=arguments.force
         )
         if goes_on and (summary := folder.summary):
@@ -92,12 +92,12 @@ def _run(prepared: Prepared, path: Path, arguments: argparse.Namespace) -> dict[
     return summary | {"folder": str(path)}
 
 
-def _warning_show(message: Warning | str, *_args: Any, **_options: Any) -> None:
+def _show_warning(message: Warning | str, *_args: Any, **_options: Any) -> None:
     """A warning as a sentence, without the line of code it comes from."""
     print(f"warning: {message}", file=sys.stderr, flush=True)
 
 
-def _outlook(prepared: Prepared) -> dict[str, Any]:
+def _preview_run(prepared: Prepared) -> dict[str, Any]:
     """What a run would be: bodies, steps, and the cost as a short trial tells it."""
     from qdem_fem.files import StepWarning
     from qdem_fem.scene import (
@@ -114,10 +114,10 @@ def _outlook(prepared: Prepared) -> dict[str, Any]:
         "left_out": prepared.scene.list_left_out(),
     }
     if "track" in prepared.text.data:
-        from qdem_fem.track import TrackPrepared, foresee_bed
+        from qdem_fem.track import TrackPrepared, preview_bed
 
         assert isinstance(prepared, TrackPrepared)
-        if bed := foresee_bed(prepared):  # what follows it is known when it stands
+        if bed := preview_bed(prepared):  # what follows it is known when it stands
             return outlook | {"bed": bed}
     run, bodies = make_simulation(prepared)
     outlook |= {
@@ -129,7 +129,7 @@ def _outlook(prepared: Prepared) -> dict[str, Any]:
         plan = make_plan(prepared, float(run.step))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", StepWarning)  # the outlook has its text
-            seconds = _seconds_a_step(run, plan.total)
+            seconds = _time_step(run, plan.total)
         outlook |= {
             "step": plan.step,
             "steps": plan.total,
@@ -140,7 +140,7 @@ def _outlook(prepared: Prepared) -> dict[str, Any]:
     return outlook
 
 
-def _seconds_a_step(run: Any, most: int) -> float:
+def _time_step(run: Any, most: int) -> float:
     """Time of one step on the clock [s], from a few steps; the first ones compile."""
     run.advance(run.step)
     steps = 1
@@ -203,7 +203,7 @@ class Progress:
         self._printed = time.monotonic()
         self._first: tuple[float, int] | None = None
 
-    def at(self, steps: int, total: int, when: float) -> None:
+    def report(self, steps: int, total: int, when: float) -> None:
         """So many of all steps are done; ``when`` is the simulated time [s]."""
         now = time.monotonic()
         first = self._first = self._first or (now, steps)

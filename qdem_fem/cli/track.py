@@ -64,7 +64,7 @@ def make_grain_file(arguments: argparse.Namespace) -> int:
     from qdem_fem.grains import BALLAST, Grading, GrainRecipe, make_grains, save_grains
 
     _refuse_no_folder(arguments.out)
-    recipe = GrainRecipe(**_given(arguments, "sphericity", "roundness"))
+    recipe = GrainRecipe(**_select_given(arguments, "sphericity", "roundness"))
     grading = BALLAST
     if arguments.sizes is not None:
         grading = Grading(np.array(arguments.sizes), np.array([0.0, 1.0]))
@@ -87,10 +87,10 @@ def make_train_file(arguments: argparse.Namespace) -> int:
     )
 
     _refuse_no_folder(arguments.out)
-    train = Train(**_given(arguments, "cars", "speed", "axle_load", "first_share"))
-    track, rough = Track(**_given(arguments, "modulus")), None
+    train = Train(**_select_given(arguments, "cars", "speed", "axle_load", "first_share"))
+    track, rough = Track(**_select_given(arguments, "modulus")), None
     if arguments.roughness is not None:
-        rough = Roughness(arguments.roughness, **_given(arguments, "seed"))
+        rough = Roughness(arguments.roughness, **_select_given(arguments, "seed"))
     elif arguments.seed is not None:
         raise UsageError("--seed is that of a roughness", remedy="give --roughness, too")
     flats = [WheelFlat(axle, peak, duration) for axle, peak, duration in arguments.flat]
@@ -100,7 +100,7 @@ def make_train_file(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _given(arguments: argparse.Namespace, *names: str) -> dict[str, Any]:
+def _select_given(arguments: argparse.Namespace, *names: str) -> dict[str, Any]:
     """Those of the named arguments that were given."""
     return {
         name: getattr(arguments, name) for name in names if getattr(arguments, name) is not None

@@ -99,7 +99,7 @@ def find_near_step(
         bound = bound_spring_network(ends, stiffness, wall, inverse_mass, rigid)
         return shorten_step_by_contact(elements, bound, viscous=run.viscous)
 
-    def springs(u: Floats) -> Floats:
+    def apply_springs(u: Floats) -> Floats:
         """``-M^-1 K_near u`` [m/s^2], (n, 3)."""
         moved = u[nodes]
         pull = -wall[:, None] * moved
@@ -110,4 +110,4 @@ def find_near_step(
         change[nodes] = pull * inverse_mass[:, None]
         return change
 
-    return find_critical_step(run, springs).value
+    return find_critical_step(run, apply_springs).value

@@ -77,16 +77,16 @@ def find_highest_mode(
     n = len(mass)
     root = np.sqrt(np.where(mass > 0, mass, 1.0))[:, None]
 
-    def product(x: Floats, rate: float) -> Floats:
+    def multiply(x: Floats, rate: float) -> Floats:
         u = np.ascontiguousarray(x.reshape(n, 3) / root)
         return (-accelerate(u, rate * u) * root).ravel()
 
     start = np.random.default_rng(seed).normal(size=3 * n)
     step, rate = inf, 0.0
-    if not (product(start, 0.0).any() or (viscous and product(start, 1.0).any())):
+    if not (multiply(start, 0.0).any() or (viscous and multiply(start, 1.0).any())):
         return inf, 0.0, np.zeros((n, 3))  # all is held
     for _ in range(ROUNDS):
-        operator = LinearOperator((3 * n, 3 * n), matvec=partial(product, rate=rate), dtype=float)
+        operator = LinearOperator((3 * n, 3 * n), matvec=partial(multiply, rate=rate), dtype=float)
         if 3 * n <= 24:  # too small for Lanczos
             matrix = np.stack([operator.matvec(e) for e in np.eye(3 * n)])
             values, vectors = np.linalg.eigh((matrix + matrix.T) / 2)
@@ -95,10 +95,10 @@ def find_highest_mode(
             values, vectors = eigsh(operator, k=1, which="LA", tol=LANCZOS_TOLERANCE, v0=start)
             value, vector = values[0], vectors[:, 0]
         residual = float(np.linalg.norm(operator.matvec(vector) - value * vector))
-        stiffness = float(vector @ product(vector, 0.0))
+        stiffness = float(vector @ multiply(vector, 0.0))
         damping = max(0.0, (value - stiffness) / rate) if rate > 0 else 0.0
         if rate == 0.0 and viscous:
-            damping = float(vector @ (product(vector, 1.0) - product(vector, 0.0)))
+            damping = float(vector @ (multiply(vector, 1.0) - multiply(vector, 0.0)))
         before, step = step, find_lagged_viscous_step(stiffness + residual, damping)
         start, rate = vector, 2 / step if np.isfinite(step) else 0.0
         if not viscous or abs(step - before) < ROUND_TOLERANCE * step:
@@ -141,11 +141,11 @@ def find_critical_step(
         element=element,
         body=body.name,
         mode=mode / (abs(mode).max() or 1.0),
-        remark=remark_on_short_step(run, stiffness, body, element),
+        remark=describe_short_step(run, stiffness, body, element),
     )
 
 
-def remark_on_short_step(run: System, stiffness: float, governing: Body, element: int) -> str:
+def describe_short_step(run: System, stiffness: float, governing: Body, element: int) -> str:
     """Which element makes the step short, where ``2/sqrt(stiffness)`` is `SHORT`; else nothing.
 
     ``stiffness`` [1/s^2]: of the governing motion, without what viscosity takes from the step.

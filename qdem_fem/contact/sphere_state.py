@@ -16,7 +16,7 @@ from qdem_fem.contact.search import (
     check_extents,
     check_joined,
     choose_skin,
-    extents,
+    find_extents,
     find_near_walls,
     make_pairs,
     renew_pairs,
@@ -54,12 +54,12 @@ class SphereContacts(Contacts):
         super().__init__(run, asked)
         counts = np.diff(self.first_vertex)
 
-        def by_body(values: list[float]) -> Floats:
+        def repeat_by_body(values: list[float]) -> Floats:
             return np.repeat(np.array(values, dtype=float), counts)
 
-        normal = by_body([asked.of_body(b.name, "normal_stiffness") for b in run.bodies])
-        radius = by_body([asked.of_body(b.name, "radius") for b in run.bodies])
-        poisson = by_body([float(np.mean(b.material.poisson)) for b in run.bodies])
+        normal = repeat_by_body([asked.find_value(b.name, "normal_stiffness") for b in run.bodies])
+        radius = repeat_by_body([asked.find_value(b.name, "radius") for b in run.bodies])
+        poisson = repeat_by_body([float(np.mean(b.material.poisson)) for b in run.bodies])
         self.one = compute_pair_stiffness(normal, normal.max(initial=0.0))
         self.skin = float(SKIN_OF_SPHERES * radius.min() if asked.skin is None else asked.skin)
         free = asked.skin is None and asked.contacts != NEAR
@@ -105,13 +105,15 @@ class SphereContacts(Contacts):
         least, most = self.skins
         room = least + self.room / 2
         self.skin = choose_skin(
-            self.skin, self.lasted, self.idle(), len(self.nodes), least, min(most, room)
+            self.skin, self.lasted, self.count_idle_pairs(), len(self.nodes), least, min(most, room)
         )  # fmt: skip
-        self.look_for_pairs(position, max(self.skin, min(self.parted(position), self.deep, room)))
+        self.look_for_pairs(
+            position, max(self.skin, min(self.measure_gap(position), self.deep, room))
+        )
 
     def extents(self, position: Floats, side: PeriodicWidth) -> Floats:
         """Extent of each body along the axis of a width [m], (bodies,)."""
-        return extents(position[:, side.number], self.first_vertex)
+        return find_extents(position[:, side.number], self.first_vertex)
 
     def check_images(self, position: Floats) -> None:
         """Raise `ConditionError` for a body that would touch its own image across the width."""
@@ -126,7 +128,7 @@ class SphereContacts(Contacts):
         size = self.extents(position, side)
         self.room = check_extents(run.bodies, size, self.reach, side, self.where)
 
-    def idle(self) -> int:
+    def count_idle_pairs(self) -> int:
         """Pairs of the list that do not touch."""
         return len(self.pairs.second) - int(self.pairs.touching.sum())
 
@@ -140,7 +142,7 @@ class SphereContacts(Contacts):
         self.kernel = self.kernel._replace(pairs=pairs, half_skin=self.skin / 2)
         self.kernel.start[:] = position
 
-    def parted(self, position: Floats) -> float:
+    def measure_gap(self, position: Floats) -> float:
         """By how much what touched in the last step is apart at (c, 3) [m].
 
         A list has to hold it for one step more, in which its spring is let go.
@@ -238,7 +240,7 @@ class SphereContacts(Contacts):
         pressed = (self.kernel.planes.force != 0).any(axis=(0, 2))
         return body[self._ends()], body[pressed]
 
-    def stored(self) -> dict[str, NDArray[Any]]:
+    def pack_state(self) -> dict[str, NDArray[Any]]:
         self.refresh()
         arrays = {f"contact_{name}": getattr(self.pairs, name) for name in PAIR_ARRAYS}
         if self.asked.periodic is not None:

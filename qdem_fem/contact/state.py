@@ -123,7 +123,7 @@ class Contacts(ABC):
         """Numbers of the bodies that touch each other (t, 2), and of those on a wall (w,)."""
 
     @abstractmethod
-    def stored(self) -> dict[str, NDArray[Any]]:
+    def pack_state(self) -> dict[str, NDArray[Any]]:
         """Everything that the next step reads, to the bit."""
 
     @abstractmethod
@@ -201,7 +201,9 @@ class Contacts(ABC):
         """The time, or before the first step the key, for messages on the width."""
         return self.when if self.run.steps_done else "contact.periodic.width"
 
-    def window(self, steps: int, step: float, given: Given, work: Floats) -> tuple[int, float]:
+    def advance_window(
+        self, steps: int, step: float, given: Given, work: Floats
+    ) -> tuple[int, float]:
         """`Assembly.window` with contact; comes back early where pairs have to be looked for."""
         done, bad, said = self.march(steps, step, given, work)
         self.lasted += done

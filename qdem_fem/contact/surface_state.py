@@ -77,7 +77,7 @@ class SurfaceContacts(Contacts):
         """First vertex, face, point and edge of every body, and the ends."""
         face, area, point_face = (np.concatenate(each) for each in (faces, areas, of_points))
         body_of = [np.repeat(np.arange(len(counts)), np.diff(first)) for first in self.firsts]
-        modulus = np.array([asked.of_body(body.name, "modulus") for body in run.bodies])
+        modulus = np.array([asked.find_value(body.name, "modulus") for body in run.bodies])
         poisson = np.array([float(np.mean(body.material.poisson)) for body in run.bodies])
         size, walls, count = len(self.nodes), len(asked.planes), len(point_face)
         fan = np.argsort(face.ravel(), kind="stable")
@@ -103,7 +103,7 @@ class SurfaceContacts(Contacts):
         )  # fmt: skip
         covering = np.zeros(size)
         np.add.at(covering, face, np.repeat(area[:, None] / 3, 3, axis=1))
-        covering = self.shared(covering)
+        covering = self.sum_shared(covering)
         self.one = compute_pair_stiffness(modulus, modulus.max())[body_of[0]] * covering
 
     @property
@@ -125,7 +125,7 @@ class SurfaceContacts(Contacts):
         self.kernel = self.kernel._replace(near=near)
         self.kernel.start[:] = position
 
-    def shared(self, values: Floats) -> Floats:
+    def sum_shared(self, values: Floats) -> Floats:
         """(c,) for every vertex the sum over all that move with its node."""
         total = np.zeros(self.run.assembly.n_nodes)
         np.add.at(total, self.place, values)
@@ -161,7 +161,7 @@ class SurfaceContacts(Contacts):
         held = np.maximum(walls.weight, 0).sum(axis=0)
         stiffness = 2 * held * surface.modulus[surface.point_body]
         np.add.at(total, surface.point_node, stiffness[:, None] * surface.point_share)
-        total = self.shared(total)
+        total = self.sum_shared(total)
         bound = total * self.inverse_mass + self.bound_rigid(total)
         return float(bound.max(initial=0.0))
 
@@ -182,7 +182,7 @@ class SurfaceContacts(Contacts):
         pressed = (self.kernel.walls.weight > 0).any(axis=0)
         return np.concatenate([by_points, by_edges]), surface.point_body[pressed]
 
-    def stored(self) -> dict[str, NDArray[Any]]:
+    def pack_state(self) -> dict[str, NDArray[Any]]:
         self.refresh()
         kernel, walls = self.kernel, self.kernel.walls
         arrays = {f"contact_near_{name}": getattr(self.near, name) for name in Near._fields}

@@ -121,7 +121,7 @@ class System:
     def pack_lists(self) -> tuple[Loads, Constraints]:
         """The kernel's lists of the present conditions."""
         if self._lists is None:
-            self._lists = self.assembly.lists(self.conditions, self.gravity is not None)
+            self._lists = self.assembly.pack_lists(self.conditions, self.gravity is not None)
             if self.rigid is not None:
                 self._lists = self.rigid.split_lists(*self._lists, self.motion.work)
         return self._lists

@@ -48,7 +48,9 @@ def advance_contact(
 
 
 @overload(advance_contact, strict=False)
-def _advance_of(contact: Any, threads: Any, displacement: Any, velocity: Any, step: float) -> Any:
+def _choose_advance(
+    contact: Any, threads: Any, displacement: Any, velocity: Any, step: float
+) -> Any:
     if isinstance(contact, types.NoneType):
         return lambda contact, threads, displacement, velocity, step: GO_ON
     if contact.instance_class is not Contact:
@@ -68,7 +70,7 @@ def build_contact_window(made_from: str) -> Any:
     """The loop; ``made_from`` makes the sources it calls a part of its key on disk."""
 
     @njit(cache=True, error_model="numpy")
-    def contact_window(
+    def advance_contact_window(
         threads: Any, law: Any, viscous: Any, layout: Any, state: Any, loads: Any, held: Any,
         probes: Any, table: Any, gravity: Any, work: Any, step: Any, steps: int, contact: Any,
         acting: Any, force_at: Any, pull: Any, rigid: Any,
@@ -105,7 +107,7 @@ def build_contact_window(made_from: str) -> Any:
                 return k + 1, bad, said
         return steps, 0.0, GO_ON
 
-    return contact_window
+    return advance_contact_window
 
 
 contact_window: Any = build_contact_window(
@@ -142,7 +144,7 @@ def run_window(
     """
     assembly = run.assembly
     place, *forces = list_forces(contact)
-    rigid = None if run.rigid is None else run.rigid.kernel_of(given.probes.node_at, place)
+    rigid = None if run.rigid is None else run.rigid.make_kernel(given.probes.node_at, place)
     before, threads = numba.get_num_threads(), choose_threads(run, contact)
     numba.set_num_threads(threads)
     try:

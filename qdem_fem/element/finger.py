@@ -13,11 +13,11 @@ from numpy.typing import ArrayLike
 
 from qdem_fem.element.kinematics import (
     IDENTITY,
-    cofactor,
-    contraction,
-    isotropic,
-    trace,
-    transposed,
+    apply_hooke,
+    contract,
+    find_cofactor,
+    find_trace,
+    transpose,
 )
 from qdem_fem.element.stress import Nine, compute_viscous_stress
 from qdem_fem.files import Floats
@@ -37,12 +37,12 @@ OBJECTIVE = True
 
 def compute_strain(H: Floats) -> Floats:
     """eps = (F F^T - I)/2 = (H + H^T + H H^T)/2 [-] (eqs 3, 4)."""
-    return (H + transposed(H) + H @ transposed(H)) / 2
+    return (H + transpose(H) + H @ transpose(H)) / 2
 
 
 def compute_nominal_stress(H: Floats, lame_first: ArrayLike, lame_second: ArrayLike) -> Floats:
     """P = T cof(F) [Pa] with the Cauchy stress T of the Finger strain (eqs 2, 9, 10)."""
-    return isotropic(compute_strain(H), lame_first, lame_second) @ cofactor(IDENTITY + H)
+    return apply_hooke(compute_strain(H), lame_first, lame_second) @ find_cofactor(IDENTITY + H)
 
 
 def compute_stored_energy(
@@ -54,12 +54,12 @@ def compute_stored_energy(
     nu = 0.25 and within the order of the strain otherwise.
     """
     lam, mu = np.asarray(lame_first, float), np.asarray(lame_second, float)
-    first, minors = trace(H)[..., 0, 0], cofactor(H)
-    spread = first + contraction(H, H) / 2  # tr(eps)
-    beyond_first = trace(minors)[..., 0, 0] + contraction(H, minors) / 3
+    first, minors = find_trace(H)[..., 0, 0], find_cofactor(H)
+    spread = first + contract(H, H) / 2  # tr(eps)
+    beyond_first = find_trace(minors)[..., 0, 0] + contract(H, minors) / 3
     j = first + beyond_first  # compute_volume_change(H)
     # (1 + j) tr(eps) - j, its first order tr H - tr H left out
-    density = mu * (contraction(H, H) / 2 - beyond_first + j * spread)
+    density = mu * (contract(H, H) / 2 - beyond_first + j * spread)
     return volume * (density + (lam - mu) / 2 * spread**2)
 
 

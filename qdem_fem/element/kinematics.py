@@ -27,22 +27,22 @@ def compute_displacement_gradient(
     return np.swapaxes(u[:, 1:] - u[:, :1], -1, -2) @ gradients
 
 
-def transposed(matrix: Floats) -> Floats:
+def transpose(matrix: Floats) -> Floats:
     """A^T of every matrix."""
     return np.swapaxes(matrix, -1, -2)
 
 
-def trace(matrix: Floats) -> Floats:
+def find_trace(matrix: Floats) -> Floats:
     """tr A of every matrix, with two axes of length 1 to multiply matrices."""
     return np.trace(matrix, axis1=-2, axis2=-1)[..., None, None]
 
 
-def contraction(first: Floats, second: Floats) -> Floats:
+def contract(first: Floats, second: Floats) -> Floats:
     """A : B of every pair of matrices, (m,)."""
     return np.einsum("...ij,...ij->...", first, second)
 
 
-def cofactor(matrix: Floats) -> Floats:
+def find_cofactor(matrix: Floats) -> Floats:
     """cof A = det(A) A^-T of every matrix, also where A has no inverse: cyclic minors."""
     minors = np.empty_like(matrix)
     for i, j in np.ndindex(3, 3):
@@ -55,12 +55,12 @@ def cofactor(matrix: Floats) -> Floats:
 
 def compute_volume_change(H: Floats) -> Floats:
     """J - 1 = tr H + tr cof H + det H [-], (m,), without cancellation."""
-    minors = cofactor(H)
-    determinant = contraction(H, minors) / 3
-    return trace(H)[..., 0, 0] + trace(minors)[..., 0, 0] + determinant
+    minors = find_cofactor(H)
+    determinant = contract(H, minors) / 3
+    return find_trace(H)[..., 0, 0] + find_trace(minors)[..., 0, 0] + determinant
 
 
-def isotropic(tensor: Floats, first: ArrayLike, second: ArrayLike) -> Floats:
+def apply_hooke(tensor: Floats, first: ArrayLike, second: ArrayLike) -> Floats:
     """first tr(A) I + 2 second A of a symmetric A (..., 3, 3): the common form of eqs 2 and 7."""
     trace = np.trace(tensor, axis1=-2, axis2=-1)[..., None, None]
     one, two = (np.asarray(value, float)[..., None, None] for value in (first, second))
@@ -72,11 +72,11 @@ def compute_quadratic_energy(
 ) -> Floats:
     """``V0 (lambda/2 tr(e)^2 + mu e : e)`` of every element [J], (m,); ``volume`` is V0 [m^3]."""
     lam, mu = np.asarray(lame_first, float), np.asarray(lame_second, float)
-    first = trace(strain)[..., 0, 0]
-    return volume * (lam / 2 * first**2 + mu * contraction(strain, strain))
+    first = find_trace(strain)[..., 0, 0]
+    return volume * (lam / 2 * first**2 + mu * contract(strain, strain))
 
 
 def compute_von_mises(cauchy: Floats) -> Floats:
     """sqrt(3/2 s : s) [Pa], (m,), with the deviator s of the Cauchy stress (m, 3, 3)."""
-    deviator = cauchy - trace(cauchy) * IDENTITY / 3
-    return np.sqrt(1.5 * contraction(deviator, deviator))
+    deviator = cauchy - find_trace(cauchy) * IDENTITY / 3
+    return np.sqrt(1.5 * contract(deviator, deviator))

@@ -48,7 +48,7 @@ class Material:
     def __post_init__(self) -> None:
         lengths: dict[str, int] = {}
         for field in fields(self):
-            value = _real(field.name, getattr(self, field.name))
+            value = _check_real(field.name, getattr(self, field.name))
             object.__setattr__(self, field.name, value)
             if isinstance(value, np.ndarray):
                 lengths[field.name] = len(value)
@@ -93,7 +93,7 @@ class Material:
         """Whether any element has a viscosity."""
         return bool(np.any(self.shear_viscosity) or np.any(self.bulk_viscosity))
 
-    def per_element(self, elements: int) -> Material:
+    def broadcast(self, elements: int) -> Material:
         """The same material with an array (elements,) for each property.
 
         Raises `MaterialError` if a property is already an array of another length.
@@ -112,7 +112,7 @@ class Material:
         return tuple(getattr(self, field.name) for field in fields(self))
 
 
-def _real(name: str, value: Any) -> Value:
+def _check_real(name: str, value: Any) -> Value:
     """``value`` as a float or as an array (m,) that can not be written; `MaterialError` if not."""
     where = f"material, {name}"
     remedy = "give a real number" + (f" in {_UNITS[name]}" if _UNITS[name] else "")
@@ -135,7 +135,7 @@ def _real(name: str, value: Any) -> Value:
     if array.dtype.kind not in "iuf":
         raise not_real
     if array.ndim == 0:
-        return _real(name, array.item())
+        return _check_real(name, array.item())
     if not isinstance(value, np.ndarray) and any(isinstance(v, bool | np.bool_) for v in value):
         raise not_real  # NumPy takes [1.0, True] for two numbers
     if array.ndim != 1 or array.size == 0:

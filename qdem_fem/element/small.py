@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from numpy.typing import ArrayLike
 
-from qdem_fem.element.kinematics import compute_quadratic_energy, isotropic, transposed
+from qdem_fem.element.kinematics import apply_hooke, compute_quadratic_energy, transpose
 from qdem_fem.element.stress import Nine
 from qdem_fem.files import Floats
 
@@ -26,12 +26,12 @@ OBJECTIVE = False
 
 def compute_strain(H: Floats) -> Floats:
     """e = (H + H^T)/2 [-]."""
-    return (H + transposed(H)) / 2
+    return (H + transpose(H)) / 2
 
 
 def compute_nominal_stress(H: Floats, lame_first: ArrayLike, lame_second: ArrayLike) -> Floats:
     """P = T = lambda tr(e) I + 2 mu e [Pa] of linear elasticity."""
-    return isotropic(compute_strain(H), lame_first, lame_second)
+    return apply_hooke(compute_strain(H), lame_first, lame_second)
 
 
 def compute_stored_energy(

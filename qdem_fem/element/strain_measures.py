@@ -12,7 +12,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal
 
-from qdem_fem.element.kinematics import IDENTITY, compute_volume_change, transposed
+from qdem_fem.element.kinematics import IDENTITY, compute_volume_change, transpose
 from qdem_fem.files import Floats
 from trackbed.choices import find_choices
 
@@ -32,4 +32,4 @@ def compute_cauchy_stress(H: Floats, nominal: Floats, strain: Strain) -> Floats:
     """Cauchy stress T = P F^T/J [Pa], (m, 3, 3); T is P where the measure is not objective."""
     if not MEASURES[strain].OBJECTIVE:
         return nominal
-    return nominal @ transposed(IDENTITY + H) / (1 + compute_volume_change(H))[..., None, None]
+    return nominal @ transpose(IDENTITY + H) / (1 + compute_volume_change(H))[..., None, None]

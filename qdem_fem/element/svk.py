@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from numpy.typing import ArrayLike
 
-from qdem_fem.element.kinematics import IDENTITY, compute_quadratic_energy, isotropic, transposed
+from qdem_fem.element.kinematics import IDENTITY, apply_hooke, compute_quadratic_energy, transpose
 from qdem_fem.element.stress import Nine, compute_viscous_stress
 from qdem_fem.files import Floats
 
@@ -28,7 +28,7 @@ OBJECTIVE = True
 
 def compute_strain(H: Floats) -> Floats:
     """Green's strain E = (F^T F - I)/2 = (H + H^T + H^T H)/2 [-]."""
-    return (H + transposed(H) + transposed(H) @ H) / 2
+    return (H + transpose(H) + transpose(H) @ H) / 2
 
 
 def compute_nominal_stress(H: Floats, lame_first: ArrayLike, lame_second: ArrayLike) -> Floats:
@@ -36,7 +36,7 @@ def compute_nominal_stress(H: Floats, lame_first: ArrayLike, lame_second: ArrayL
 
     Softens under compression, and loses all stiffness below a stretch of 0.58.
     """
-    return (IDENTITY + H) @ isotropic(compute_strain(H), lame_first, lame_second)
+    return (IDENTITY + H) @ apply_hooke(compute_strain(H), lame_first, lame_second)
 
 
 def compute_stored_energy(

@@ -69,7 +69,7 @@ def is_real(value: object) -> bool:
     return isinstance(value, Real) and not isinstance(value, bool) and isfinite(value)
 
 
-def ramp(duration: float, value: ArrayLike) -> Series:
+def make_ramp(duration: float, value: ArrayLike) -> Series:
     """From zero to ``value`` in ``duration`` [s], then constant: the paper's loading (3.1)."""
     if not (is_real(duration) and duration > 0):
         raise ConditionError(f"a ramp of {duration} s", where="ramp", remedy="give a time above 0")
@@ -102,14 +102,14 @@ class Driver:
             self.varying = value
             self.sample(np.zeros(1))  # a fault is found now, not in the run
         else:
-            self.constant = self._columns(value, 1, None)[0]
+            self.constant = self._check_columns(value, 1, None)[0]
 
     def sample(self, times: Floats) -> Floats:
         """Values (k, components) at ``times`` (k,) [s]."""
         if self.varying is None:
             return np.broadcast_to(self.constant, (len(times), self.components))
         if isinstance(self.varying, Series):
-            return self._columns(self.varying.at(times), len(times), None)
+            return self._check_columns(self.varying.at(times), len(times), None)
         rows = []
         for time in map(float, times):
             try:
@@ -119,10 +119,10 @@ class Driver:
                     f"the function failed at t = {time:g} s ({type(error).__name__}: {error})",
                     where=self.where, remedy="give a function of one number, the time in s",
                 ) from error  # fmt: skip
-            rows.append(self._columns(value, 1, time))
+            rows.append(self._check_columns(value, 1, time))
         return np.concatenate(rows)
 
-    def _columns(self, value: Any, rows: int, time: float | None) -> Floats:
+    def _check_columns(self, value: Any, rows: int, time: float | None) -> Floats:
         when = "" if time is None else f" at t = {time:g} s"
         try:
             given = np.asarray(value)

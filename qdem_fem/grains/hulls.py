@@ -131,7 +131,7 @@ def draw_grain(generator: np.random.Generator, recipe: GrainRecipe) -> GrainForm
     for _ in range(DRAWS_MOST):
         count = int(generator.integers(recipe.corners[0], recipe.corners[1] + 1))
         drawn = _Drawn(generator, count)
-        form = drawn.solved(psi, roundness, reached)
+        form = drawn.solve(psi, roundness, reached)
         if form is not None:
             return form
     got = f"roundness {min(reached):.2f} to {max(reached):.2f}" if reached else "less sphericity"
@@ -191,7 +191,7 @@ class _Drawn:
         self.turn = np.linalg.qr(generator.standard_normal((3, 3)))[0]
         self.turn *= np.sign(np.linalg.det(self.turn))
 
-    def lifted(self, lift: float) -> Floats:
+    def lift_nodes(self, lift: float) -> Floats:
         """Nodes within the unit sphere (n, 3); lifts are lowered until the grain is convex."""
         lifts = np.full(len(self.outward), lift)
         for _ in range(1000):
@@ -205,30 +205,30 @@ class _Drawn:
             lifts[inward] *= LOWERED
         return nodes
 
-    def stretched(self, nodes: Floats, psi: float) -> Floats | None:
+    def stretch_nodes(self, nodes: Floats, psi: float) -> Floats | None:
         """Nodes of sphericity ``psi``, or None where they have less without any stretch.
 
         Stretches keep the volume.
         """
         volume = integrate_polyhedron(nodes, self.faces).volume
 
-        def excess(size: float) -> float:
+        def find_excess(size: float) -> float:
             area = find_surface_area(nodes * np.exp(size * self.axes), self.faces)
             return find_sphericity(volume, area) - psi
 
-        if excess(0.0) < 0 or excess(STRETCH_MOST) > 0:
+        if find_excess(0.0) < 0 or find_excess(STRETCH_MOST) > 0:
             return None
-        size = brentq(excess, 0.0, STRETCH_MOST, xtol=1e-12)
+        size = brentq(find_excess, 0.0, STRETCH_MOST, xtol=1e-12)
         return nodes * np.exp(size * self.axes)
 
-    def solved(self, psi: float, roundness: float, reached: list[float]) -> GrainForm | None:
+    def solve(self, psi: float, roundness: float, reached: list[float]) -> GrainForm | None:
         """The grain of this sphericity and roundness, None if these corners can not have both.
 
         What roundness was had on the way is noted in ``reached``.
         """
 
-        def tried(lift: float) -> tuple[float, Floats] | None:
-            nodes = self.stretched(self.lifted(lift), psi)
+        def try_lift(lift: float) -> tuple[float, Floats] | None:
+            nodes = self.stretch_nodes(self.lift_nodes(lift), psi)
             if nodes is None:
                 return None
             reached.append(find_roundness(nodes, self.faces, self.edges))
@@ -236,18 +236,18 @@ class _Drawn:
 
         below: float | None = None
         for lift in np.linspace(0.0, LIFT_MOST, LIFT_STEPS):
-            found = tried(float(lift))
+            found = try_lift(float(lift))
             if found is None:
                 below = None
             elif abs(found[0]) <= ROUNDNESS_WITHIN:
-                return self._form(found[1], psi, reached[-1])
+                return self._make_form(found[1], psi, reached[-1])
             elif found[0] < 0:
                 below = float(lift)
             elif below is not None:
-                return self._halved(below, float(lift), psi, tried, reached)
+                return self._halve_bracket(below, float(lift), psi, try_lift, reached)
         return None
 
-    def _halved(
+    def _halve_bracket(
         self, below: float, above: float, psi: float, tried: Any, reached: list[float]
     ) -> GrainForm | None:
         """The bracket of two lifts halved until the roundness is near enough; None if it jumps."""
@@ -257,11 +257,11 @@ class _Drawn:
             if found is None:
                 return None
             if abs(found[0]) <= ROUNDNESS_WITHIN:
-                return self._form(found[1], psi, reached[-1])
+                return self._make_form(found[1], psi, reached[-1])
             below, above = (middle, above) if found[0] < 0 else (below, middle)
         return None
 
-    def _form(self, surface: Floats, psi: float, roundness: float) -> GrainForm | None:
+    def _make_form(self, surface: Floats, psi: float, roundness: float) -> GrainForm | None:
         """The grain of a solved surface, None where its mesh has a sliver."""
         turned = surface @ self.turn.T
         inner = place_apex_and_spokes(turned, self.faces, self.count)

@@ -32,19 +32,19 @@ def find_sieve_size(nodes: Floats) -> float:
     by shrinking random turns, the same for every grain.
     """
     x = nodes - nodes.mean(axis=0)
-    starts, turns = _rotations()
-    frames = starts[np.argsort(_hole(x, starts), kind="stable")[:KEPT]]
+    starts, turns = _make_rotations()
+    frames = starts[np.argsort(_measure_hole(x, starts), kind="stable")[:KEPT]]
     for turn in turns:
         tries = np.einsum("kil,tlj->ktij", frames, turn)
         tries[:, 0] = frames
-        width = _hole(x, tries)
+        width = _measure_hole(x, tries)
         best = width.argmin(axis=1)
         frames = tries[np.arange(len(frames)), best]
-    return float(_hole(x, frames).min())
+    return float(_measure_hole(x, frames).min())
 
 
 @cache
-def _rotations() -> tuple[Floats, Floats]:
+def _make_rotations() -> tuple[Floats, Floats]:
     """Frames to start from (s, 2, 3), and turns (rounds, tries, 3, 3) that get smaller."""
     generator = np.random.default_rng(0)
     starts = Rotation.from_quat(generator.standard_normal((STARTS, 4))).as_matrix()[:, :2]
@@ -54,7 +54,7 @@ def _rotations() -> tuple[Floats, Floats]:
     return starts, turns.reshape(ROUNDS, TRIES, 3, 3)
 
 
-def _hole(x: Floats, frames: Floats) -> Floats:
+def _measure_hole(x: Floats, frames: Floats) -> Floats:
     """max(w(a), w(b)) [m] of frames (..., 2, 3)."""
     along = frames @ x.T
     return np.asarray((along.max(axis=-1) - along.min(axis=-1)).max(axis=-1))

@@ -13,7 +13,7 @@ from typing import Any
 
 from numba import njit
 
-__all__ = ["cross", "digest_sources", "dot", "exact", "inlined", "row"]
+__all__ = ["cross", "digest_sources", "dot", "exact", "inlined", "read_row"]
 
 exact: Any = njit(error_model="numpy")
 """No fast mathematics: a force and its reaction are the same number."""
@@ -31,7 +31,7 @@ def digest_sources(*sources: str | ModuleType) -> str:
 
 
 @inlined
-def row(a: Any, i: int) -> Any:  # pragma: no cover
+def read_row(a: Any, i: int) -> Any:  # pragma: no cover
     """Row i of ``a`` (..., 3)."""
     return a[i, 0], a[i, 1], a[i, 2]
 

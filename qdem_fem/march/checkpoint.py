@@ -57,15 +57,15 @@ def write_checkpoint(
         "previous": held.previous,
         "critical_mode": critical.mode,
     }
-    arrays |= assembly.stored()
+    arrays |= assembly.pack_state()
     if simulation.rigid is not None:
-        arrays |= simulation.rigid.stored()
+        arrays |= simulation.rigid.pack_state()
     if simulation.contacts is not None:
-        arrays |= simulation.contacts.stored()
+        arrays |= simulation.contacts.pack_state()
     arrays |= {f"{BESIDE}{name}": array for name, array in (beside or {}).items()}
     stream = io.BytesIO()
     np.savez(stream, **arrays)  # type: ignore[arg-type]  # numpy's stub takes them for its flags
-    write_whole(Path(path), _sealed(stream.getvalue()))
+    write_whole(Path(path), _seal_archive(stream.getvalue()))
 
 
 def read_checkpoint(simulation: State, path: str | Path) -> Arrays:
@@ -81,7 +81,7 @@ def read_checkpoint(simulation: State, path: str | Path) -> Arrays:
         content = Path(path).read_bytes()
     except OSError as error:
         raise CheckpointError(f"can not be read ({error.strerror})", where=where) from error
-    head, arrays = _opened(content, where)
+    head, arrays = _open_archive(content, where)
     _compare(head["fingerprint"], fingerprint_run(simulation), where)
     assembly, (_, held) = simulation.assembly, simulation.pack_lists()
     try:
@@ -116,29 +116,29 @@ def fingerprint_run(simulation: State) -> dict[str, str]:
         if simulation.given_step is not None
         else f"{simulation.safety!r} of the critical one",
         "mass_scaling": repr(simulation.mass_scaling),
-        "gravity": "none" if simulation.gravity is None else _mark(simulation.gravity),
-        "loads": _mark(conditions.loads),
-        "given displacements": _mark(conditions.held),
-        "rollers": _mark(conditions.rollers),
-        "periodic pairs": _mark(simulation.master),
+        "gravity": "none" if simulation.gravity is None else _hash_part(simulation.gravity),
+        "loads": _hash_part(conditions.loads),
+        "given displacements": _hash_part(conditions.held),
+        "rollers": _hash_part(conditions.rollers),
+        "periodic pairs": _hash_part(simulation.master),
     }
     if simulation.contact is not None:
         marks["contact"] = repr(simulation.contact)
         if simulation.contact.periodic is not None:
             marks["periodic width"] = repr(simulation.contact.periodic)
     for number, body in enumerate(simulation.bodies):
-        marks[f"mesh of body {number}"] = _mark([body.nodes, body.elements])
-        marks[f"material of body {number}"] = _mark(body.material)
+        marks[f"mesh of body {number}"] = _hash_part([body.nodes, body.elements])
+        marks[f"material of body {number}"] = _hash_part(body.material)
         if body.rigid:
             marks[f"body {number} is rigid"] = str(body.rigid)
     return marks
 
 
-def _mark(part: Any) -> str:
+def _hash_part(part: Any) -> str:
     """A hash of arrays, of lists and of what has fields; of a function, that it is one."""
     digest = hashlib.sha256()
 
-    def take(part: Any) -> None:
+    def add_part(part: Any) -> None:
         if isinstance(part, np.ndarray):
             digest.update(f"{part.dtype.str} {part.shape}".encode())
             digest.update(np.ascontiguousarray(part).tobytes())
@@ -147,13 +147,13 @@ def _mark(part: Any) -> str:
         elif isinstance(part, list | tuple):
             digest.update(f"{len(part)} parts".encode())
             for each in part:
-                take(each)
+                add_part(each)
         elif hasattr(part, "__dict__"):
-            take(list(vars(part).values()))
+            add_part(list(vars(part).values()))
         else:
             digest.update(repr(part).encode())
 
-    take(part)
+    add_part(part)
     return digest.hexdigest()
 
 
@@ -171,13 +171,13 @@ def _compare(saved: Mapping[str, str], here: Mapping[str, str], where: str) -> N
     )
 
 
-def _sealed(archive: bytes) -> bytes:
+def _seal_archive(archive: bytes) -> bytes:
     """The archive with its own hash as its comment; the length of that ends the archive."""
     body = archive[:-2] + DIGEST.to_bytes(2, "little")
     return body + hashlib.sha256(body).hexdigest().encode()
 
 
-def _opened(content: bytes, where: str) -> tuple[dict[str, Any], Arrays]:
+def _open_archive(content: bytes, where: str) -> tuple[dict[str, Any], Arrays]:
     """Head and arrays of a sound file."""
     body, seal = content[:-DIGEST], content[-DIGEST:]
     if hashlib.sha256(body).hexdigest().encode() != seal:

@@ -25,7 +25,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from qdem_fem.bodies import NOTHING, Assembly, Body, take_out_held
+from qdem_fem.bodies import NOTHING, Assembly, Body, remove_held
 from qdem_fem.files import ConditionError, ElementInverted, Floats, NotConverged, is_real
 from qdem_fem.march.energies import find_energy
 from qdem_fem.march.rigid_motions import check_held
@@ -80,7 +80,7 @@ def relax(simulation: State, tolerance: float, max_steps: int) -> StaticAnswer:
     check_held(simulation)
     before = find_energy(simulation)
     problem = StaticProblem(simulation)
-    found = _conjugate(problem, simulation.bodies, tolerance, max_steps)
+    found = _solve_problem(problem, simulation.bodies, tolerance, max_steps)
     problem.finish(simulation, found.displacement)
     after = find_energy(simulation)
     simulation.motion.work[0] += after.elastic - before.elastic - before.kinetic
@@ -118,7 +118,7 @@ class _Found:
         self.residual = float(np.linalg.norm(r) / size) if size > 0 else 0.0
         self.energy = float(r @ (problem.inverse_mass * r))
 
-    def softest(self) -> float:
+    def lowest_eigenvalue(self) -> float:
         """Lowest eigenvalue of ``M^-1 K`` met: of the iteration's tridiagonal matrix [-]."""
         from scipy.linalg import eigh_tridiagonal
 
@@ -138,15 +138,15 @@ class _Found:
             return 0.0
         if not self.lengths or twice_energy <= 0:
             return np.nan
-        return float(np.sqrt(self.energy / max(self.softest(), 1e-300) / twice_energy))
+        return float(np.sqrt(self.energy / max(self.lowest_eigenvalue(), 1e-300) / twice_energy))
 
 
-def _conjugate(
+def _solve_problem(
     problem: StaticProblem, bodies: Sequence[Body], tolerance: float, max_steps: int
 ) -> _Found:
     """Conjugate gradients, with the true residual at the end."""
     u = problem.start()
-    project, forces, weight = problem.project, problem.forces, problem.inverse_mass
+    project, forces, weight = problem.project, problem.find_forces, problem.inverse_mass
     stiff = weight > 0
     found = _Found(u)
     sure = u
@@ -223,7 +223,7 @@ class StaticProblem:
                 simulation.threads,
             )  # fmt: skip
         assembly, place = self.assembly, self.assembly.place
-        loads, held = assembly.lists(conditions, gravity=False)
+        loads, held = assembly.pack_lists(conditions, gravity=False)
         row = conditions.table(now)[0]
         self.external = np.zeros(4 * assembly.n_nodes)
         np.add.at(self.external, loads.node_at, loads.weight * row[loads.series])
@@ -235,14 +235,14 @@ class StaticProblem:
             used = own.mass > 0
             self.external.reshape(-1, 4)[place[used]] += weight[place[used]]
         self.held, self.target = held, held.weight * row[held.series]
-        self.state = assembly._state(np.ones(assembly.n_nodes))
+        self.state = assembly._make_state(np.ones(assembly.n_nodes))
         self.inverse_mass = find_inverse_stiffness(simulation, assembly)
         self.initial = simulation.assembly.field("displacement")
         self.steps = 0
 
     def start(self) -> Floats:
         """The present displacement with given components at their values."""
-        u = self.project(self.assembly.by_place(self.initial))
+        u = self.project(self.assembly.pack_field(self.initial))
         u[self.held.node_at] = self.target
         return u
 
@@ -256,9 +256,9 @@ class StaticProblem:
 
     def project(self, field: Floats) -> Floats:
         """``field`` without what is held: given components and normals of rollers."""
-        return take_out_held(field.copy(), self.held)
+        return remove_held(field.copy(), self.held)
 
-    def forces(self, u: Floats) -> tuple[Floats, bool]:
+    def find_forces(self, u: Floats) -> tuple[Floats, bool]:
         """``f_int + f_ext`` [N], reactions included, and whether all elements are sound.
 
         The kernel's own step of one second with masses of one kilogram, from rest.
@@ -283,7 +283,7 @@ class StaticProblem:
         """
         slope = float(direction @ r)
         for _ in range(TRIALS):
-            trial, sound = self.forces(u + sigma * direction)
+            trial, sound = self.find_forces(u + sigma * direction)
             if sound:
                 break
             sigma /= 4
@@ -296,7 +296,7 @@ class StaticProblem:
             return length, total + length * change, 0.0
         predicted = total + length * change
         for _ in range(TRIALS):
-            true, sound = self.forces(u + length * direction)
+            true, sound = self.find_forces(u + length * direction)
             left = float(direction @ self.project(true))
             if sound and abs(left) <= SLOPE_LEFT * slope:
                 break

@@ -31,7 +31,7 @@ def find_energy(run: State) -> Energy:
     velocity, motion = find_velocity(run), run.motion
     kinetic = 0.5 * float((run.assembly.mass * (velocity**2).sum(axis=1)).sum())
     if run.rigid is not None:
-        kinetic += run.rigid.kinetic(run.rigid.now(run.acting()))
+        kinetic += run.rigid.kinetic_energy(run.rigid.find_motion(run.find_acting()))
     elastic = sum(
         body.elastic_energy(body.displacement, run.strain).sum()
         for body in run.bodies
@@ -42,6 +42,6 @@ def find_energy(run: State) -> Energy:
         external += float(find_half_work(run, run.assembly.field("velocity"), velocity).sum())
         viscous += find_viscous_half(run)
         if run.rigid is not None:
-            external += float(run.rigid.find_half_work(run.acting()).sum())
+            external += float(run.rigid.find_half_work(run.find_acting()).sum())
     touching = (0.0, 0.0) if run.contacts is None else run.contacts.energy()
     return Energy(kinetic, float(elastic), external, *touching, viscous)

@@ -162,7 +162,7 @@ class Damping:
     """Looks without a greater kinetic energy after which a body is stopped."""
     judged: int = 0
 
-    def alone(self, each: bool) -> bool:
+    def stops_each(self, each: bool) -> bool:
         """Whether bodies are stopped one by one until the next judgement."""
         return each or (self.judged >= SLOW and self.judged % 2 == 1)
 
@@ -172,19 +172,19 @@ class Damping:
         return WAIT if self.judged % 2 else self.wait
 
     @classmethod
-    def begin(cls, run: State) -> Damping:
+    def from_run(cls, run: State) -> Damping:
         """Of a simulation that is not damped yet."""
         count = len(run.bodies)
         return cls(
             np.zeros(count), np.zeros(count, int), np.zeros(count, bool), run.steps_done, run.time
         )
 
-    def stored(self) -> dict[str, NDArray[Any]]:
+    def pack_state(self) -> dict[str, NDArray[Any]]:
         """As arrays."""
         return {name: np.asarray(value) for name, value in vars(self).items()}
 
     @classmethod
-    def restored(cls, arrays: Mapping[str, NDArray[Any]]) -> Damping:
+    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> Damping:
         """What `stored` gave."""
         given: list[Any] = [arrays[field.name] for field in fields(cls)]
         return cls(*(value if value.ndim else value.item() for value in given))
@@ -206,14 +206,14 @@ def find_rest(
     judgement, and is to save both.
     The account of energies knows nothing of what is taken at peaks.
     """
-    state = Damping.begin(run) if damping is None else damping
+    state = Damping.from_run(run) if damping is None else damping
     greatest, looks = 0.0, 0
     every = np.ones(len(run.bodies), bool)
     while True:
         march(run, look, look, np.zeros(0, np.int64), None)
         now = find_kinetic_each(run)
         greatest, looks = max(greatest, float(now.sum())), looks + 1
-        alone = state.alone(each)
+        alone = state.stops_each(each)
         if not alone:
             now = np.full_like(now, now.sum())
         more = now > state.peak
@@ -231,7 +231,7 @@ def find_rest(
         if looks < CHECK:
             continue
         done, time = run.steps_done - state.first, run.time - state.begun
-        rest = _judged(run, greatest, state.peaks, done, time)
+        rest = _judge_rest(run, greatest, state.peaks, done, time)
         looks, greatest = 0, 0.0
         state.judged += 1
         if state.judged % SLOW == 0:
@@ -256,7 +256,7 @@ def find_rest(
             )
 
 
-def _judged(run: State, greatest: float, peaks: int, steps: int, time: float) -> Rest:
+def _judge_rest(run: State, greatest: float, peaks: int, steps: int, time: float) -> Rest:
     energy = find_energy(run)
     stored = energy.elastic + energy.contact
     assert run.contacts is not None

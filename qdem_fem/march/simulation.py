@@ -98,7 +98,7 @@ class Simulation(ConditionedBodies):
         for body in self.bodies:
             if self.mass_scaling and not body.rigid:
                 own = float((body.material.density * body.gradients[1]).sum())
-                nodes = np.unique(self.master[self._own(body)])
+                nodes = np.unique(self.master[self._node_slice(body)])
                 added[body.name] = float(self.assembly.mass[nodes].sum()) / own - 1
         return added
 
@@ -152,7 +152,7 @@ class Simulation(ConditionedBodies):
     def velocities(self, bodies: Sequence[Body]) -> Floats:
         """`Body.velocity` of some bodies, one after the other, computed once [m/s], (n, 3)."""
         whole = find_velocity(self)
-        return np.concatenate([whole[self._own(body)] for body in bodies])
+        return np.concatenate([whole[self._node_slice(body)] for body in bodies])
 
     def energy(self) -> Energy:
         """Energies now [J], see `Energy`."""
@@ -174,7 +174,7 @@ class Simulation(ConditionedBodies):
 
     def field_of(self, body: Body, name: str) -> Floats:
         """``displacement`` [m] or ``velocity`` [m/s] of a body's nodes now, (n, 3)."""
-        own = self._own(body)
+        own = self._node_slice(body)
         return find_velocity(self)[own] if name == "velocity" else self.assembly.field(name, own)
 
     def set_field(self, body: Body, name: str, values: Floats) -> None:
@@ -184,13 +184,13 @@ class Simulation(ConditionedBodies):
         level_velocities(self)
         if self.rigid is not None and body.rigid:
             self.rigid.set_field(body, name, values)
-        self.assembly.set_field(name, values, self._own(body))
+        self.assembly.set_field(name, values, self._node_slice(body))
         self.motion.put_in = nan
         if name == "displacement":
             self.motion.displacement_set = True
             if self._contacts is not None:  # are to be found again: the user moved a body
                 self._contacts.stale = True
 
-    def _own(self, body: Body) -> slice:
+    def _node_slice(self, body: Body) -> slice:
         start = self._offset(body)
         return slice(start, start + len(body.nodes))

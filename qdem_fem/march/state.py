@@ -86,7 +86,7 @@ class State(System):
             self._contacts = make_contacts(self, self.contact)
         return self._contacts
 
-    def acting(self) -> Acting:
+    def find_acting(self) -> Acting:
         """What acts on the rigid bodies now."""
         from qdem_fem.rigid import Acting
 

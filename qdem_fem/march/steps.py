@@ -14,7 +14,7 @@ from qdem_fem.element import compute_displacement_gradient, compute_volume_chang
 from qdem_fem.files import ElementInverted, Floats, Integers, StepWarning, Unstable
 from qdem_fem.kernel.cpu import Probes
 from qdem_fem.march.energies import find_energy
-from qdem_fem.march.leapfrog import admit_state, take_velocities_behind
+from qdem_fem.march.leapfrog import constrain_state, stagger_velocities
 from qdem_fem.march.state import State
 
 WINDOW_STEPS = 4096
@@ -34,25 +34,25 @@ def march(
     if steps:
         motion.step = run.step
     if motion.displacement_set:
-        admit_state(run)
+        constrain_state(run)
         motion.displacement_set = False
     if run.contacts is not None:
         run.contacts.refresh()
     if isnan(motion.put_in):
         motion.put_in = find_set_energy(run)
     check_step(run)
-    take_velocities_behind(run)
+    stagger_velocities(run)
     loads, held = run.pack_lists()
     samples = Samples(motion.steps_done, steps, stride, len(nodes))
     if samples.first_step == motion.steps_done and len(samples.record):
         samples.record[0] = assembly.field("displacement")[nodes]
     most = max(16, min(WINDOW_STEPS, assembly.window_work // max(1, len(assembly.elements))))
     end = motion.steps_done + steps
-    window = assembly.window if run.contacts is None else run.contacts.window
+    window = assembly.advance_window if run.contacts is None else run.contacts.advance_window
     try:
         while motion.steps_done < end:
             assembly.renew_frames()
-            count = min(most, end - motion.steps_done, assembly.steps_most(run.step))
+            count = min(most, end - motion.steps_done, assembly.find_most_steps(run.step))
             times = run.step * (motion.steps_done + np.arange(count + 1, dtype=float))
             probes = samples.probes(4 * assembly.place[nodes], motion.steps_done)
             before = find_moment(run) if gravity is not None else None
@@ -73,7 +73,7 @@ def march(
                 progress(run.time)
     finally:
         if run.rigid is not None:
-            run.rigid.follow()
+            run.rigid.place_others()
     return samples
 
 
@@ -128,7 +128,9 @@ def find_moment(run: State) -> Floats:
 
 def check_motion(run: State, bad: float) -> None:
     """Raise when the state can not be right: energy from nothing, or ``bad`` elements."""
-    kinetic = run.assembly.kinetic() + (0.0 if run.rigid is None else run.rigid.kinetic())
+    kinetic = run.assembly.kinetic_energy() + (
+        0.0 if run.rigid is None else run.rigid.kinetic_energy()
+    )
     motion = run.motion
     put_in = motion.put_in + abs(motion.work[:2]).sum() + abs(motion.gravity_work)
     ratio = run.step / run.critical_step.value

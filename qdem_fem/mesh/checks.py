@@ -44,7 +44,7 @@ def raise_problems(problems: list[Problem], where: str) -> None:
     )
 
 
-def take_array(raw: Any, what: str, kinds: str, of: str, remedy: str) -> Any:
+def convert_array(raw: Any, what: str, kinds: str, of: str, remedy: str) -> Any:
     """An array of one of the ``kinds`` of numpy's types, or the `Problem` with what it is."""
     try:
         array = np.asarray(raw)
@@ -55,11 +55,11 @@ def take_array(raw: Any, what: str, kinds: str, of: str, remedy: str) -> Any:
     return array
 
 
-def take_nodes(raw: Any) -> tuple[Floats, list[Problem]]:
+def convert_nodes(raw: Any) -> tuple[Floats, list[Problem]]:
     """Coordinates (n, 3) [m] as float64, a copy; every other shape or type is a problem."""
     remedy = "give nodes as an array (n, 3) of coordinates in metres"
     none = np.zeros((0, 3))
-    array = take_array(raw, "the nodes are", "iuf", "real", remedy)
+    array = convert_array(raw, "the nodes are", "iuf", "real", remedy)
     if isinstance(array, Problem):
         return none, [array]
     if array.ndim != 2 or array.shape[1] != 3:
@@ -80,11 +80,11 @@ def take_nodes(raw: Any) -> tuple[Floats, list[Problem]]:
     return nodes, []
 
 
-def take_elements(raw: Any) -> tuple[Integers, list[Problem]]:
+def convert_elements(raw: Any) -> tuple[Integers, list[Problem]]:
     """Elements (m, 4) as int64, a copy; whole numbers held as float are accepted."""
     remedy = "give elements as an array (m, 4) of whole numbers, the nodes of each, counted from 0"
     none = np.zeros((0, 4), np.int64)
-    array = take_array(raw, "the elements are", "iuf", "whole", remedy)
+    array = convert_array(raw, "the elements are", "iuf", "whole", remedy)
     if isinstance(array, Problem):
         return none, [array]
     if array.size == 0:
@@ -105,7 +105,7 @@ def take_elements(raw: Any) -> tuple[Integers, list[Problem]]:
     return np.array(array, dtype=np.int64, order="C"), []
 
 
-def take_sets(
+def convert_sets(
     sets: dict[str, Any], kind: str, count: int
 ) -> tuple[dict[str, Integers], list[Problem]]:
     """Sets of nodes or elements as sorted int64 without repeats; a bool mask is accepted."""
@@ -113,7 +113,7 @@ def take_sets(
     taken: dict[str, Integers] = {}
     problems: list[Problem] = []
     for name, raw in sets.items():
-        array = take_array(raw, f"the {kind} set '{name}' is", "iub", "whole", remedy)
+        array = convert_array(raw, f"the {kind} set '{name}' is", "iub", "whole", remedy)
         if not isinstance(array, Problem) and array.dtype.kind == "b" and array.shape == (count,):
             array = np.flatnonzero(array)
         if isinstance(array, Problem):

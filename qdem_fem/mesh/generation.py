@@ -65,7 +65,7 @@ def make_box_mesh(
     return TetMesh(nodes, elements.reshape(-1, 4), node_sets=sets)
 
 
-def jitter(mesh: TetMesh, fraction: float, seed: int) -> TetMesh:
+def jitter_nodes(mesh: TetMesh, fraction: float, seed: int) -> TetMesh:
     """Move the interior nodes at random, to make a mesh as irregular as a generator's.
 
     Each goes uniformly into a ball around it whose radius is ``fraction`` of the smallest

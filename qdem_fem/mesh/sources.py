@@ -44,7 +44,7 @@ def read_mesh_parts(source: Any, where: str) -> MeshParts:
     Raises `MeshError` if the source is of no known kind, or holds no linear tetrahedra.
     """
     if isinstance(source, (str, os.PathLike)):
-        return _parts_of_meshio(read_mesh_file(source, where), where)
+        return _read_meshio(read_mesh_file(source, where), where)
     if isinstance(source, (tuple, list)):
         if len(source) != 2:
             raise MeshError(
@@ -54,15 +54,15 @@ def read_mesh_parts(source: Any, where: str) -> MeshParts:
             )
         return MeshParts(source[0], source[1])
     if hasattr(source, "points") and hasattr(source, "cells"):
-        return _parts_of_meshio(source, where)
+        return _read_meshio(source, where)
     if hasattr(source, "p") and hasattr(source, "t"):
-        return _parts_of_skfem(source, where)
+        return _read_skfem(source, where)
     raise MeshError(
         f"an object of type {type(source).__name__} is no mesh", where=where, remedy=_ACCEPTED
     )
 
 
-def _parts_of_skfem(mesh: Any, where: str) -> MeshParts:
+def _read_skfem(mesh: Any, where: str) -> MeshParts:
     """``p`` is (3, n), ``t`` is (4, m); boundaries hold facets, subdomains hold elements."""
     kind = type(mesh).__name__
     shape = getattr(getattr(mesh, "elem", None), "__name__", "ElementTetP1")
@@ -92,7 +92,7 @@ def _parts_of_skfem(mesh: Any, where: str) -> MeshParts:
     return MeshParts(np.asarray(mesh.p).T, np.asarray(mesh.t).T, node_sets, dict(subdomains))
 
 
-def _parts_of_meshio(mesh: Any, where: str) -> MeshParts:
+def _read_meshio(mesh: Any, where: str) -> MeshParts:
     """All blocks of tetrahedra joined; sets and physical groups of every block by name."""
     kinds = [block.type for block in mesh.cells]
     others = sorted({kind for kind in kinds if kind.startswith(_OTHER_SOLIDS)})

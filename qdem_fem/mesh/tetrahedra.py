@@ -12,14 +12,14 @@ import numpy.typing as npt
 from qdem_fem.files import Floats, Integers, MeshError
 from qdem_fem.mesh.checks import (
     Problem,
+    convert_elements,
+    convert_nodes,
+    convert_sets,
     find_flat_elements,
     find_index_problems,
     find_repeated_elements,
     name_some,
     raise_problems,
-    take_elements,
-    take_nodes,
-    take_sets,
 )
 from qdem_fem.mesh.sources import MeshParts, read_mesh_parts
 
@@ -30,7 +30,7 @@ _SLIVER = 1e-2
 precision; few or no elements of a sound mesh are below it."""
 
 
-def _none() -> Integers:
+def _make_empty() -> Integers:
     return np.zeros(0, np.int64)
 
 
@@ -45,9 +45,9 @@ class TetMesh:
     """Coordinates X [m], (n, 3)."""
     elements: Integers
     """The nodes of each element, (m, 4), with (X1 - X0) x (X2 - X0) . (X3 - X0) > 0."""
-    flipped: Integers = field(default_factory=_none)
+    flipped: Integers = field(default_factory=_make_empty)
     """Elements that were left-handed as given, and whose last two nodes were swapped, (k,)."""
-    unused: Integers = field(default_factory=_none)
+    unused: Integers = field(default_factory=_make_empty)
     """Nodes of no element, (j,); they have no mass and do not move."""
     node_sets: dict[str, Integers] = field(default_factory=dict)
     """Named nodes, each sorted."""
@@ -86,8 +86,8 @@ def read_mesh(source: Any, *, where: str = "") -> TetMesh:
     else:
         parts = read_mesh_parts(source, where)
 
-    nodes, problems = take_nodes(parts.nodes)
-    elements, found = take_elements(parts.elements)
+    nodes, problems = convert_nodes(parts.nodes)
+    elements, found = convert_elements(parts.elements)
     problems += found
     if len(nodes) == 0 and not problems:
         problems.append(Problem("there are no nodes", "give coordinates (n, 3) in metres"))
@@ -102,9 +102,9 @@ def read_mesh(source: Any, *, where: str = "") -> TetMesh:
         sound &= ~np.isin(elements, lost).any(axis=1)
     volume, found = find_flat_elements(nodes, elements, sound)
     problems += found
-    node_sets, found = take_sets(parts.node_sets, "node", len(nodes))
+    node_sets, found = convert_sets(parts.node_sets, "node", len(nodes))
     problems += found
-    element_sets, found = take_sets(parts.element_sets, "element", len(elements))
+    element_sets, found = convert_sets(parts.element_sets, "element", len(elements))
     raise_problems(problems + found, where)
 
     flipped = np.flatnonzero(volume < 0)
@@ -136,11 +136,11 @@ def find_gradients(nodes: Floats, elements: Integers) -> tuple[Floats, Floats]:
     for start in range(0, len(elements), _GRADIENTS_AT_ONCE):
         part = slice(start, start + _GRADIENTS_AT_ONCE)
         x = nodes[elements[part]].transpose(1, 2, 0)
-        gradient, sixfold, lengths = _cofactors(x)
+        gradient, sixfold, lengths = _find_cofactors(x)
         gradients[part], volumes[part] = gradient.transpose(2, 0, 1), sixfold / 6
         slivers = np.flatnonzero(sixfold < _SLIVER * lengths)
         if len(slivers):
-            gradient, sixfold, _ = _cofactors(x[:, :, slivers].astype(np.longdouble))
+            gradient, sixfold, _ = _find_cofactors(x[:, :, slivers].astype(np.longdouble))
             gradients[start + slivers] = gradient.transpose(2, 0, 1)
             volumes[start + slivers] = sixfold / 6
     bad = np.flatnonzero(~(volumes > 0))
@@ -154,7 +154,7 @@ def find_gradients(nodes: Floats, elements: Integers) -> tuple[Floats, Floats]:
     return gradients, volumes
 
 
-def _cofactors(x: npt.NDArray[Any]) -> tuple[npt.NDArray[Any], ...]:
+def _find_cofactors(x: npt.NDArray[Any]) -> tuple[npt.NDArray[Any], ...]:
     """Gradients (3, 3, k), six volumes (k,), product of three edge lengths (k,), of x (4, 3, k)."""
     e = x[1:] - x[0]
     gradient = np.empty_like(e)

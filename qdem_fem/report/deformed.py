@@ -58,7 +58,7 @@ def draw_deformed(path: Path, bodies: Sequence[Any], magnification: float | None
         panel.set_axis_off()
         panel.margins(0.03)
         panel.autoscale_view()
-        _scale_bar(panel)
+        _draw_scale_bar(panel)
     return magnification
 
 
@@ -146,7 +146,7 @@ def _draw_frame(panel: Axes, frame: Floats) -> None:
     inset.set_axis_off()
 
 
-def _scale_bar(panel: Axes) -> None:
+def _draw_scale_bar(panel: Axes) -> None:
     """A bar of a round length of the reference shape."""
     low, high = panel.get_xlim()
     length = round_below((high - low) / 5)

@@ -49,8 +49,8 @@ def find_amplitudes(time: Floats, values: Floats) -> tuple[Floats, Floats]:
     `find_peak_frequencies` has no such error.  Raises `UsageError` for a record that is no even,
     finite series.
     """
-    step, values = _record(time, values)
-    weight = _hann(len(values))
+    step, values = _check_record(time, values)
+    weight = _make_hann(len(values))
     centred = values - np.average(values, weights=weight)
     amplitude = 2 * np.abs(np.fft.rfft(weight * centred)) / weight.sum()
     return np.asarray(np.fft.rfftfreq(len(values), step), float), amplitude
@@ -58,7 +58,7 @@ def find_amplitudes(time: Floats, values: Floats) -> tuple[Floats, Floats]:
 
 def transform_record(time: Floats, values: Floats) -> tuple[Floats, ComplexArray]:
     """Frequencies [Hz] and the Fourier spectrum X(f) [unit s] of a record, mean left in."""
-    step, values = _record(time, values)
+    step, values = _check_record(time, values)
     frequency = np.asarray(np.fft.rfftfreq(len(values), step), float)
     return frequency, step * np.fft.rfft(values) * np.exp(-2j * pi * frequency * time[0])
 
@@ -116,7 +116,7 @@ def find_peak_frequencies(
     """
     from scipy.optimize import least_squares
 
-    step, values = _record(time, values)
+    step, values = _check_record(time, values)
     elapsed: Floats = step * np.arange(len(values), dtype=float)
     duration = float(elapsed[-1])
     scale = float(np.abs(values - values.mean()).max())
@@ -130,16 +130,16 @@ def find_peak_frequencies(
         # Unknowns are cycles in the record and decay over it: both of the order of one to 100.
         starts = [
             [*start, peak * duration, decay]
-            for peak in {_highest_peak(left, step, windowed) for windowed in (True, False)}
+            for peak in {_find_highest_peak(left, step, windowed) for windowed in (True, False)}
             for decay in DECAYS
         ]
-        start = min(starts, key=lambda one: _misfit_square(one, elapsed / duration, target))
+        start = min(starts, key=lambda one: _square_misfit(one, elapsed / duration, target))
         fit = least_squares(
-            _misfit, start, args=(elapsed / duration, target), x_scale="jac", method="lm",
+            _find_misfit, start, args=(elapsed / duration, target), x_scale="jac", method="lm",
             xtol=1e-14, ftol=1e-14, gtol=1e-14,
         )  # fmt: skip
-        left = _misfit(fit.x, elapsed / duration, target)
-        found = _modes(fit.x, elapsed / duration, target, duration, scale)
+        left = _find_misfit(fit.x, elapsed / duration, target)
+        found = _make_modes(fit.x, elapsed / duration, target, duration, scale)
         if any(not 0 < mode.frequency < 0.5 / step for mode in found):
             break
         if found[-1].amplitude < floor * max(mode.amplitude for mode in found):
@@ -150,13 +150,13 @@ def find_peak_frequencies(
     return sorted(modes, key=lambda mode: -mode.amplitude)
 
 
-def _highest_peak(values: Floats, step: float, windowed: bool) -> float:
+def _find_highest_peak(values: Floats, step: float, windowed: bool) -> float:
     """Frequency [Hz] of the highest peak of the padded spectrum, refined by a parabola.
 
     A Hann window finds modes that last, and would hide one that dies out at once.
     """
     length = PADDING * len(values)
-    weight = _hann(len(values)) if windowed else np.ones(len(values))
+    weight = _make_hann(len(values)) if windowed else np.ones(len(values))
     spectrum = np.abs(np.fft.rfft(weight * values, length))
     lowest = PADDING // 2
     top = lowest + int(np.argmax(spectrum[lowest:-1]))
@@ -166,7 +166,7 @@ def _highest_peak(values: Floats, step: float, windowed: bool) -> float:
     return float((top + np.clip(shift, -1, 1)) / (length * step))
 
 
-def _columns(unknowns: Floats, t: Floats) -> Floats:
+def _make_columns(unknowns: Floats, t: Floats) -> Floats:
     """Cosine and sine of each damped oscillation, and the constant: (k, 2 modes + 1)."""
     cycles, decay = np.reshape(unknowns, (-1, 2)).T
     damped = np.exp(-np.clip(decay, -50, 500) * t[:, None])
@@ -174,21 +174,21 @@ def _columns(unknowns: Floats, t: Floats) -> Floats:
     return np.hstack([damped * np.cos(angle), damped * np.sin(angle), np.ones((len(t), 1))])
 
 
-def _misfit(unknowns: Floats, t: Floats, target: Floats) -> Floats:
-    columns = _columns(unknowns, t)
+def _find_misfit(unknowns: Floats, t: Floats, target: Floats) -> Floats:
+    columns = _make_columns(unknowns, t)
     weight = np.linalg.lstsq(columns, target, rcond=None)[0]
     return np.asarray(target - columns @ weight)
 
 
-def _misfit_square(unknowns: list[float], t: Floats, target: Floats) -> float:
-    left = _misfit(np.array(unknowns), t, target)
+def _square_misfit(unknowns: list[float], t: Floats, target: Floats) -> float:
+    left = _find_misfit(np.array(unknowns), t, target)
     return float(left @ left)
 
 
-def _modes(
+def _make_modes(
     unknowns: Floats, t: Floats, target: Floats, duration: float, scale: float
 ) -> list[Mode]:
-    weight = np.linalg.lstsq(_columns(unknowns, t), target, rcond=None)[0]
+    weight = np.linalg.lstsq(_make_columns(unknowns, t), target, rcond=None)[0]
     pairs = np.reshape(unknowns, (-1, 2))
     cosine, sine = weight[: len(pairs)], weight[len(pairs) : -1]
     return [
@@ -202,12 +202,12 @@ def _modes(
     ]
 
 
-def _hann(length: int) -> Floats:
+def _make_hann(length: int) -> Floats:
     """The periodic Hann window."""
     return np.asarray(0.5 - 0.5 * np.cos(2 * pi * np.arange(length) / length))
 
 
-def _record(time: Floats, values: Floats) -> tuple[float, Floats]:
+def _check_record(time: Floats, values: Floats) -> tuple[float, Floats]:
     """Interval [s] and values of an even, finite series."""
     time, values = np.asarray(time, float), np.asarray(values, float)
     if time.ndim != 1 or time.shape != values.shape or len(time) < 4:

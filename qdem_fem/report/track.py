@@ -32,7 +32,7 @@ FEWEST_SAMPLES = 5
 
 def find_accelerations(time: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Times and acceleration [m/s2], (k - 2,) each, of an even series of displacements (k,) [m]."""
-    return time[1:-1], np.diff(values, 2) / _interval(time) ** 2
+    return time[1:-1], np.diff(values, 2) / _find_interval(time) ** 2
 
 
 def find_acceleration_spectrum(time: Floats, values: Floats) -> tuple[Floats, Floats]:
@@ -43,10 +43,10 @@ def find_acceleration_spectrum(time: Floats, values: Floats) -> tuple[Floats, Fl
     velocity v of the first interval, and v is left at all frequencies: of a grain that is let go
     and rings, more below 400 Hz than all of its motion there.
     """
-    begin = time[0] - _interval(time)
+    begin = time[0] - _find_interval(time)
     rested = np.concatenate([[begin], time]), np.concatenate([values[:1], values])
     frequency, spectrum = transform_record(*find_accelerations(*rested))
-    size = np.abs(spectrum) / np.sinc(frequency * _interval(time)) ** 2
+    size = np.abs(spectrum) / np.sinc(frequency * _find_interval(time)) ** 2
     seen = frequency <= HIGHEST
     return frequency[seen], smooth_spectrum(frequency, size, BANDWIDTH)[seen]
 
@@ -54,7 +54,7 @@ def find_acceleration_spectrum(time: Floats, values: Floats) -> tuple[Floats, Fl
 def find_grain_mobility(time: Floats, values: Floats, load: Series) -> tuple[Floats, Floats]:
     """Frequencies [Hz] and |V|/|F| [m/(s N)] of a grain displaced by ``values`` [m] under a load
     (k, 3) [N] (Fig. 12), smoothed as spectra are; nan where the load is silent."""
-    when, velocity = (time[1:] + time[:-1]) / 2, np.diff(values) / _interval(time)
+    when, velocity = (time[1:] + time[:-1]) / 2, np.diff(values) / _find_interval(time)
     force = average_between(time, load.times, load.values[:, 2])
     frequency, ratio = find_mobility(when, force, velocity, BANDWIDTH)
     seen = frequency <= HIGHEST
@@ -70,7 +70,7 @@ def average_between(time: Floats, times: Floats, values: Floats) -> Floats:
     return np.diff(area[np.searchsorted(knots, time)]) / np.diff(time)
 
 
-def _interval(time: Floats) -> float:
+def _find_interval(time: Floats) -> float:
     """Between two samples of an even series [s]."""
     return float(time[-1] - time[0]) / (len(time) - 1)
 

@@ -163,24 +163,24 @@ class RigidBodies:
 
     def arm_now(self) -> Floats:
         """From the centres to all nodes as they are turned now [m], (v, 3)."""
-        return self._turned(self.body, self.arm)
+        return self._turn_arms(self.body, self.arm)
 
-    def _turned(self, body: Integers, arm: Floats) -> Floats:
+    def _turn_arms(self, body: Integers, arm: Floats) -> Floats:
         return arm + np.einsum("vij,vj->vi", make_turn_matrix(self._every.turn)[body], arm)
 
     def omega(self, spin: Floats) -> Floats:
         """Angular velocities [1/s] of angular momenta (b, 3) about the centres."""
-        free, inertia = self._turns_free(), self.inertia()
+        free, inertia = self._free_turns(), self.inertia()
         held = ~(free[:, :, None] & free[:, None, :])
         inertia[held] = np.broadcast_to(np.eye(3), inertia.shape)[held]
         return np.asarray(np.linalg.solve(inertia, (spin * free)[:, :, None])[:, :, 0])
 
-    def _turns_free(self) -> NDArray[np.bool_]:
+    def _free_turns(self) -> NDArray[np.bool_]:
         """Which turns about the laboratory's axes each body may make, (b, 3)."""
         turning = self._every.turning[:, None]
         return np.asarray((turning == FREE) | (turning == np.arange(3)))
 
-    def kinetic(self, motion: RigidNow | None = None) -> float:
+    def kinetic_energy(self, motion: RigidNow | None = None) -> float:
         """Kinetic energy of a motion, by default of the velocities as they are [J]."""
         return float(self.find_kinetic_each(motion).sum())
 
@@ -194,7 +194,7 @@ class RigidBodies:
         """``sum M d`` [kg m], (3,)."""
         return np.asarray(self.mass @ self._every.shift)
 
-    def stored(self) -> dict[str, NDArray[Any]]:
+    def pack_state(self) -> dict[str, NDArray[Any]]:
         """The state, to the bit."""
         return {f"rigid_{name}": getattr(self._every, name) for name in STATE}
 
@@ -205,7 +205,7 @@ class RigidBodies:
 
     # --- what acts on them ---------------------------------------------------------------------
 
-    def now(self, acting: Acting) -> RigidNow:
+    def find_motion(self, acting: Acting) -> RigidNow:
         """The motion at the time of the displacements."""
         state, step = self._every, acting.step
         if not acting.behind:
@@ -232,7 +232,7 @@ class RigidBodies:
         size = state.load_weight * acting.table[0][state.load_series]
         body = np.repeat(np.arange(len(self.bodies)), np.diff(state.load_first))
         pulls = size[:, None] * np.eye(3)[state.load_component]
-        arm = self._turned(body, state.load_arm)
+        arm = self._turn_arms(body, state.load_arm)
         return self._resultant(body, arm, pulls)
 
     def _resultant(self, body: Integers, arm: Floats, pulls: Floats) -> tuple[Floats, Floats]:
@@ -243,7 +243,7 @@ class RigidBodies:
 
     def velocity_field(self, acting: Acting) -> Floats:
         """Velocity of all nodes at the time of the displacements [m/s], (v, 3)."""
-        now = self.now(acting)
+        now = self.find_motion(acting)
         across = np.cross(self.omega(now.spin)[self.body], self.arm_now())
         return np.asarray(now.velocity[self.body] + across)
 
@@ -281,10 +281,10 @@ class RigidBodies:
         """Hold or free the turns of a body; what stops them does work, as it does on shifts."""
         if turning == self._every.turning[b] == FREE:
             return
-        before = self.kinetic()
+        before = self.kinetic_energy()
         omega = self.omega(self._every.spin)[b]
         self._every.turning[b] = turning
-        held = ~self._turns_free()[b]
+        held = ~self._free_turns()[b]
         if self._every.turn[b, 1:][held].any():
             raise ConditionError(
                 "what is to hold it has turned already, and can not be brought back",
@@ -293,18 +293,18 @@ class RigidBodies:
             )
         omega[held] = 0.0
         self._every.spin[b] = self._inertia_of(b) @ omega
-        work[1] += self.kinetic() - before
+        work[1] += self.kinetic_energy() - before
 
     def kick_half(self, sign: int, acting: Acting, work: Floats) -> None:
         """Take the motion half a step on (``sign`` 1) or back (-1), and note its ``work`` [J]."""
-        behind, now = self._ends(acting)
+        behind, now = self._find_motions(acting)
         to = now if sign > 0 else behind
         work[:2] += sign * self.find_half_work(acting)
         self._every.velocity[:], self._every.spin[:] = to.velocity, to.spin
 
-    def _ends(self, acting: Acting) -> tuple[RigidNow, RigidNow]:
+    def _find_motions(self, acting: Acting) -> tuple[RigidNow, RigidNow]:
         """The motion half a step ago, and now."""
-        state, now = self._every, self.now(acting)
+        state, now = self._every, self.find_motion(acting)
         if acting.behind:
             return RigidNow(state.velocity.copy(), state.spin.copy()), now
         force, torque = self.forces(acting)
@@ -314,7 +314,7 @@ class RigidBodies:
 
     def find_half_work(self, acting: Acting) -> Floats:
         """Work in the half step up to now [J], (2,): of loads, of prescribed motion."""
-        behind, now = self._ends(acting)
+        behind, now = self._find_motions(acting)
         state, half = self._every, 0.5 * acting.step
         mean = 0.5 * (behind.velocity + now.velocity)
         turn = 0.5 * (self.omega(behind.spin) + self.omega(now.spin))
@@ -325,7 +325,7 @@ class RigidBodies:
         of_loads = half * (loads * mean + levers * turn).sum()
         return np.array([of_loads, (missing * mean)[held].sum()])
 
-    def kernel_of(self, probed: Integers, touching: Integers) -> Rigid:
+    def make_kernel(self, probed: Integers, touching: Integers) -> Rigid:
         """What a step of a march reads: vertices that may touch, and nodes that are probed.
 
         ``probed``, ``touching``: 4 x kernel number of nodes of any bodies.  Other nodes follow when
@@ -343,11 +343,11 @@ class RigidBodies:
             self._seen = probed.copy()
         return self.kernel
 
-    def follow(self) -> None:
+    def place_others(self) -> None:
         """Put the nodes that no step moves where their bodies are."""
         at = 4 * self.place[self._following][:, None] + np.arange(3)
         body, arm = self.body[self._following], self.arm[self._following]
-        moved = self._every.shift[body] + (self._turned(body, arm) - arm)
+        moved = self._every.shift[body] + (self._turn_arms(body, arm) - arm)
         self.assembly.state.displacement[at] = moved
 
     # --- for the step and the files ------------------------------------------------------------
@@ -362,7 +362,7 @@ class RigidBodies:
         mine = row >= 0
         body = self.body[row[mine]]
         spring = make_stiffness_six(body, self.arm[row[mine]], stiffness[mine], len(self.bodies))
-        free = np.concatenate([self._every.given < 0, self._turns_free()], axis=1)
+        free = np.concatenate([self._every.given < 0, self._free_turns()], axis=1)
         spring *= free[:, :, None] & free[:, None, :]
         highest = np.linalg.eigvalsh(self._root @ spring @ self._root.transpose(0, 2, 1))[:, -1]
         bound = np.zeros(len(nodes))

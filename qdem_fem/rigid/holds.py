@@ -80,18 +80,18 @@ def split_conditions(
     """
 
     of_loads, of_held = is_rigid[loads.node_at // 4], is_rigid[held.node_at // 4]
-    mine = _part(held, of_held)._replace(
+    mine = _select_held(held, of_held)._replace(
         roller_at=np.zeros(0, np.int64), roller_normal=np.zeros((0, 3))
     )
     return (
         Loads(*(entry[~of_loads] for entry in loads)),
-        _part(held, ~of_held),
+        _select_held(held, ~of_held),
         Loads(*(entry[of_loads] for entry in loads)),
         mine,
     )
 
 
-def _part(held: Constraints, mask: NDArray[np.bool_]) -> Constraints:
+def _select_held(held: Constraints, mask: NDArray[np.bool_]) -> Constraints:
     """Some of the held components, and all rollers."""
     return held._replace(
         node_at=held.node_at[mask],

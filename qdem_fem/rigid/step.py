@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from qdem_fem.kernel import cross, dot, exact, inlined, row
+from qdem_fem.kernel import cross, dot, exact, inlined, read_row
 
 FREE, STILL = 3, -1
 """Of ``Rigid.turning``; 0, 1, 2: turns about that axis of the laboratory alone."""
@@ -67,13 +67,13 @@ class Rigid(NamedTuple):
 
 
 @inlined
-def axis_of(axes: Any, b: int, i: int) -> Any:  # pragma: no cover
+def read_axis(axes: Any, b: int, i: int) -> Any:  # pragma: no cover
     """Principal axis i of body b."""
     return axes[b, i, 0], axes[b, i, 1], axes[b, i, 2]
 
 
 @inlined
-def turned_less(q: Any, a: Any) -> Any:  # pragma: no cover
+def find_turn_change(q: Any, a: Any) -> Any:  # pragma: no cover
     """``R(q) a - a``: with ``t = 2 v x a`` it is ``q0 t + v x t``."""
     v = q[1], q[2], q[3]
     t = cross(v, a)
@@ -83,14 +83,14 @@ def turned_less(q: Any, a: Any) -> Any:  # pragma: no cover
 
 
 @inlined
-def turned(q: Any, a: Any) -> Any:  # pragma: no cover
+def turn_vector(q: Any, a: Any) -> Any:  # pragma: no cover
     """``R(q) a``"""
-    less = turned_less(q, a)
+    less = find_turn_change(q, a)
     return a[0] + less[0], a[1] + less[1], a[2] + less[2]
 
 
 @inlined
-def turned_on(q: Any, axis: Any, c: float, s: float) -> Any:  # pragma: no cover
+def compose_turn(q: Any, axis: Any, c: float, s: float) -> Any:  # pragma: no cover
     """``q`` behind a turn about ``axis`` (unit) of the body; ``c``, ``s``: of half its angle."""
     x, y, z = s * axis[0], s * axis[1], s * axis[2]
     return (
@@ -102,56 +102,56 @@ def turned_on(q: Any, axis: Any, c: float, s: float) -> Any:  # pragma: no cover
 
 
 @inlined
-def around(q: Any, axis: Any, m: float, n: float, angle: float) -> Any:  # pragma: no cover
+def turn_around(q: Any, axis: Any, m: float, n: float, angle: float) -> Any:  # pragma: no cover
     """``q`` behind a turn by ``angle`` [rad], and the next two components of a fixed vector."""
     c, s = np.cos(0.5 * angle), np.sin(0.5 * angle)
     whole, across = c * c - s * s, 2.0 * c * s
-    return turned_on(q, axis, c, s), whole * m + across * n, whole * n - across * m
+    return compose_turn(q, axis, c, s), whole * m + across * n, whole * n - across * m
 
 
 @inlined
 def drift(c: Any, b: int, q: Any, spin: Any, step: float) -> Any:  # pragma: no cover
     """The turn of body b after ``step`` [s] without torque."""
-    first, second, third = axis_of(c.axes, b, 0), axis_of(c.axes, b, 1), axis_of(c.axes, b, 2)
-    inverse = row(c.inverse_inertia, b)
+    first, second, third = read_axis(c.axes, b, 0), read_axis(c.axes, b, 1), read_axis(c.axes, b, 2)
+    inverse = read_row(c.inverse_inertia, b)
     back = q[0], -q[1], -q[2], -q[3]
-    own = turned(back, spin)
+    own = turn_vector(back, spin)
     m0, m1, m2 = dot(first, own), dot(second, own), dot(third, own)
     half = 0.5 * step
-    q, m1, m2 = around(q, first, m1, m2, half * m0 * inverse[0])
-    q, m2, m0 = around(q, second, m2, m0, half * m1 * inverse[1])
-    q, m0, m1 = around(q, third, m0, m1, step * m2 * inverse[2])
-    q, m2, m0 = around(q, second, m2, m0, half * m1 * inverse[1])
-    q, m1, m2 = around(q, first, m1, m2, half * m0 * inverse[0])
+    q, m1, m2 = turn_around(q, first, m1, m2, half * m0 * inverse[0])
+    q, m2, m0 = turn_around(q, second, m2, m0, half * m1 * inverse[1])
+    q, m0, m1 = turn_around(q, third, m0, m1, step * m2 * inverse[2])
+    q, m2, m0 = turn_around(q, second, m2, m0, half * m1 * inverse[1])
+    q, m1, m2 = turn_around(q, first, m1, m2, half * m0 * inverse[0])
     scale = 1.0 / np.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
     return q[0] * scale, q[1] * scale, q[2] * scale, q[3] * scale
 
 
 @exact
-def angular_velocity(c: Any, b: int, spin: Any) -> Any:  # pragma: no cover
+def find_angular_velocity(c: Any, b: int, spin: Any) -> Any:  # pragma: no cover
     """``I(q)^-1 L`` of body b [1/s]; about its axis alone where it is held to one."""
-    turning, q = c.turning[b], quaternion(c, b)
+    turning, q = c.turning[b], read_turn(c, b)
     x, y, z = 0.0, 0.0, 0.0
     if turning == STILL:
         return x, y, z
     if turning != FREE:
         moment = 0.0  # e . I e of the axis e, which the turn about e leaves as it is
         for i in range(3):
-            along = turned(q, axis_of(c.axes, b, i))[turning]
+            along = turn_vector(q, read_axis(c.axes, b, i))[turning]
             moment += along * along / c.inverse_inertia[b, i]
         rate = spin[turning] / moment
         if turning == 0:
             return rate, y, z
         return (x, rate, z) if turning == 1 else (x, y, rate)
     for i in range(3):
-        axis = turned(q, axis_of(c.axes, b, i))
+        axis = turn_vector(q, read_axis(c.axes, b, i))
         rate = dot(axis, spin) * c.inverse_inertia[b, i]
         x, y, z = x + rate * axis[0], y + rate * axis[1], z + rate * axis[2]
     return x, y, z
 
 
 @inlined
-def quaternion(c: Any, b: int) -> Any:  # pragma: no cover
+def read_turn(c: Any, b: int) -> Any:  # pragma: no cover
     """The turn of body b."""
     return c.turn[b, 0], c.turn[b, 1], c.turn[b, 2], c.turn[b, 3]
 
@@ -159,7 +159,7 @@ def quaternion(c: Any, b: int) -> Any:  # pragma: no cover
 @inlined
 def take_pulls(c: Any, b: int, forces: Any) -> Any:  # pragma: no cover
     """Force [N] and torque [N m] of what lies at the vertices of body b, which is taken away."""
-    q, force, torque = quaternion(c, b), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    q, force, torque = read_turn(c, b), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for i in range(c.node_first[b], c.node_first[b + 1]):
         at = c.force_at[i]
         f = forces[at], forces[at + 1], forces[at + 2]
@@ -167,18 +167,18 @@ def take_pulls(c: Any, b: int, forces: Any) -> Any:  # pragma: no cover
             continue
         for k in range(3):
             forces[at + k] = 0.0
-        force, torque = add_pull(force, torque, turned(q, row(c.arm, i)), f)
+        force, torque = add_pull(force, torque, turn_vector(q, read_row(c.arm, i)), f)
     return force, torque
 
 
 @exact
 def take_loads(c: Any, b: int, table_row: Any) -> Any:  # pragma: no cover
     """Force [N] and torque [N m] of the loads on body b."""
-    q, force, torque = quaternion(c, b), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    q, force, torque = read_turn(c, b), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for i in range(c.load_first[b], c.load_first[b + 1]):
         size, k = c.load_weight[i] * table_row[c.load_series[i]], c.load_component[i]
         f = size * (k == 0), size * (k == 1), size * (k == 2)
-        force, torque = add_pull(force, torque, turned(q, row(c.load_arm, i)), f)
+        force, torque = add_pull(force, torque, turn_vector(q, read_row(c.load_arm, i)), f)
     return force, torque
 
 
@@ -197,12 +197,12 @@ def place_vertices(
     c: Any, b: int, displacement: Any, velocity: Any, step: float
 ) -> None:  # pragma: no cover
     """Move the vertices of body b; their velocity is the way in this step over ``step`` [s]."""
-    q, rate = quaternion(c, b), 1.0 / step
-    x = turned_less(q, (1.0, 0.0, 0.0))
-    y = turned_less(q, (0.0, 1.0, 0.0))
-    z = turned_less(q, (0.0, 0.0, 1.0))
+    q, rate = read_turn(c, b), 1.0 / step
+    x = find_turn_change(q, (1.0, 0.0, 0.0))
+    y = find_turn_change(q, (0.0, 1.0, 0.0))
+    z = find_turn_change(q, (0.0, 0.0, 1.0))
     for i in range(c.node_first[b], c.node_first[b + 1]):
-        arm, at = row(c.arm, i), c.node_at[i]
+        arm, at = read_row(c.arm, i), c.node_at[i]
         for k in range(3):
             there = c.shift[b, k] + (x[k] * arm[0] + y[k] * arm[1] + z[k] * arm[2])
             velocity[at + k] = (there - displacement[at + k]) * rate
@@ -227,11 +227,11 @@ def advance_rigid(
         loaded = c.load_first[b + 1] > c.load_first[b]
         if loaded:
             load, lever = take_loads(c, b, table[0])
-            slow = angular_velocity(c, b, row(c.spin, b))
+            slow = find_angular_velocity(c, b, read_row(c.spin, b))
         for k in range(3):
             c.spin[b, k] += step * (twist[k] + lever[k])
         if loaded or turning != FREE:
-            fast = angular_velocity(c, b, row(c.spin, b))
+            fast = find_angular_velocity(c, b, read_row(c.spin, b))
         done = 0.0
         for k in range(3):
             before = c.velocity[b, k]
@@ -249,20 +249,20 @@ def advance_rigid(
             c.velocity[b, k] = after
             done += load[k] * (before + after) + lever[k] * (slow[k] + fast[k])
         work[0] += 0.5 * step * done
-        q = quaternion(c, b)
+        q = read_turn(c, b)
         if turning == FREE:
-            q = drift(c, b, q, row(c.spin, b), step)
+            q = drift(c, b, q, read_row(c.spin, b), step)
         elif turning != STILL:
-            q = turned_about(q, fast, step)
+            q = turn_by_rate(q, fast, step)
         c.turn[b, 0], c.turn[b, 1], c.turn[b, 2], c.turn[b, 3] = q
         place_vertices(c, b, displacement, velocity, step)
 
 
 @inlined
-def turned_about(q: Any, rate: Any, step: float) -> Any:  # pragma: no cover
+def turn_by_rate(q: Any, rate: Any, step: float) -> Any:  # pragma: no cover
     """``q`` ahead of a turn with angular velocity ``rate`` [1/s] of the laboratory."""
     size = np.sqrt(dot(rate, rate))
     scale = 1.0 / size if size > 0.0 else 0.0
     axis = rate[0] * scale, rate[1] * scale, rate[2] * scale
-    half, own = 0.5 * size * step, turned((q[0], -q[1], -q[2], -q[3]), axis)
-    return turned_on(q, own, np.cos(half), np.sin(half))
+    half, own = 0.5 * size * step, turn_vector((q[0], -q[1], -q[2], -q[3]), axis)
+    return compose_turn(q, own, np.cos(half), np.sin(half))

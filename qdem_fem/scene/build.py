@@ -39,7 +39,7 @@ def make_simulation(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
     bodies = {
         body.name: Body(
             prepared.meshes[body.name],
-            _material(body, prepared.meshes[body.name]),
+            _make_material(body, prepared.meshes[body.name]),
             name=body.name,
             rigid=body.rigid,
         )
@@ -49,7 +49,7 @@ def make_simulation(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
     run = Simulation(list(bodies.values()), contact=choose_contact(scene.contact), **options)
     problems = []
     for step in prepared.conditions:
-        arguments = [_argument(value, table.method) for value in step.arguments]
+        arguments = [_choose_argument(value, table.method) for value in step.arguments]
         try:
             getattr(run, step.verb)(bodies[step.body], *arguments)
         except QdemError as error:
@@ -86,13 +86,13 @@ def begin_motion(body: Body, table: BodyTable) -> None:
     body.velocity = velocity + np.cross(spin, body.nodes - body.rigid_mass.centre)
 
 
-def _argument(value: Any, method: str) -> Any:
+def _choose_argument(value: Any, method: str) -> Any:
     """What the simulation takes for an argument: the last value of a series that does not vary."""
     constant = isinstance(value, Series) and (method == "static" or len(value.times) == 1)
     return value.values[-1] if constant else value
 
 
-def _material(body: BodyTable, mesh: TetMesh) -> Any:
+def _make_material(body: BodyTable, mesh: TetMesh) -> Any:
     """Material of a body: uniform, or by element where regions differ."""
     from qdem_fem.element import Material
 

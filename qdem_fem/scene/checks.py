@@ -53,23 +53,23 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Prepared:
         return check_track_scene(text)
     problems = list(text.problems)
     folder = text.path.parent
-    meshes, found = _meshes(text, folder)
+    meshes, found = _make_meshes(text, folder)
     problems += found
-    names = _body_names(text)
+    names = _list_body_names(text)
     conditions: list[Step] = []
     for key, table in list_tables(text, Condition, Periodic):
         if names and table.body not in names:
             near = suggest_word(table.body, names)
             problems.append(Problem(f"{key}.body", f"there is no body {table.body!r}{near}"))
         mesh = meshes.get(table.body)
-        for step in _condition(key, table, mesh, folder):
+        for step in _check_condition(key, table, mesh, folder):
             if isinstance(step, Problem):
                 problems.append(step)
             else:
                 conditions.append(step)
     probes: dict[str, tuple[str, Integers]] = {}
     for _, output in list_tables(text, Output):
-        found = list(_probes(output, names, meshes, probes))
+        found = list(_fill_probes(output, names, meshes, probes))
         problems += found
     problems += find_output_faults(text)
     problems += find_motion_faults(text)
@@ -90,7 +90,7 @@ def choose_model(data: Mapping[str, Any]) -> type[Scene]:
     return TrackScene
 
 
-def _body_names(text: SceneText) -> list[str]:
+def _list_body_names(text: SceneText) -> list[str]:
     """Names of all bodies, sound or not, so that a wrong body makes no other problem."""
     bodies = text.data.get("body")
     entries = bodies if isinstance(bodies, list) else []
@@ -98,7 +98,7 @@ def _body_names(text: SceneText) -> list[str]:
     return [name for name in names if isinstance(name, str)]
 
 
-def _meshes(text: SceneText, folder: Path) -> tuple[dict[str, TetMesh], list[Problem]]:
+def _make_meshes(text: SceneText, folder: Path) -> tuple[dict[str, TetMesh], list[Problem]]:
     """The mesh of each body that has a sound one, and what is wrong with bodies."""
     meshes: dict[str, TetMesh] = {}
     problems: list[Problem] = []
@@ -140,7 +140,7 @@ def list_mesh_tables(text: SceneText) -> Iterator[tuple[str, str, Mesh, list[str
                 yield key, entry["name"], Mesh.model_validate(entry.get("mesh")), []
 
 
-def _condition(
+def _check_condition(
     key: str, table: Any, mesh: TetMesh | None, folder: Path
 ) -> Iterator[Step | Problem]:
     """The call that a condition stands for, or everything that is wrong with it."""
@@ -164,7 +164,7 @@ def _condition(
         yield Step(key, type(table).__name__.lower(), table.body, tuple(arguments))
 
 
-def _probes(
+def _fill_probes(
     output: Output,
     names: Sequence[str],
     meshes: dict[str, TetMesh],

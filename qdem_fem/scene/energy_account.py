@@ -30,7 +30,7 @@ class EnergyAccount:
         self.greatest = 0.0
         """The greatest energy so far [J]."""
 
-    def take(self, energy: Mapping[str, Floats]) -> None:
+    def add_rows(self, energy: Mapping[str, Floats]) -> None:
         """Take rows more: columns (k,) [J] by name; others than energies are passed by."""
         names = [name for name in STORED if name in energy]
         if not self.first:
@@ -51,7 +51,7 @@ class EnergyAccount:
 def list_energy_facts(energy: Mapping[str, Floats]) -> dict[str, float]:
     """Energies at the end [J], and what `EnergyAccount` says of all rows."""
     account = EnergyAccount()
-    account.take(energy)
+    account.add_rows(energy)
     return {
         **account.last,
         "greatest_imbalance": account.missing,

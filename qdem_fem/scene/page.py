@@ -13,7 +13,15 @@ from qdem_fem.report import Mode
 from qdem_fem.scene.energy_account import STORED
 from qdem_fem.scene.run import Done, RunFolder
 from qdem_fem.scene.summary import find_moving_components
-from trackbed.report import bullets, folded, page, paragraph, picture, section, table
+from trackbed.report import (
+    make_folded,
+    make_list,
+    make_page,
+    make_paragraph,
+    make_picture,
+    make_section,
+    make_table,
+)
 from trackbed.run_files import write_whole
 
 
@@ -24,28 +32,30 @@ def write_report(
     """Write the report of a finished run, and its pictures unless ``done`` is None; its path.
 
     ``more``: files and captions of further pictures."""
-    pictures = [] if done is None else [*more, *_pictures(folder.path, manifest, summary, done)]
+    pictures = (
+        [] if done is None else [*more, *_draw_pictures(folder.path, manifest, summary, done)]
+    )
     title = summary["title"] or "QDEM run"
     body = [
         f"<h1>{escape(title)}</h1>",
-        _claim(summary),
-        *(picture(path, caption, escape(caption)) for path, caption in pictures),
-        *_bed(summary),
-        *_probes(summary),
-        *_modes(summary),
-        _meshes(summary),
-        _step(summary),
-        _energy(summary),
-        section("What is not in this run", bullets(map(escape, summary["left_out"]))),
-        _cost(summary),
-        _again(manifest),
+        _format_claim(summary),
+        *(make_picture(path, caption, escape(caption)) for path, caption in pictures),
+        *_format_bed(summary),
+        *_format_probes(summary),
+        *_format_modes(summary),
+        _format_meshes(summary),
+        _format_step(summary),
+        _format_energy(summary),
+        make_section("What is not in this run", make_list(map(escape, summary["left_out"]))),
+        _format_cost(summary),
+        _format_rerun(manifest),
     ]
     path = folder.path / "report.html"
-    write_whole(path, page(title, body))
+    write_whole(path, make_page(title, body))
     return path
 
 
-def _pictures(
+def _draw_pictures(
     path: Path, manifest: dict[str, Any], summary: dict[str, Any], done: Done
 ) -> Iterator[tuple[Path, str]]:
     """Draw what there is to draw; file and caption of each picture."""
@@ -80,7 +90,7 @@ def _pictures(
     yield balance, "Energies; external is the work of loads, gravity and prescribed motion."
 
 
-def _claim(summary: dict[str, Any]) -> str:
+def _format_claim(summary: dict[str, Any]) -> str:
     bodies = summary["bodies"].values()
     elements, nodes = (sum(body[key] for body in bodies) for key in ("elements", "nodes"))
     mesh = f"{elements:,} linear tetrahedra with {nodes:,} nodes"
@@ -96,10 +106,10 @@ def _claim(summary: dict[str, Any]) -> str:
             f"{summary['time']:.6g} s of motion in {summary['steps']:,} steps of "
             f"{summary['step']:.4g} s, {mesh}."
         )
-    return paragraph(escape(text), "claim")
+    return make_paragraph(escape(text), "claim")
 
 
-def _probes(summary: dict[str, Any]) -> Iterator[str]:
+def _format_probes(summary: dict[str, Any]) -> Iterator[str]:
     rows = [
         (name, axis, *(f"{1e6 * facts[what][i]:.6g}" for what in ("end", "least", "greatest")))
         for name, facts in summary["probes"].items()
@@ -107,10 +117,10 @@ def _probes(summary: dict[str, Any]) -> Iterator[str]:
     ]
     header = ("probe", "component", "end (um)", "least (um)", "greatest (um)")
     if rows:
-        yield section("Displacement of the probes", _table(header, rows))
+        yield make_section("Displacement of the probes", _format_table(header, rows))
 
 
-def _modes(summary: dict[str, Any]) -> Iterator[str]:
+def _format_modes(summary: dict[str, Any]) -> Iterator[str]:
     rows = [
         (name, f"{m['frequency']:.6g}", f"{m['decay']:.4g}", f"{1e6 * m['amplitude']:.4g}")
         for name, modes in summary["modes"].items()
@@ -119,10 +129,12 @@ def _modes(summary: dict[str, Any]) -> Iterator[str]:
     words = "Damped cosines fitted to the record since the last change of a load, strongest first."
     header = ("record", "frequency (Hz)", "decay (1/s)", "amplitude (um)")
     if rows:
-        yield section("Modes of the free motion", paragraph(words), _table(header, rows))
+        yield make_section(
+            "Modes of the free motion", make_paragraph(words), _format_table(header, rows)
+        )
 
 
-def _meshes(summary: dict[str, Any]) -> str:
+def _format_meshes(summary: dict[str, Any]) -> str:
     header = (
         "body", "elements", "nodes", "surface faces", "turned right-handed", "unused nodes",
         "smallest altitude (mm)", "in element", "mass (kg)",
@@ -135,10 +147,10 @@ def _meshes(summary: dict[str, Any]) -> str:
         )
         for name, b in summary["bodies"].items()
     ]  # fmt: skip
-    return section("Bodies and meshes", _table(header, rows))
+    return make_section("Bodies and meshes", _format_table(header, rows))
 
 
-def _step(summary: dict[str, Any]) -> str:
+def _format_step(summary: dict[str, Any]) -> str:
     critical = summary["critical_step"]
     text = "No elastic motion limits the step. "
     if critical["value"] is not None and critical["element"] < 0:
@@ -158,27 +170,27 @@ def _step(summary: dict[str, Any]) -> str:
             f" Mass scaling added {scaled['added_mass']:.4g} kg, {100 * scaled['share']:.3g} % of "
             "the bodies' own mass: inertia that they do not have."
         )
-    return section("Time step", paragraph(escape(text)))
+    return make_section("Time step", make_paragraph(escape(text)))
 
 
-def _energy(summary: dict[str, Any]) -> str:
+def _format_energy(summary: dict[str, Any]) -> str:
     energy = summary["energy"]
     if summary["method"] == "static":
-        return section("Energy", paragraph(f"Elastic energy {energy['elastic']:.6g} J."))
+        return make_section("Energy", make_paragraph(f"Elastic energy {energy['elastic']:.6g} J."))
     named = [name for name in energy if name in (*STORED, "external")]
     rows = [(f"{name} at the end", f"{energy[name]:.6g}") for name in named]
     imbalance = f"{energy['greatest_imbalance']:.3g} ({100 * energy['relative_imbalance']:.2g} %)"
     rows.append(("greatest external - kinetic - elastic on the way", imbalance))
-    return section("Energy", _table(("energy", "J"), rows))
+    return make_section("Energy", _format_table(("energy", "J"), rows))
 
 
-def _bed(summary: dict[str, Any]) -> Iterator[str]:
+def _format_bed(summary: dict[str, Any]) -> Iterator[str]:
     """How the prepared bed of a track stands."""
     if words := summary.get("bed", {}).get("words"):
-        yield section("The prepared bed", paragraph(f"{escape(words.capitalize())}."))
+        yield make_section("The prepared bed", make_paragraph(f"{escape(words.capitalize())}."))
 
 
-def _cost(summary: dict[str, Any]) -> str:
+def _format_cost(summary: dict[str, Any]) -> str:
     cost = summary["cost"]
     rows = [
         ("CPU time (s)", f"{cost['cpu_s']:.3g}"),
@@ -188,24 +200,24 @@ def _cost(summary: dict[str, Any]) -> str:
         speed = f"{cost['million_elements_per_s']:.3g}"
         rows.append(("million element-steps per second on the clock", speed))
     words = "Advancing alone; without reading, pictures and compilation before the first step."
-    return section("Cost", _table(("", ""), rows), paragraph(words))
+    return make_section("Cost", _format_table(("", ""), rows), make_paragraph(words))
 
 
-def _again(manifest: dict[str, Any]) -> str:
+def _format_rerun(manifest: dict[str, Any]) -> str:
     versions = ", ".join(f"{name} {version}" for name, version in manifest["versions"].items())
     made = "; ".join([versions, manifest["machine"], manifest["started"]])
     asked = f"<pre>{escape(json.dumps(manifest['scene'], indent=1))}</pre>"
     files = [
-        paragraph(f"{escape(name)}: SHA-256 <code>{digest}</code>")
+        make_paragraph(f"{escape(name)}: SHA-256 <code>{digest}</code>")
         for name, digest in manifest["files"].items()
     ]
-    return section(
+    return make_section(
         "To compute it again",
         f"<pre>{escape(manifest['command'])}</pre>",
-        paragraph(f"{escape(made)}."),
-        folded("What was asked, defaults included", "".join([asked, *files])),
+        make_paragraph(f"{escape(made)}."),
+        make_folded("What was asked, defaults included", "".join([asked, *files])),
     )
 
 
-def _table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    return table("", [escape(cell) for cell in header], ([*map(escape, row)] for row in rows))
+def _format_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    return make_table("", [escape(cell) for cell in header], ([*map(escape, row)] for row in rows))

@@ -84,17 +84,17 @@ def make_plan(prepared: Prepared, step: float) -> Plan:
     duration, output = prepared.scene.simulation.duration, prepared.scene.output
     assert duration is not None
 
-    def multiple(interval: float, unit: int) -> int:
+    def round_steps(interval: float, unit: int) -> int:
         return unit * max(1, round(interval / (unit * step)))
 
-    sampling = multiple(output.sampling or duration / 2000, 1)
+    sampling = round_steps(output.sampling or duration / 2000, 1)
     return Plan(
         step=step,
         total=sampling * max(1, ceil(duration / (sampling * step) - 1e-6)),
         sampling=sampling,
         chunk=sampling * max(1, CHUNK_WORK // (elements * sampling)),
-        energy=multiple(output.energy_interval or max(duration / 200, ENERGY * step), sampling),
-        fields=multiple(output.vtu_interval or duration, sampling),
+        energy=round_steps(output.energy_interval or max(duration / 200, ENERGY * step), sampling),
+        fields=round_steps(output.vtu_interval or duration, sampling),
         every_field=output.vtu_interval is not None,
     )
 
@@ -134,14 +134,14 @@ def run_dynamic(
     record = _Record(done, plan, folder.path, probes, prepared.scene.audit)
     if goes_on:
         done.cost |= read_object(folder.path / COST) or {}  # none: killed before it was written
-        record.go_on()
+        record.resume()
     else:
         record.begin()
     saved = time.monotonic()
     with note_signals() as stop:
         while run.steps_done < plan.total:
             record.advance(plan.find_next_stop(run.steps_done) - run.steps_done)
-            progress.at(run.steps_done, plan.total, run.time)
+            progress.report(run.steps_done, plan.total, run.time)
             late = time.monotonic() - saved >= prepared.scene.output.checkpoint_interval
             if stop.name or late or run.steps_done == plan.total:
                 record.save(folder.checkpoint)
@@ -192,17 +192,17 @@ class _Record:
         self.energies.begin()
         means = [body.displacement[nodes].mean(axis=0) for body, nodes in self.probes.values()]
         self.rows.append(np.concatenate([[0.0], *means])[None])
-        self.take_energy(0.0)
+        self.write_energy(0.0)
         self.write_fields()
 
-    def go_on(self) -> None:
+    def resume(self) -> None:
         """Take back what was written behind the checkpoint."""
         now = (self.run.steps_done + 0.5) * self.plan.step
         done, plan = self.run.steps_done, self.plan
         self.rows.cut(now, done // plan.sampling + 1)
         at_end = done == plan.total and done % plan.energy > 0
         self.energies.cut(now, done // plan.energy + 1 + at_end)
-        self.account.take(read_table(self.energies.path))
+        self.account.add_rows(read_table(self.energies.path))
         kept = {name for _, _, name in self.plan.list_field_files(self.run.steps_done)}
         for path in self.path.glob("fields_*.vtu"):
             if path.name not in kept:
@@ -221,16 +221,16 @@ class _Record:
         columns = [history[name][new] for name in self.probes]
         self.rows.append(np.column_stack([number * plan.step, *columns]))
         if run.steps_done % plan.energy == 0 or run.steps_done == plan.total:
-            self.take_energy(run.steps_done * plan.step)
+            self.write_energy(run.steps_done * plan.step)
             self.check_audit()
         self.write_fields()
 
-    def take_energy(self, when: float) -> None:
+    def write_energy(self, when: float) -> None:
         """A row of energies at a time [s], into its file and the account."""
         energy, names = self.run.energy(), list_energies(self.run)
         row = np.array([[when, *(float(getattr(energy, name)) for name in names)]])
         self.energies.append(row)
-        self.account.take(dict(zip(names, row[:, 1:].T, strict=True)))
+        self.account.add_rows(dict(zip(names, row[:, 1:].T, strict=True)))
 
     def check_audit(self) -> None:
         """Raise `EnergyLost` where the account of energies so far does not close."""

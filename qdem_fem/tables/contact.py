@@ -12,12 +12,12 @@ from qdem_fem.contact.spheres import NEAR, ContactPlane, SphereContact, check_pl
 from qdem_fem.contact.surface import SurfaceContact
 from qdem_fem.files import ConditionError
 from qdem_fem.march import Contact
-from qdem_fem.tables.types import Vector, tell_kind
+from qdem_fem.tables.types import Vector, make_discriminator
 from trackbed.scene_files import Name, NonNegative, Positive, Table
 
 NumberByBody = Annotated[
     Annotated[Positive, Tag("#number")] | Annotated[dict[Name, Positive], Tag("#table")],
-    tell_kind("#number", "#table"),
+    make_discriminator("#number", "#table"),
 ]
 
 

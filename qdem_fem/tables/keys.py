@@ -20,7 +20,7 @@ from qdem_fem.tables.types import (
     Share,
     Size,
     Vector,
-    tell_kind,
+    make_discriminator,
 )
 from trackbed.scene_files import Name, NonNegative, Positive, Real, Table, Text
 
@@ -144,11 +144,11 @@ class SeriesTable(Table):
 
 ScalarSeries = Annotated[
     Annotated[Real, Tag("#number")] | Annotated[SeriesTable, Tag("#table")],
-    tell_kind("#number", "#table"),
+    make_discriminator("#number", "#table"),
 ]
 VectorSeries = Annotated[
     Annotated[Vector, Tag("#vector")] | Annotated[SeriesTable, Tag("#table")],
-    tell_kind("#vector", "#table"),
+    make_discriminator("#vector", "#table"),
 ]
 
 

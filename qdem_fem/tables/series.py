@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from qdem_fem.files import Series, ramp
+from qdem_fem.files import Series, make_ramp
 from qdem_fem.tables.keys import SeriesTable
 from qdem_fem.tables.types import WrongKey
 from trackbed.errors import LibraryMissing, UsageError
@@ -25,17 +25,17 @@ def make_series(
     """
     if not isinstance(table, SeriesTable):
         return Series([0.0], [table])
-    way = _way(table, key)
+    way = _choose_way(table, key)
     if way == "ramp":
         if isinstance(table.value, str) or table.value is None or table.ramp is None:
             raise WrongKey(f"{key}.value", "a ramp needs a value in SI units")
-        found = ramp(table.ramp, table.value)
+        found = make_ramp(table.ramp, table.value)
     else:
-        found = _tabulated(table, key) if way == "times" else _from_csv(table, key, folder)
-    return _directed(found, table, key, vector)
+        found = _read_values(table, key) if way == "times" else _read_csv(table, key, folder)
+    return _apply_direction(found, table, key, vector)
 
 
-def _way(table: SeriesTable, key: str) -> str:
+def _choose_way(table: SeriesTable, key: str) -> str:
     """Which of the ways to give a series; all keys that belong to it and no other are there."""
     given = table.model_fields_set
     ways = [way for way in WAYS if way in given]
@@ -52,7 +52,7 @@ def _way(table: SeriesTable, key: str) -> str:
     return way
 
 
-def _tabulated(table: SeriesTable, key: str) -> Series:
+def _read_values(table: SeriesTable, key: str) -> Series:
     times, values = table.times or (), table.values or ()
     if len(times) != len(values) or not times:
         what = f"{len(times)} times, {len(values)} values: give as many, and at least one"
@@ -66,7 +66,7 @@ def _tabulated(table: SeriesTable, key: str) -> Series:
     return Series(times, values)
 
 
-def _from_csv(table: SeriesTable, key: str, folder: Path) -> Series:
+def _read_csv(table: SeriesTable, key: str, folder: Path) -> Series:
     if not isinstance(table.value, str):
         raise WrongKey(f"{key}.value", "name the column of the values")
     path = folder / str(table.csv)
@@ -86,7 +86,7 @@ def _from_csv(table: SeriesTable, key: str, folder: Path) -> Series:
     return Series(times, values)
 
 
-def _directed(found: Series, table: SeriesTable, key: str, vector: bool) -> Series:
+def _apply_direction(found: Series, table: SeriesTable, key: str, vector: bool) -> Series:
     """Numbers times the direction for a vector quantity; refuses what does not fit."""
     is_vector = found.values.ndim == 2
     if table.direction is not None:

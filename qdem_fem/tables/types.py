@@ -24,7 +24,7 @@ class WrongKey(Exception):
         self.problem = Problem(key, what, where)
 
 
-def tell_kind(*tags: str) -> Discriminator:
+def make_discriminator(*tags: str) -> Discriminator:
     """Which type of a union a value is checked as: that of its kind, or the first of ``tags``.
 
     Keys in messages leave these tags out.
@@ -43,11 +43,11 @@ def tell_kind(*tags: str) -> Discriminator:
 
 NumberVector = Annotated[
     Annotated[Real, Tag("#number")] | Annotated[Vector, Tag("#vector")],
-    tell_kind("#number", "#vector"),
+    make_discriminator("#number", "#vector"),
 ]
 NumberVectorName = Annotated[
     Annotated[Real, Tag("#number")]
     | Annotated[Vector, Tag("#vector")]
     | Annotated[Text, Tag("#name")],
-    tell_kind("#number", "#vector", "#name"),
+    make_discriminator("#number", "#vector", "#name"),
 ]

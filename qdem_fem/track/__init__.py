@@ -5,13 +5,7 @@ from qdem_fem.track.enter import (
     TrackScene,
     check_track_scene,
     enter_track,
-    foresee_bed,
+    preview_bed,
 )
 
-__all__ = [
-    "TrackPrepared",
-    "TrackScene",
-    "check_track_scene",
-    "enter_track",
-    "foresee_bed",
-]  # fmt: skip
+__all__ = ["TrackPrepared", "TrackScene", "check_track_scene", "enter_track", "preview_bed"]

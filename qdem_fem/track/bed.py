@@ -109,16 +109,14 @@ def prepare_bed(
     for number, stage in enumerate(STAGES):
         if bed is not None and STAGES.index(bed.stage) >= number:
             continue
-        bed = run_stage(
-            recipe, grains, stage, bed, threads, progress, place_stage_part(path, stage)
-        )
+        bed = run_stage(recipe, grains, stage, bed, threads, progress, name_stage_file(path, stage))
         write_bed(path, recipe, bed)
-        place_stage_part(path, stage).unlink(missing_ok=True)
+        name_stage_file(path, stage).unlink(missing_ok=True)
     assert bed is not None
     return bed
 
 
-def place_stage_part(path: Path, stage: str) -> Path:
+def name_stage_file(path: Path, stage: str) -> Path:
     """Where a stage of the bed in ``path`` is saved: a kill may leave that of one that is done."""
     return path.with_suffix(f".{stage.replace(' ', '-').replace('/', '-of-')}.part.npz")
 
@@ -141,7 +139,7 @@ def run_stage(
 
     started = time.process_time()
     last = stage == STAGES[-1]
-    nodes = begin_nodes(recipe, grains, stage, before)
+    nodes = place_start_nodes(recipe, grains, stage, before)
     rigid = recipe.rigid and not last
     bodies = make_bed_bodies(recipe, grains, nodes, rigid="lumped" if rigid else False)
     softness = recipe.softness ** {**FIRM, "hard": 0, "rest": 0}.get(stage, 1)
@@ -162,11 +160,11 @@ def run_stage(
     report = None if progress is None else (lambda rest: progress(stage, rest))
     together = recipe.periodic and stage in ("hard", "rest")  # as said above: a heap slides
     sitting = Sitting(run, part, started)
-    damping = sitting.go_on()
+    damping = sitting.resume()
     try:
         rest = find_rest(
             run, *shares, recipe.patience, report, each=not together, damping=damping,
-            keep=sitting.keep, fall=stage in FALLS,
+            keep=sitting.save_if_due, fall=stage in FALLS,
         )  # fmt: skip
     except NotConverged as error:
         sitting.save()
@@ -175,10 +173,10 @@ def run_stage(
             remedy="with more track.patience it goes on from there; or ask for less",
         ) from error  # fmt: skip
     rests = {} if before is None else dict(before.rests)
-    rests[stage] = {**asdict(rest), "step": run.step, "cpu_s": sitting.spent()}
+    rests[stage] = {**asdict(rest), "step": run.step, "cpu_s": sitting.time_spent()}
     moved = run.assembly.field("displacement")
     assert run.contacts is not None
-    springs = run.contacts.stored() if last else {}
+    springs = run.contacts.pack_state() if last else {}
     return Bed(stage, [body.nodes for body in run.bodies], moved, springs, rests)
 
 
@@ -190,18 +188,18 @@ class Sitting:
         self.before, self.saved = 0.0, time.monotonic()
         self.damping: Damping | None = None
 
-    def spent(self) -> float:
+    def time_spent(self) -> float:
         """Processor time of the stage, all sittings together [s]."""
         return self.before + time.process_time() - self.started
 
-    def go_on(self) -> Damping | None:
+    def resume(self) -> Damping | None:
         """Take the state in the file, where there is one; raises `CheckpointError`."""
         if self.part is None or not self.part.exists():
             return None
         try:
             arrays = read_checkpoint(self.run, self.part)
             self.before = float(arrays.pop("cpu_s"))
-            return Damping.restored(arrays)
+            return Damping.from_arrays(arrays)
         except (CheckpointError, KeyError) as error:
             what = error.what if isinstance(error, CheckpointError) else f"{error} is not in it"
             raise CheckpointError(
@@ -209,7 +207,7 @@ class Sitting:
                 remedy="remove it: the stage then begins again",
             ) from error  # fmt: skip
 
-    def keep(self, damping: Damping) -> None:
+    def save_if_due(self, damping: Damping) -> None:
         """Save it, `KEEP` seconds after the last time."""
         self.damping = damping
         if time.monotonic() - self.saved >= KEEP:
@@ -219,12 +217,12 @@ class Sitting:
         """Write the file."""
         if self.part is None or self.damping is None:
             return
-        beside = {**self.damping.stored(), "cpu_s": np.array(self.spent())}
+        beside = {**self.damping.pack_state(), "cpu_s": np.array(self.time_spent())}
         write_checkpoint(self.run, self.part, beside)
         self.saved = time.monotonic()
 
 
-def begin_nodes(
+def place_start_nodes(
     recipe: BedRecipe, grains: GrainSet, stage: str, before: Bed | None
 ) -> list[Floats]:
     """Where the bodies of a stage begin [m]."""
@@ -235,7 +233,7 @@ def begin_nodes(
         return before.positions
     below, radius = before.positions, recipe.radius
     every = np.concatenate(below)
-    bottom = float(every[layout.under(every), 2].max()) + 2 * radius + GAP
+    bottom = float(every[layout.is_under(every), 2].max()) + 2 * radius + GAP
     top = float(every[:, 2].max()) + radius + GAP
     beside = layout.place_grains_beside(loose[recipe.below :], top, recipe.seed + 1)
     return [*below, *beside, layout.sleeper(bottom).nodes]

@@ -54,7 +54,8 @@ def make_loose_lattice(
     high = np.array([nodes.max(axis=0) for nodes in turned]) + radius
     cell = (high - low).max(axis=0) + GAP
     grids = [
-        np.meshgrid(_centres(*room[:2], cell[0]), _centres(*room[2:], cell[1])) for room in rooms
+        np.meshgrid(_place_centres(*room[:2], cell[0]), _place_centres(*room[2:], cell[1]))
+        for room in rooms
     ]
     spots = np.concatenate([np.stack(grid, axis=-1).reshape(-1, 2) for grid in grids])
     spots = spots[np.lexsort(spots.T[::-1])]
@@ -75,7 +76,7 @@ def make_loose_lattice(
     return placed
 
 
-def _centres(start: float, end: float, cell: float) -> Floats:
+def _place_centres(start: float, end: float, cell: float) -> Floats:
     """Centres of as many cells as fit, evenly shared out [m]."""
     count = int((end - start) / cell)
     return start + (np.arange(count) + 0.5) * (end - start) / max(count, 1)

@@ -85,7 +85,7 @@ class TrackPrepared(Prepared):
 
 def check_track_scene(text: SceneText) -> TrackPrepared:
     """Check a scene with ``[track]``; raises `SceneError` with all that is wrong."""
-    problems = list(text.problems) + list(_faults(text))
+    problems = list(text.problems) + list(_find_faults(text))
     loads: tuple[Series, ...] = ()
     track = text.tables.get("track")
     if isinstance(track, TrackTable):
@@ -109,7 +109,7 @@ def check_track_scene(text: SceneText) -> TrackPrepared:
     )  # fmt: skip
 
 
-def _faults(text: SceneText) -> Iterator[Problem]:
+def _find_faults(text: SceneText) -> Iterator[Problem]:
     """What tables of a track demand of one another."""
     track, contact = text.tables.get("track"), text.tables.get("contact")
     simulation = text.tables.get("simulation")
@@ -186,7 +186,7 @@ def choose_contact(prepared: TrackPrepared) -> SphereContact:
     return replace(every, friction=table.friction, skin=table.skin, contacts=contacts)
 
 
-def foresee_bed(prepared: TrackPrepared) -> dict[str, Any]:
+def preview_bed(prepared: TrackPrepared) -> dict[str, Any]:
     """What a run has to do before its bed stands; empty where that is in its file."""
     ahead, recipe = list_stages_ahead(prepared.recipe, prepared.bed_file), prepared.recipe
     if not ahead:
@@ -242,7 +242,7 @@ def find_watched_points(
     """
     positions = bed.positions
     centres = np.array([x.mean(axis=0) for x in positions[: recipe.below]])
-    centres[:, 1] = recipe.layout.across(centres)
+    centres[:, 1] = recipe.layout.measure_across(centres)
     bottom = float(positions[-1][:, 2].min())
     found: dict[str, tuple[str, Integers]] = {}
 

@@ -65,17 +65,17 @@ class TrackLayout:
             mesh, nodes=mesh.nodes + np.array([self.span[0], self.box.width / 2, bottom])
         )
 
-    def beyond(self, x: Floats) -> Floats:
+    def measure_beyond(self, x: Floats) -> Floats:
         """How far x (k,) [m] lies beyond the free end of the sleeper, zero along it [m]."""
         start, end = self.span
         return np.maximum(np.maximum(start - x, x - end), 0.0)
 
-    def under(self, places: Floats) -> NDArray[np.bool_]:
+    def is_under(self, places: Floats) -> NDArray[np.bool_]:
         """Whether spheres at (k, 3) [m] are where the sleeper goes down, (k,)."""
-        aside = np.abs(self.across(places)) <= self._reach
-        return np.asarray(aside & (self.beyond(places[:, 0]) <= 2 * self.radius))
+        aside = np.abs(self.measure_across(places)) <= self._reach
+        return np.asarray(aside & (self.measure_beyond(places[:, 0]) <= 2 * self.radius))
 
-    def across(self, places: Floats) -> Floats:
+    def measure_across(self, places: Floats) -> Floats:
         """How far places (k, 3) [m] lie from the plane of the sleeper's middle, along y; where the
         track repeats a grain may have left the box, and counts where its image is, (k,) [m]."""
         away = places[:, 1] - self.box.width / 2
@@ -88,10 +88,10 @@ class TrackLayout:
             return make_loose_lattice(grains, [self._room(inf)], 0.0, self.radius, seed)
         flat, foot = self.shoulder
 
-        def share(x: Floats) -> Floats:
-            return np.minimum(1.0, (foot - self.beyond(x)) / (foot - flat))
+        def find_share(x: Floats) -> Floats:
+            return np.minimum(1.0, (foot - self.measure_beyond(x)) / (foot - flat))
 
-        return make_loose_lattice(grains, [self._room(foot)], 0.0, self.radius, seed, share)
+        return make_loose_lattice(grains, [self._room(foot)], 0.0, self.radius, seed, find_share)
 
     def place_grains_beside(
         self, grains: Sequence[Floats], bottom: float, seed: int

@@ -106,11 +106,11 @@ class BedRecipe:
 
 def make_bed_grains(recipe: BedRecipe) -> GrainSet:
     """The grains of a bed."""
-    return _grains_made(recipe.below + recipe.beside, recipe.seed, recipe.sizes)
+    return _make_grains_once(recipe.below + recipe.beside, recipe.seed, recipe.sizes)
 
 
 @lru_cache(maxsize=1)  # 30 ms a grain, and a run asks twice
-def _grains_made(count: int, seed: int, sizes: tuple[float, float]) -> GrainSet:
+def _make_grains_once(count: int, seed: int, sizes: tuple[float, float]) -> GrainSet:
     return make_grains(count, seed, None, Grading(np.array(sizes), np.array([0.0, 1.0])))
 
 

@@ -56,7 +56,7 @@ def make_sleeper_mesh(shape: SleeperShape, along: int, across: int, up: int) -> 
     along.
     """
     knots = shape.stations
-    cuts = _cells_shared(np.diff(knots) / shape.length, along)
+    cuts = _share_cells(np.diff(knots) / shape.length, along)
     mesh = make_box_mesh((1.0, 1.0, 1.0), (along, across, up))
     grid = np.concatenate(
         [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(knots, knots[1:], cuts,
@@ -101,7 +101,7 @@ def make_half_sleeper(shape: SleeperShape, along: int, across: int, up: int) -> 
     return TetMesh(whole.nodes[nodes], number[whole.elements[kept]], node_sets=sets)
 
 
-def _cells_shared(shares: Floats, count: int) -> Integers:
+def _share_cells(shares: Floats, count: int) -> Integers:
     """``count`` whole cells by shares that add up to one, one each at least."""
     if count < len(shares):
         raise MeshError(

@@ -37,7 +37,7 @@ from rigid_lcp.collision.passing import PASSING
 from rigid_lcp.collision.restitution_scale import Share
 from rigid_lcp.errors import ProblemError, UsageError
 from rigid_lcp.friction.auto import solve_auto
-from rigid_lcp.friction.methods import pivoting
+from rigid_lcp.friction.methods import solve_pivoting
 from rigid_lcp.friction.problem import (
     FORCE_ROUND_OFF,
     MOST_FRICTION,
@@ -46,12 +46,12 @@ from rigid_lcp.friction.problem import (
     FrictionSolution,
     Status,
     check_factors,
-    in_range,
     judge_forces,
-    length,
+    norm,
     require_finite,
     require_number,
     require_one_a_contact,
+    require_range,
     require_whole,
 )
 
@@ -66,7 +66,7 @@ class CollisionNumbers:
     rounds_with_friction: int = 50
     """with it one in five of those has no end, and energy is lost anyway [-]."""
     least_tolerance: float = 1e-16  # the smallest residual that is asked for [-]
-    most_error: float = 1e-6  # (`round_error`) of impulses that change velocities [-]
+    most_error: float = 1e-6  # (`find_round_error`) of impulses that change velocities [-]
     pivoting_contacts: int = 300  # up to so many in 2D are solved by pivoting first [-]
 
 
@@ -135,7 +135,7 @@ def collide(
     require_whole(max_rounds, "max_rounds")
     moved = np.zeros(nc * dim)
     if drive is not None:
-        moved = numbers_of("drive", drive, nc * dim, "one number a row of J")
+        moved = require_numbers("drive", drive, nc * dim, "one number a row of J")
     first = bodies.jacobian @ before + moved
     none = max(still, PASSING.speed_round_off * float(np.abs(first).max(initial=0.0)))
     after, impulse = before.copy(), np.zeros(nc * dim)
@@ -191,7 +191,7 @@ def run_collision_round(
     ``velocity`` (nc * dim,): of all contacts before it [m/s].
     """
     rows = (dim * taking[:, None] + np.arange(dim)).ravel()
-    part = bodies.of_contacts(taking)
+    part = bodies.select_contacts(taking)
     v = velocity[rows]
     share = Share(1)
     while True:
@@ -202,27 +202,27 @@ def run_collision_round(
             excess[:, 1:] += used[:, None] * v.reshape(-1, dim)[:, 1:]
         problem = FrictionProblem(None, excess.ravel(), mu[taking], dim, part)
         solution = find_round_impulses(problem, tolerance)
-        p, error = solution.r, round_error(problem, solution)
+        p, error = solution.r, find_round_error(problem, solution)
         if not (used.any() and problem.friction.any()):
             break  # without friction energy can not grow
         change = 0.5 * float(p @ (2.0 * v + part.product(p)))
-        grows = error > COLLISION.most_error or change > work_round_off(part, p, v)
-        if not share.next(np.array([grows])):
+        grows = error > COLLISION.most_error or change > estimate_round_off(part, p, v)
+        if not share.bisect(np.array([grows])):
             break
     impulse = np.zeros(bodies.jacobian.shape[0])
     impulse[rows] = p
     return impulse, solution, error, float(share.now[0])
 
 
-def round_error(problem: FrictionProblem, solution: FrictionSolution) -> float:
+def find_round_error(problem: FrictionProblem, solution: FrictionSolution) -> float:
     """Residual of a round's impulses, or the share of the velocities that they leave wrong, where
     that is more than `COLLISION`'s: impulses without bound make any residual small [-]."""
-    speed = length(problem.offset)
-    left = max(solution.residual, FORCE_ROUND_OFF) * length(solution.r) / problem.rho
+    speed = norm(problem.offset)
+    left = max(solution.residual, FORCE_ROUND_OFF) * norm(solution.r) / problem.rho
     return left / speed if left > COLLISION.most_error * speed else solution.residual
 
 
-def work_round_off(bodies: BodySpace, impulse: Floats, velocity: Floats) -> float:
+def estimate_round_off(bodies: BodySpace, impulse: Floats, velocity: Floats) -> float:
     """Round-off of the work of impulses p (nc * dim,) [N s] at contacts that approached with
     ``velocity`` (nc * dim,) [m/s]: a growth of energy [J] that is none.
 
@@ -240,8 +240,8 @@ def find_round_impulses(problem: FrictionProblem, tolerance: float) -> FrictionS
     light ones, so that it is asked to be as small beside the velocities too.
     """
     found = _find_impulses_at(problem, tolerance)
-    error = found.residual * length(found.r) / problem.rho
-    if found.solved and error > (most := tolerance * length(problem.offset)):
+    error = found.residual * norm(found.r) / problem.rho
+    if found.solved and error > (most := tolerance * norm(problem.offset)):
         finer = max(found.residual * most / error, COLLISION.least_tolerance)
         again = _find_impulses_at(problem, finer)
         if again.residual < found.residual:
@@ -252,7 +252,7 @@ def find_round_impulses(problem: FrictionProblem, tolerance: float) -> FrictionS
 def _find_impulses_at(problem: FrictionProblem, tolerance: float) -> FrictionSolution:
     few = problem.contacts <= COLLISION.pivoting_contacts
     if problem.friction.any() and problem.dim == 2 and few:
-        found = pivoting(problem, None, tolerance)
+        found = solve_pivoting(problem, None, tolerance)
         if found.solved:
             return found
     return solve_auto(problem, None, tolerance)
@@ -276,12 +276,14 @@ def check_moving_bodies(bodies: BodySpace, velocity: ArrayLike) -> tuple[int, Fl
             f"jacobian has {rows} rows, which are not {dim} a contact", where="bodies",
             remedy="give a contact 2 rows where a body has 3 freedoms, and 3 where it has 6",
         )  # fmt: skip
-    before = numbers_of("velocity", velocity, freedoms, "one number a freedom, as J has columns")
-    in_range(before, "velocity", least=0.0)
+    before = require_numbers(
+        "velocity", velocity, freedoms, "one number a freedom, as J has columns"
+    )
+    require_range(before, "velocity", least=0.0)
     return dim, before
 
 
-def numbers_of(name: str, values: ArrayLike, count: int, remedy: str) -> Floats:
+def require_numbers(name: str, values: ArrayLike, count: int, remedy: str) -> Floats:
     """``values`` as (count,); `ProblemError`, with ``name``, for another number of them."""
     array = require_finite(values, name).ravel()
     if len(array) != count:

@@ -159,7 +159,7 @@ def find_impulses_in_turn(bodies: BodySpace, closing: Closing, solve: Solve) -> 
         taking = np.flatnonzero(bounce | resting | last)
         work += len(taking)
         offset = (now.offset + find_contact_shift(now, bounce))[taking]
-        solution, error = solve(bodies.of_contacts(taking), offset, now.friction[taking])
+        solution, error = solve(bodies.select_contacts(taking), offset, now.friction[taking])
         push = np.zeros_like(impulse)
         push[taking] = solution.r.reshape(-1, impulse.shape[1])
         impulse += push

@@ -17,7 +17,7 @@ import numpy as np
 
 from rigid_lcp.arrays import Bools, Floats
 from rigid_lcp.collision.passing import PASSING, Closing, Impulses
-from rigid_lcp.friction.auto import islands
+from rigid_lcp.friction.auto import find_islands
 from rigid_lcp.friction.problem import BodySpace, FrictionProblem
 
 SHARE_RESOLUTION = 1 / 64
@@ -47,7 +47,7 @@ def gains_energy(
     dim = impulse.shape[1]
     problem = FrictionProblem(None, closing.offset.ravel(), closing.friction, dim, bodies)
     first, body, _ = problem.body_jacobians
-    for island in islands(problem):
+    for island in find_islands(problem):
         touched = np.unique(np.concatenate([body[first[c] : first[c + 1]] for c in island]))
         most = allowed[touched].sum() + PASSING.speed_round_off * parts[island].sum()
         gains[island] = bounce[island].any() and work[island].sum() > most
@@ -66,7 +66,7 @@ class Share:
         """What is to be tried next, (count,) [-]."""
         self._least, self._most = np.zeros(count), np.ones(count)
 
-    def next(self, gains: Bools) -> bool:
+    def bisect(self, gains: Bools) -> bool:
         """Whether another share is to be tried, where those tried now made energy (count,)."""
         before = self.now
         self._most = np.where(gains, before, self._most)

@@ -4,15 +4,15 @@ from rigid_lcp.contact.arrays import (
     FEATURE_BITS,
     ContactForces,
     Contacts,
+    build_frames,
     choose_tangents,
-    contact_frames,
-    contact_rows,
+    match_keys,
 )
-from rigid_lcp.contact.detection_plane import detect_2d, shapes_2d
+from rigid_lcp.contact.detection_plane import detect_2d, pack_shapes_2d
 from rigid_lcp.contact.detection_space import detect_3d
-from rigid_lcp.contact.placed_solids import MOST_EDGES, shapes_3d
+from rigid_lcp.contact.placed_solids import MOST_EDGES, pack_shapes_3d
 
 __all__ = [
-    "FEATURE_BITS", "MOST_EDGES", "ContactForces", "Contacts", "choose_tangents",
-    "contact_frames", "contact_rows", "detect_2d", "detect_3d", "shapes_2d", "shapes_3d",
+    "FEATURE_BITS", "MOST_EDGES", "ContactForces", "Contacts", "build_frames", "choose_tangents",
+    "detect_2d", "detect_3d", "match_keys", "pack_shapes_2d", "pack_shapes_3d",
 ]  # fmt: skip

@@ -96,12 +96,12 @@ def choose_tangents(normal: Floats) -> Floats:
     return np.stack([first, np.cross(normal, first)], axis=1)
 
 
-def contact_frames(normal: Floats) -> Floats:
+def build_frames(normal: Floats) -> Floats:
     """Unit vectors n, t (n, t1, t2) of every contact as rows, (nc, dim, dim)."""
     return np.concatenate([normal[:, None, :], choose_tangents(normal)], axis=1)
 
 
-def contact_rows(old: Ints, new: Ints) -> tuple[Ints, Bools]:
+def match_keys(old: Ints, new: Ints) -> tuple[Ints, Bools]:
     """Where each key of ``new`` stands in ``old`` (any row if it does not), and if it does."""
     if len(old) == 0:
         return np.zeros(len(new), dtype=np.int64), np.zeros(len(new), dtype=bool)

@@ -21,7 +21,7 @@ from rigid_lcp.contact.near_pairs import (
     POLYGON,
     ZERO,
     bound_shapes,
-    near_pairs,
+    find_near_pairs,
     place_shapes,
 )
 from rigid_lcp.errors import SceneError
@@ -45,7 +45,7 @@ class Shapes2D:
     """Pairs of bodies that can not move are never looked at."""
 
 
-def shapes_2d(
+def pack_shapes_2d(
     shapes: Sequence[object], movable: Bools, called: Callable[[int], str] = "body {}".format
 ) -> Shapes2D:
     """Flat arrays of polygons, discs and half-spaces; `SceneError` for any other shape.
@@ -98,8 +98,8 @@ def detect_2d(
     vertices, normals = place_shapes(shapes.kind, shapes.first, shapes.vertices, shapes.normals,
                                      position, angle)  # fmt: skip
     boxes = bound_shapes(shapes.first, vertices, shapes.radius, position, margins)
-    pairs = near_pairs(shapes.kind, boxes, shapes.movable)
-    bodies, numbers, key = pair_contacts(
+    pairs = find_near_pairs(shapes.kind, boxes, shapes.movable)
+    bodies, numbers, key = find_pair_contacts(
         pairs, shapes.kind, shapes.first, vertices, normals, shapes.radius, position, margins
     )
     zero, edges = np.zeros((2, len(key))), np.zeros((2, len(key), 2))
@@ -110,13 +110,13 @@ def detect_2d(
 
 
 @njit(cache=True)
-def contact_key(a: int, b: int, vertex: int, face: int) -> int:
+def pack_key(a: int, b: int, vertex: int, face: int) -> int:
     """One number for a vertex of a on a face of b."""
     return ((((a << BODY_BITS) | b) << FEATURE_BITS) | vertex) << FEATURE_BITS | face
 
 
 @njit(cache=True)
-def widest_face(own: Floats, normals: Floats, other: Floats) -> tuple[int, float]:
+def find_widest_face(own: Floats, normals: Floats, other: Floats) -> tuple[int, float]:
     """Face whose line separates the other polygon most, and by how much [m]: the gap if > 0."""
     best, separation = 0, -np.inf
     for face in range(len(own)):
@@ -196,7 +196,7 @@ def find_face_contacts(
 
 
 @njit(cache=True)
-def pair_contacts(
+def find_pair_contacts(
     pairs: Ints, kind: Ints, first: Ints, vertices: Floats, normals: Floats, radius: Floats,
     position: Floats, margins: Floats,
 ) -> tuple[Ints, Floats, Ints]:  # fmt: skip
@@ -219,7 +219,7 @@ def pair_contacts(
                 x, y = position[i]
                 gap = n[0] * x + n[1] * y - offset - radius[i]
                 if gap <= margin:
-                    bodies[c, 0], bodies[c, 1], key[c] = i, j, contact_key(i, j, none, none)
+                    bodies[c, 0], bodies[c, 1], key[c] = i, j, pack_key(i, j, none, none)
                     _store(numbers, c, x - radius[i] * n[0], y - radius[i] * n[1], n[0], n[1], gap,
                            radius[i], np.inf)  # fmt: skip
                     c += 1
@@ -228,16 +228,16 @@ def pair_contacts(
                 x, y = vertices[v]
                 gap = n[0] * x + n[1] * y - offset
                 if gap <= margin:
-                    bodies[c, 0], bodies[c, 1], key[c] = i, j, contact_key(i, j, v - first[i], none)
+                    bodies[c, 0], bodies[c, 1], key[c] = i, j, pack_key(i, j, v - first[i], none)
                     _store(numbers, c, x, y, n[0], n[1], gap, 0.0, np.inf)
                     c += 1
         elif kind[i] == POLYGON and kind[j] == POLYGON:
             vi, ni = vertices[first[i] : first[i + 1]], normals[first[i] : first[i + 1]]
             vj, nj = vertices[first[j] : first[j + 1]], normals[first[j] : first[j + 1]]
-            face_i, gap_i = widest_face(vi, ni, vj)
+            face_i, gap_i = find_widest_face(vi, ni, vj)
             if gap_i > margin:
                 continue
-            face_j, gap_j = widest_face(vj, nj, vi)
+            face_j, gap_j = find_widest_face(vj, nj, vi)
             if gap_j > margin:
                 continue
             tie = LENGTH_TIE * min(radius[i], radius[j])
@@ -252,7 +252,7 @@ def pair_contacts(
                 vertex, face = int(found[k, 1]), int(found[k, 2])
                 x, y = vertices[first[a] + vertex]
                 n = normals[first[b] + face]
-                bodies[c, 0], bodies[c, 1], key[c] = a, b, contact_key(a, b, vertex, face)
+                bodies[c, 0], bodies[c, 1], key[c] = a, b, pack_key(a, b, vertex, face)
                 _store(numbers, c, x, y, n[0], n[1], found[k, 3], 0.0, np.inf)
                 c += 1
         elif kind[i] == DISC and kind[j] == DISC:
@@ -263,7 +263,7 @@ def pair_contacts(
             x, y = position[disc]
             own = vertices[first[grain] : first[grain + 1]]
             outward = normals[first[grain] : first[grain + 1]]
-            face, distance = widest_face(own, outward, position[disc : disc + 1])
+            face, distance = find_widest_face(own, outward, position[disc : disc + 1])
             if distance - radius[disc] > margin:
                 continue
             n, following = outward[face], (face + 1) % len(own)
@@ -276,7 +276,7 @@ def pair_contacts(
                 continue
             # A key with a vertex of one beyond the last: a face is no vertex.
             bodies[c, 0], bodies[c, 1] = disc, grain
-            key[c] = contact_key(disc, grain, none + 1, face)
+            key[c] = pack_key(disc, grain, none + 1, face)
             _store(numbers, c, x - radius[disc] * n[0], y - radius[disc] * n[1], n[0], n[1],
                    distance - radius[disc], radius[disc], np.inf)  # fmt: skip
             c += 1
@@ -303,7 +303,7 @@ def _find_round_contact(
     if distance - radius_a - radius_b > margin:
         return 0
     n0, n1 = (x / distance, y / distance) if distance > 0.0 else (0.0, 1.0)
-    bodies[c, 0], bodies[c, 1], key[c] = a, b, contact_key(a, b, int(ZERO), corner)
+    bodies[c, 0], bodies[c, 1], key[c] = a, b, pack_key(a, b, int(ZERO), corner)
     _store(numbers, c, centre_a[0] - radius_a * n0, centre_a[1] - radius_a * n1, n0, n1,
            distance - radius_a - radius_b, radius_a, radius_b)  # fmt: skip
     return 1

@@ -19,10 +19,10 @@ from rigid_lcp.contact.manifold import (
     MOST_KEPT,
     ROOM,
     add_candidate,
+    is_within_face,
     keep_outer,
-    within_face,
 )
-from rigid_lcp.contact.near_pairs import HALF_SPACE, ZERO, bound_shapes, near_pairs
+from rigid_lcp.contact.near_pairs import HALF_SPACE, ZERO, bound_shapes, find_near_pairs
 from rigid_lcp.contact.placed_solids import (
     MOST_EDGES,
     POLYHEDRON,
@@ -69,7 +69,7 @@ def touch_sphere_solid(solids: Solids, body: int, x: Floats, radius: float, row:
         distance = dot(solids.normal[f], x) - solids.offset[f]
         if distance > separation:
             best, separation = f, distance
-    if separation <= 0.0 or within_face(solids, body, best, x, 0.0):
+    if separation <= 0.0 or is_within_face(solids, body, best, x, 0.0):
         _fill(row, x, radius, solids.normal[best], separation - radius, np.inf)
         return best - first_face
     feature, nearest = 0, np.inf
@@ -131,19 +131,21 @@ def detect_3d(
     position = np.ascontiguousarray(position, dtype=float)
     solids = place_solids(shapes, position, quaternion)
     boxes = bound_shapes(solids.first_vertex, solids.vertex, shapes.reach, position, margins)
-    pairs = near_pairs(shapes.kind, boxes, shapes.movable)
-    bodies, numbers, key = pair_contacts(
+    pairs = find_near_pairs(shapes.kind, boxes, shapes.movable)
+    bodies, numbers, key = find_pair_contacts(
         pairs, shapes.kind, solids, shapes.reach, position, margins, boxes
     )
     zero = np.zeros(len(key))
     return Contacts(
         bodies[:, 0], bodies[:, 1], numbers[:, 0:3], numbers[:, 3:6], numbers[:, 6], key,
         numbers[:, 7], numbers[:, 8], zero, zero.copy(),
-        *edge_directions(shapes.kind, solids, bodies, key),
+        *find_edge_directions(shapes.kind, solids, bodies, key),
     )  # fmt: skip
 
 
-def edge_directions(kind: Ints, solids: Solids, bodies: Ints, key: Ints) -> tuple[Floats, Floats]:
+def find_edge_directions(
+    kind: Ints, solids: Solids, bodies: Ints, key: Ints
+) -> tuple[Floats, Floats]:
     """Unit directions (nc, 3) of the edges of a and of b that the contacts' names tell of.
 
     Zero at corners, faces and spheres.
@@ -172,13 +174,13 @@ def edge_directions(kind: Ints, solids: Solids, bodies: Ints, key: Ints) -> tupl
 
 
 @njit(cache=True)
-def contact_key(a: int, b: int, feature_a: int, feature_b: int) -> int:
+def pack_key(a: int, b: int, feature_a: int, feature_b: int) -> int:
     """One number for a feature of a on a feature of b; crossing edges count from `MOST_EDGES`."""
     return ((((a << BODY_BITS) | b) << FEATURE_BITS) | feature_a) << FEATURE_BITS | feature_b
 
 
 @njit(cache=True)
-def pair_contacts(
+def find_pair_contacts(
     pairs: Ints, kind: Ints, solids: Solids, reach: Floats, position: Floats, margins: Floats,
     boxes: Floats,
 ) -> tuple[Ints, Floats, Ints]:  # fmt: skip
@@ -204,7 +206,7 @@ def pair_contacts(
                 feature = touch_sphere_solid(solids, other, x, radius, row)
             if row[6] <= margin:
                 bodies[c, 0], bodies[c, 1] = sphere, other
-                key[c] = contact_key(sphere, other, none, none) + feature
+                key[c] = pack_key(sphere, other, none, none) + feature
                 c += 1
             continue
         if kind[j] == HALF_SPACE:
@@ -224,7 +226,7 @@ def pair_contacts(
             elif form == CORNERS:
                 second += solids.first_face[j + 1] - solids.first_face[j]
             bodies[c, 0], bodies[c, 1] = a, b
-            key[c] = contact_key(a, b, first, second)
+            key[c] = pack_key(a, b, first, second)
             for axis in range(3):
                 numbers[c, axis] = found[k, 7 + axis]
                 numbers[c, 3 + axis] = sign * found[k, 4 + axis]

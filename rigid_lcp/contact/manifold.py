@@ -26,7 +26,7 @@ OUTSIDE_HULL, MOST_KEPT = POLYHEDRA.outside_hull, POLYHEDRA.most_kept
 
 
 @njit(cache=True)
-def within_face(solids: Solids, body: int, face: int, x: Floats, slack: float) -> bool:
+def is_within_face(solids: Solids, body: int, face: int, x: Floats, slack: float) -> bool:
     """The point projects into the face, or no farther outside than ``slack`` [m]."""
     base = solids.first_vertex[body]
     n = solids.normal[face]
@@ -84,7 +84,7 @@ def find_face_candidates(
     for v in range(first_other, solids.first_vertex[other + 1]):
         x = solids.vertex[v]
         gap = dot(n, x) - level
-        if gap <= margin and within_face(solids, own, face, x, LENGTH_TIE * size):
+        if gap <= margin and is_within_face(solids, own, face, x, LENGTH_TIE * size):
             here, there = v - first_other, face - solids.first_face[own]
             kind, first, second = int(CORNER_FACE), here, there
             if not own_is_b:
@@ -101,7 +101,7 @@ def find_face_candidates(
         for k in range(start, stop):
             x = solids.vertex[first_own + solids.loop[k]]
             gap = dot(m, x) - solids.offset[g]
-            if gap <= margin and within_face(solids, other, g, x, LENGTH_TIE * size):
+            if gap <= margin and is_within_face(solids, other, g, x, LENGTH_TIE * size):
                 here, there = g - solids.first_face[other], solids.loop[k]
                 kind, first, second = int(FACE_CORNER), here, there
                 if not own_is_b:
@@ -113,7 +113,7 @@ def find_face_candidates(
     crossing = np.empty(9)
     towards = sign * n
     for f in range(solids.first_edge[own], solids.first_edge[own + 1]):
-        if not edge_of_face(solids, f, start, stop):
+        if not is_edge_of_face(solids, f, start, stop):
             continue
         for e in edges_other:
             edge_a, edge_b = (e, f) if own_is_b else (f, e)
@@ -135,7 +135,7 @@ def find_face_candidates(
 
 
 @njit(cache=True)
-def edge_of_face(solids: Solids, edge: int, start: int, stop: int) -> bool:
+def is_edge_of_face(solids: Solids, edge: int, start: int, stop: int) -> bool:
     """Both corners of the edge belong to the face whose corners are ``loop[start:stop]``."""
     ends = 0
     for k in range(start, stop):
@@ -145,7 +145,7 @@ def edge_of_face(solids: Solids, edge: int, start: int, stop: int) -> bool:
 
 
 @njit(cache=True)
-def least_gap(found: Floats, count: int) -> float:
+def find_least_gap(found: Floats, count: int) -> float:
     """Least gap of the candidates [m]; inf without any."""
     least = np.inf
     for k in range(count):

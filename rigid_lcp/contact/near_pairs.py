@@ -56,7 +56,7 @@ def bound_shapes(
 
 
 @njit(cache=True)
-def near_pairs(kind: Ints, boxes: Floats, movable: Bools) -> Ints:
+def find_near_pairs(kind: Ints, boxes: Floats, movable: Bools) -> Ints:
     """Pairs (i < j) whose boxes overlap and every half-space with every movable body, (m, 2).
 
     ``boxes`` (n, 2 dim); those of half-spaces are not read.  Boxes are sorted by their lower ends

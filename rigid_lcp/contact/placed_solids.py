@@ -12,7 +12,7 @@ from rigid_lcp.contact.arrays import FEATURE_BITS
 from rigid_lcp.contact.near_pairs import HALF_SPACE
 from rigid_lcp.contact.separation import POLYHEDRA, Solids
 from rigid_lcp.errors import SceneError, ShapeError
-from rigid_lcp.shapes import HalfSpace, Polyhedron, Sphere, rotation_matrix
+from rigid_lcp.shapes import HalfSpace, Polyhedron, Sphere, make_rotation
 
 POLYHEDRON, SPHERE = 0, 1
 """Kinds of shapes as the kernels know them, with `HALF_SPACE`."""
@@ -33,7 +33,7 @@ class Shapes3D:
     """Pairs of bodies that can not move are never looked at."""
 
 
-def shapes_3d(
+def pack_shapes_3d(
     shapes: Sequence[object], movable: Bools, called: Callable[[int], str] = "body {}".format
 ) -> Shapes3D:
     """Flat arrays of polyhedra, spheres and half-spaces; `SceneError` for any other shape.
@@ -50,33 +50,33 @@ def shapes_3d(
             try:
                 edges = len(shape.edges)
             except ShapeError as error:
-                raise error.at(where) from error
+                raise error.relocate(where) from error
             if edges + 2 > MOST_EDGES:  # as many faces and corners together
                 raise SceneError(
                     f"it has {edges} edges", where=where,
                     remedy=f"use at most {MOST_EDGES - 2}, or a sphere",
                 )  # fmt: skip
-            parts.append(_solid(shape))
+            parts.append(_pack_solid(shape))
         elif isinstance(shape, Sphere):
             kind.append(SPHERE)
             reach.append(shape.radius)
-            parts.append(_bare(np.zeros((0, 3)), np.zeros(0)))
+            parts.append(_pack_bare(np.zeros((0, 3)), np.zeros(0)))
         elif isinstance(shape, HalfSpace) and shape.dim == 3:
             kind.append(HALF_SPACE)
             reach.append(shape.offset)
-            parts.append(_bare(shape.normal[None], np.array([shape.offset])))
+            parts.append(_pack_bare(shape.normal[None], np.array([shape.offset])))
         else:
             raise SceneError(
                 f"it is no shape in space ({type(shape).__name__})", where=where,
                 remedy="use Polyhedron, Sphere or HalfSpace with a normal of three numbers",
             )  # fmt: skip
     return Shapes3D(
-        np.array(kind, dtype=np.int64), np.array(reach, dtype=float), _joined(parts),
+        np.array(kind, dtype=np.int64), np.array(reach, dtype=float), _join_solids(parts),
         np.asarray(movable, dtype=bool),
     )  # fmt: skip
 
 
-def _bare(normals: Floats, offsets: Floats) -> Solids:
+def _pack_bare(normals: Floats, offsets: Floats) -> Solids:
     """No corners and no edges."""
     none, no_vectors = np.zeros(0, dtype=np.int64), np.zeros((0, 3))
     return Solids(
@@ -86,7 +86,7 @@ def _bare(normals: Floats, offsets: Floats) -> Solids:
     )  # fmt: skip
 
 
-def _solid(shape: Polyhedron) -> Solids:
+def _pack_solid(shape: Polyhedron) -> Solids:
     edges = shape.edges
     first, second = shape.normals[edges[:, 2]], shape.normals[edges[:, 3]]
     bisector = first + second
@@ -102,7 +102,7 @@ def _solid(shape: Polyhedron) -> Solids:
     )  # fmt: skip
 
 
-def _joined(parts: Sequence[Solids]) -> Solids:
+def _join_solids(parts: Sequence[Solids]) -> Solids:
     """The parts one after the other; their ``first_corner`` hold where each face's loop ends."""
     arrays = [np.concatenate(part) for part in zip(*parts, strict=True)]
     firsts = [
@@ -124,7 +124,7 @@ def _joined(parts: Sequence[Solids]) -> Solids:
 def place_solids(shapes: Shapes3D, position: Floats, quaternion: Floats) -> Solids:
     """Polyhedra in the world frame; half-spaces are there already."""
     solids = shapes.solids
-    turn = rotation_matrix(quaternion)
+    turn = make_rotation(quaternion)
     still = shapes.kind == HALF_SPACE
     turn[still], shift = np.eye(3), np.where(still[:, None], 0.0, position)
     counts = [np.diff(first) for first in (solids.first_vertex, solids.first_face,

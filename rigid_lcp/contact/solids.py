@@ -23,8 +23,8 @@ from rigid_lcp.contact.manifold import (
     SAME_CONTACT,
     add_candidate,
     find_face_candidates,
+    find_least_gap,
     keep_outer,
-    least_gap,
 )
 from rigid_lcp.contact.near_pairs import ZERO
 from rigid_lcp.contact.separation import (
@@ -85,7 +85,7 @@ def list_corner_edge_pairs(
 
 
 @njit(cache=True)
-def pair_belongs(solids: Solids, pair: Floats, normal: Floats, tie: float) -> bool:
+def shares_gap(solids: Solids, pair: Floats, normal: Floats, tie: float) -> bool:
     """The pair lies across the same gap as the nearest one, whose ``normal`` it nearly has.
 
     So do the two ends of what parallel edges have in common.
@@ -124,7 +124,7 @@ def find_corner_candidates(
             point[axis] = solids.vertex[solids.first_vertex[own] + int(pair[1]), axis]
         if row == 0:
             nearest = normal.copy()
-        elif not pair_belongs(solids, pair, nearest, tie):
+        elif not shares_gap(solids, pair, nearest, tie):
             continue
         corner, edge = int(pair[1]), int(pair[2])
         first, second = corner, edge - solids.first_edge[other]
@@ -182,7 +182,7 @@ def find_solid_contacts(
     if not alone:
         near = near_a if own_is_b else near_b
         count = find_face_candidates(solids, face, own, other, own_is_b, near, margin, size, found)
-    least = least_gap(found, count)
+    least = find_least_gap(found, count)
     apart, missing = max(faces, gap_edges), least > gap_edges + LENGTH_TIE * size
     deep = count == 0 and apart < -LENGTH_TIE * size
     if alone or (crosses and missing and (gap_edges == apart or deep)):
@@ -191,7 +191,7 @@ def find_solid_contacts(
             edge_b - solids.first_edge[b], crossing[2], crossing[3:6], 1.0, crossing[6:9],
             SAME_CONTACT * size,
         )  # fmt: skip
-        least = least_gap(found, count)
+        least = find_least_gap(found, count)
     if apart > -LENGTH_TIE * size and least > apart + LENGTH_TIE * size:
         within = min(margin, least - LENGTH_TIE * size)
         count = find_corner_candidates(

@@ -10,9 +10,9 @@ import scipy.sparse as sp
 from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import NoSolution, NotConverged
 from rigid_lcp.friction.auto import solve_friction
-from rigid_lcp.friction.methods import dantzig, pivoting
-from rigid_lcp.friction.problem import BodySpace, FrictionSolution, friction_problem
-from rigid_lcp.motion.time_stepping import forces_error
+from rigid_lcp.friction.methods import solve_dantzig, solve_pivoting
+from rigid_lcp.friction.problem import BodySpace, FrictionSolution, make_problem
+from rigid_lcp.motion.time_stepping import find_forces_error
 
 
 @dataclass(frozen=True)
@@ -39,14 +39,14 @@ def find_forces(
     dim = 1 + slip.shape[1]
     lasting = try_lasting_forces(bodies, offset, friction, slip)
     if lasting is not None and lasting.residual <= tolerance:
-        return lasting, forces_error(bodies, lasting, gravity)
+        return lasting, find_forces_error(bodies, lasting, gravity)
     if not (slip.any(axis=1) & (friction > 0)).any():
         solution = solve_friction(bodies, offset, friction, dim=dim, tolerance=tolerance)
     elif dim == 2:
-        problem = friction_problem(bodies, offset, friction, dim)
-        solution = pivoting(problem, None, tolerance, tangential_velocity=slip[:, 0])
+        problem = make_problem(bodies, offset, friction, dim)
+        solution = solve_pivoting(problem, None, tolerance, tangential_velocity=slip[:, 0])
         if not solution.solved:
-            solution = dantzig(problem, None, tolerance, tangential_velocity=slip[:, 0])
+            solution = solve_dantzig(problem, None, tolerance, tangential_velocity=slip[:, 0])
     else:
         solution = _find_sliding_forces(bodies, offset, friction, slip, tolerance)
     if solution.status == "no solution":
@@ -54,7 +54,7 @@ def find_forces(
             "no finite contact forces obey Coulomb's law (Painleve)", where="contact forces",
             remedy='use method="time-stepping", whose impulses always exist',
         )  # fmt: skip
-    error = forces_error(bodies, solution, gravity)
+    error = find_forces_error(bodies, solution, gravity)
     endless = not solution.solved and solution.residual <= tolerance  # so small only beside them
     if endless or not error <= LASTING.most_error:
         raise NotConverged(
@@ -99,7 +99,7 @@ def try_lasting_forces(
         return None
     u = offset + w @ force
     # no longer than this, as forces are within their cones
-    # (`rigid_lcp.friction.problem.natural_map`)
+    # (`rigid_lcp.friction.problem.find_natural_map`)
     residual = float(np.linalg.norm(u[free])) / float(w.diagonal().mean()) / size
     return FrictionSolution(force, u, residual, "solved", "lasting contacts", {})
 

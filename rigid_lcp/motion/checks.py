@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import SceneError, UsageError
 from rigid_lcp.motion.state import Motion
-from rigid_lcp.shapes import HalfSpace, real_numbers, require_vector
+from rigid_lcp.shapes import HalfSpace, require_real, require_vector
 
 Loads = Callable[[float, Motion], ArrayLike | None]
 """Forces and torques (n, 3) in 2D, (n, 6) in 3D [N, N m] at a time [s] and state."""
@@ -34,7 +34,7 @@ class InputBounds:
 BOUNDS = InputBounds()
 
 
-def too_many_steps(what: str, steps: float) -> str:
+def explain_step_limit(what: str, steps: float) -> str:
     """Sentence on a span of time, ``what``, of more steps than can be made."""
     return f"{what} is {steps:.3g} steps: at most {BOUNDS.steps:.0e} can be made"
 
@@ -121,7 +121,7 @@ def check_loads(loads: Loads, time: float, motion: Motion) -> Floats | None:
     shape = motion.rates.shape
     wrong = ""
     try:
-        forces = real_numbers(given)
+        forces = require_real(given)
     except (TypeError, ValueError) as error:
         wrong = f"are not real numbers ({error})"
     else:

@@ -11,12 +11,12 @@ import numpy as np
 import scipy.sparse as sp
 
 from rigid_lcp.arrays import Floats, Ints
-from rigid_lcp.contact import Contacts, contact_frames
+from rigid_lcp.contact import Contacts, build_frames
 from rigid_lcp.friction.problem import BodySpace
 from rigid_lcp.motion.state import Motion
 
 
-def body_space(
+def make_body_space(
     contacts: Contacts, position: Floats, columns: Ints, inverse_mass: sp.csr_array
 ) -> BodySpace:
     """J and M^-1 of the contacts, ``A = J M^-1 J^T`` (eqs 17, 25).
@@ -26,7 +26,7 @@ def body_space(
     """
     size = 3 if contacts.dim == 2 else 6
     movable = inverse_mass.shape[0] // size
-    return BodySpace(jacobian(contacts, position, columns, movable), inverse_mass, size)
+    return BodySpace(build_jacobian(contacts, position, columns, movable), inverse_mass, size)
 
 
 def find_response(bodies: BodySpace, impulse: Floats) -> Floats:
@@ -35,20 +35,22 @@ def find_response(bodies: BodySpace, impulse: Floats) -> Floats:
     return np.asarray(change).reshape(-1, bodies.body_size)
 
 
-def jacobian(contacts: Contacts, position: Floats, columns: Ints, movable: int) -> sp.csr_array:
+def build_jacobian(
+    contacts: Contacts, position: Floats, columns: Ints, movable: int
+) -> sp.csr_array:
     """J (nc * dim, movable * 3) in 2D, (nc * dim, movable * 6) in 3D: ``dg/dq`` (eqs 13, 20).
 
     Row of a direction d: (d, x_a x d) for body a and its negative, with x_b, for body b.
     """
     dim, nc = contacts.dim, len(contacts)
-    frames = contact_frames(contacts.normal)
+    frames = build_frames(contacts.normal)
     size = 3 if dim == 2 else 6
     values = np.empty((nc, dim, 2, size))
     place = np.empty((nc, 2), dtype=np.int64)
     for side, (bodies, sign) in enumerate(((contacts.body_a, 1.0), (contacts.body_b, -1.0))):
         lever = contacts.point - position[bodies]
         values[:, :, side, :dim] = sign * frames
-        values[:, :, side, dim:] = sign * _moment(lever[:, None, :], frames)
+        values[:, :, side, dim:] = sign * _find_moment(lever[:, None, :], frames)
         place[:, side] = columns[bodies]
     swap = place[:, 0] > place[:, 1]  # columns in ascending order
     values[swap], place[swap] = values[swap][:, :, ::-1], place[swap][:, ::-1]
@@ -60,7 +62,7 @@ def jacobian(contacts: Contacts, position: Floats, columns: Ints, movable: int) 
     return sp.csr_array((values[there], column[there], pointer), shape=shape)
 
 
-def _moment(lever: Floats, force: Floats) -> Floats:
+def _find_moment(lever: Floats, force: Floats) -> Floats:
     """``x x f``: one number (in a last axis of its own) in 2D, a vector in 3D."""
     if lever.shape[-1] == 3:
         return np.cross(lever, force)
@@ -74,19 +76,19 @@ def turn_arm(spin: Floats, arm: Floats) -> Floats:
     return np.stack([-spin * arm[..., 1], spin * arm[..., 0]], axis=-1)
 
 
-def _point_velocities(motion: Motion, bodies: Ints, point: Floats) -> Floats:
+def _find_point_velocities(motion: Motion, bodies: Ints, point: Floats) -> Floats:
     arm = point - motion.position[bodies]
     return motion.velocity[bodies] + turn_arm(motion.spin[bodies], arm)
 
 
-def relative_velocity(contacts: Contacts, motion: Motion) -> Floats:
+def find_relative_velocity(contacts: Contacts, motion: Motion) -> Floats:
     """``u = J v`` with all bodies, moving or driven: (nc, dim) along n, t (n, t1, t2) [m/s]."""
-    a = _point_velocities(motion, contacts.body_a, contacts.point)
-    b = _point_velocities(motion, contacts.body_b, contacts.point)
-    return np.einsum("cij,cj->ci", contact_frames(contacts.normal), a - b)
+    a = _find_point_velocities(motion, contacts.body_a, contacts.point)
+    b = _find_point_velocities(motion, contacts.body_b, contacts.point)
+    return np.einsum("cij,cj->ci", build_frames(contacts.normal), a - b)
 
 
-def inertial_acceleration(contacts: Contacts, motion: Motion) -> Floats:
+def find_inertial_acceleration(contacts: Contacts, motion: Motion) -> Floats:
     """The terms ``d2g/dq_k dq_l q'_k q'_l`` of eqs 14, 17 and 24, (nc, dim) [m/s^2].
 
     Relative acceleration at the contacts while no force or torque acts.  With c the carrier of a
@@ -101,7 +103,7 @@ def inertial_acceleration(contacts: Contacts, motion: Motion) -> Floats:
 
         t . (w_a x (c' - v_a) - w_b x (c' - v_b))
 
-    In 3D, at edges, see `_across_edges`; crossing edges that slide along each other are taken to
+    In 3D, at edges, see `_find_edge_terms`; crossing edges that slide along each other are taken to
     slide along b's, which matters to no force: friction then has the velocity's direction.
     """
     a, b, n = contacts.body_a, contacts.body_b, contacts.normal
@@ -110,29 +112,29 @@ def inertial_acceleration(contacts: Contacts, motion: Motion) -> Floats:
     behind = np.where(flat, 0.0, contacts.radius_b)
     face = contacts.point - contacts.gap[:, None] * n
     carrier_b = np.where(flat[:, None], carrier_a, face - behind[:, None] * n)
-    carried = _point_velocities(motion, a, carrier_a)
-    moving = carried - _point_velocities(motion, b, carrier_b)
+    carried = _find_point_velocities(motion, a, carrier_a)
+    moving = carried - _find_point_velocities(motion, b, carrier_b)
     along = moving - (moving * n).sum(axis=1)[:, None] * n
     apart = contacts.radius_a + behind + contacts.gap
     apart = np.where(flat | (apart <= 0), 1.0, apart)
     turning = turn_arm(motion.spin[b], n)
-    pull = _centripetal(motion, a, carrier_a) - _centripetal(motion, b, carrier_b)
+    pull = _find_centripetal(motion, a, carrier_a) - _find_centripetal(motion, b, carrier_b)
     normal = (n * pull).sum(axis=1)
     curved = (along * along).sum(axis=1) / apart
     normal += np.where(flat, 2 * (turning * moving).sum(axis=1), curved)
     normal_rate = np.where(flat[:, None], turning, along / apart[:, None])
     edges = np.flatnonzero(np.any(contacts.edge_b != 0, axis=1))
     if len(edges):
-        normal[edges], normal_rate[edges] = _across_edges(contacts[edges], motion)
+        normal[edges], normal_rate[edges] = _find_edge_terms(contacts[edges], motion)
     rate = carried - contacts.radius_a[:, None] * normal_rate
     pull = turn_arm(motion.spin[a], rate - motion.velocity[a])
     pull -= turn_arm(motion.spin[b], rate - motion.velocity[b])
-    result = np.einsum("cij,cj->ci", contact_frames(n), pull)
+    result = np.einsum("cij,cj->ci", build_frames(n), pull)
     result[:, 0] = normal
     return result
 
 
-def _across_edges(contacts: Contacts, motion: Motion) -> tuple[Floats, Floats]:
+def _find_edge_terms(contacts: Contacts, motion: Motion) -> tuple[Floats, Floats]:
     """Normal part (nc,) [m/s^2] and ``n' = dn/dt`` (nc, 3) [1/s] for contacts at an edge of b.
 
     The normal of two crossing edges is across both, that of a sphere on an edge across the edge:
@@ -146,8 +148,8 @@ def _across_edges(contacts: Contacts, motion: Motion) -> tuple[Floats, Floats]:
     a, b, n = contacts.body_a, contacts.body_b, contacts.normal
     carrier = contacts.point + contacts.radius_a[:, None] * n
     foot = contacts.point - contacts.gap[:, None] * n
-    velocity = _point_velocities(motion, a, carrier) - _point_velocities(motion, b, foot)
-    pull = _centripetal(motion, a, carrier) - _centripetal(motion, b, foot)
+    velocity = _find_point_velocities(motion, a, carrier) - _find_point_velocities(motion, b, foot)
+    pull = _find_centripetal(motion, a, carrier) - _find_centripetal(motion, b, foot)
     e_a, e_b = contacts.edge_a, contacts.edge_b
     turned_b = np.cross(motion.spin[b], e_b)
     across = np.cross(e_a, e_b)
@@ -163,7 +165,7 @@ def _across_edges(contacts: Contacts, motion: Motion) -> tuple[Floats, Floats]:
     return _dot(n, pull) + 2 * _dot(rate, velocity) - distance * _dot(rate, rate), rate
 
 
-def _centripetal(motion: Motion, bodies: Ints, point: Floats) -> Floats:
+def _find_centripetal(motion: Motion, bodies: Ints, point: Floats) -> Floats:
     spin = motion.spin[bodies]
     return turn_arm(spin, turn_arm(spin, point - motion.position[bodies]))
 
@@ -173,8 +175,8 @@ def find_contact_offset(contacts: Contacts, motion: Motion, free: Motion) -> Flo
 
     ``free`` has the accelerations that the loads alone would give as its velocities and spins.
     """
-    loads = relative_velocity(contacts, free)
-    return (loads + inertial_acceleration(contacts, motion)).ravel()
+    loads = find_relative_velocity(contacts, free)
+    return (loads + find_inertial_acceleration(contacts, motion)).ravel()
 
 
 def _dot(a: Floats, b: Floats) -> Floats:

@@ -31,7 +31,7 @@ def is_finite(world: World, motion: Motion) -> bool:
         return all(bool(np.isfinite(each).all()) for each in numbers)
 
 
-def too_much(
+def explain_overflow(
     world: World, motion: Motion, loads: ArrayLike | None, h: float, time: float,
     error: ProblemError | None = None,
 ) -> SceneError:  # fmt: skip
@@ -50,7 +50,7 @@ def too_much(
             body = int(np.argmin(np.where(world.movable, np.minimum(mass, inertia), np.inf)))
             cause = f"its mass is {mass[body]:.3g} kg, its inertia {inertia[body]:.3g} kg m^2"
     return SceneError(
-        f"{cause}: this leads to {leads}", where=f"{world.scene.called(body)} at {time:.6g} s",
+        f"{cause}: this leads to {leads}", where=f"{world.scene.name_body(body)} at {time:.6g} s",
         remedy="look at loads, gravity, masses and velocities; take a shorter step, or other units",
     )  # fmt: skip
 

@@ -11,52 +11,52 @@ from numpy.typing import ArrayLike
 
 from rigid_lcp.arrays import Floats
 from rigid_lcp.shapes import (
-    quaternion_of_matrix,
-    quaternion_of_rotation,
-    quaternion_product,
+    extract_quaternion,
+    make_quaternion,
+    make_rotation,
+    multiply_quaternions,
+    normalise_quaternion,
     rotate,
     rotate_back,
-    rotation_matrix,
     turn_quaternion,
-    unit_quaternion,
 )
 
 
-def principal_inertia(inertia: ArrayLike) -> tuple[Floats, Floats]:
+def find_principal_axes(inertia: ArrayLike) -> tuple[Floats, Floats]:
     """Principal moments (..., 3) in ascending order [kg m^2], and quaternions (..., 4) that turn
     their axes to body coordinates, of tensors (..., 3, 3) in the body frame [kg m^2]."""
     moments, axes = np.linalg.eigh(np.asarray(inertia, dtype=float))
-    return moments, quaternion_of_matrix(axes * np.sign(np.linalg.det(axes))[..., None, None])
+    return moments, extract_quaternion(axes * np.sign(np.linalg.det(axes))[..., None, None])
 
 
-def world_inertia(inertia: Floats, quaternion: Floats) -> Floats:
+def turn_inertia(inertia: Floats, quaternion: Floats) -> Floats:
     """``R I R^T``, (..., 3, 3), of body tensors (..., 3, 3) [kg m^2]."""
-    turn = rotation_matrix(quaternion)
+    turn = make_rotation(quaternion)
     return np.einsum("...ij,...jk,...lk->...il", turn, inertia, turn)
 
 
-def gyroscopic_acceleration(inertia: Floats, quaternion: Floats, spin: Floats) -> Floats:
+def find_spin_acceleration(inertia: Floats, quaternion: Floats, spin: Floats) -> Floats:
     """``-I^-1 (w x I w)`` [rad/s^2], (..., 3): how the spin of a free body changes (eq. 17)."""
-    placed = world_inertia(inertia, quaternion)
+    placed = turn_inertia(inertia, quaternion)
     torque = -np.cross(spin, np.einsum("...ij,...j->...i", placed, spin))
     return np.asarray(np.linalg.solve(placed, torque[..., None])[..., 0], dtype=float)
 
 
-def free_rotation(
+def rotate_freely(
     principal: tuple[Floats, Floats], quaternion: Floats, spin: Floats, seconds: float
 ) -> tuple[Floats, Floats]:
     """Orientation (..., 4) and spin (..., 3) of free bodies after ``seconds`` [s], in one step;
-    ``principal``: their `principal_inertia`.
+    ``principal``: their `find_principal_axes`.
 
     The kinetic energy ``sum L_i^2 / 2 I_i`` is split into that of a sphere with the middle moment
     and one rest for the first and for the third axis; each part turns the body about one axis,
     exactly (symplectic splitting; Touma and Wisdom, Astron. J. 107 (1994) 1189).  It keeps the
     angular momentum; what it lacks of the energy, of third order in the step, is added by
-    `turned_to_energy`.  So both are kept to round-off, the error is of second order, and spheres,
+    `find_energy_turn`.  So both are kept to round-off, the error is of second order, and spheres,
     cubes and all bodies with two equal moments move exactly.
     """
     moments, axes = principal
-    frame = unit_quaternion(quaternion_product(quaternion, axes))
+    frame = normalise_quaternion(multiply_quaternions(quaternion, axes))
     momentum = moments * rotate_back(frame, spin)
     twice_energy = (momentum**2 / moments).sum(axis=-1)
     world_momentum = rotate(frame, momentum)
@@ -64,18 +64,18 @@ def free_rotation(
     for axis, share in ((0, 0.5), (2, 1.0), (0, 0.5)):
         turn = np.zeros_like(momentum)
         turn[..., axis] = share * seconds * rest[..., axis] * momentum[..., axis]
-        step = quaternion_of_rotation(turn)
-        frame = quaternion_product(frame, step)
+        step = make_quaternion(turn)
+        frame = multiply_quaternions(frame, step)
         momentum = rotate_back(step, momentum)
-    back = turned_to_energy(moments, momentum, twice_energy, seconds)
-    frame = quaternion_product(frame, quaternion_of_rotation(back))
+    back = find_energy_turn(moments, momentum, twice_energy, seconds)
+    frame = multiply_quaternions(frame, make_quaternion(back))
     frame = turn_quaternion(frame, seconds / moments[..., 1:2] * world_momentum)
     spin = rotate(frame, rotate_back(frame, world_momentum) / moments)
-    body = quaternion_product(frame, axes * [1.0, -1.0, -1.0, -1.0])
-    return unit_quaternion(body), spin
+    body = multiply_quaternions(frame, axes * [1.0, -1.0, -1.0, -1.0])
+    return normalise_quaternion(body), spin
 
 
-def turned_to_energy(
+def find_energy_turn(
     moments: Floats, momentum: Floats, twice_energy: Floats, seconds: float
 ) -> Floats:
     """Rotation vectors (..., 3), in the principal frame, by which a frame turns to a given energy.

@@ -11,10 +11,10 @@ import numpy as np
 
 from rigid_lcp.arrays import Bools, Floats, Ints
 from rigid_lcp.collision import Collision, collide
-from rigid_lcp.contact import Contacts, choose_tangents, contact_rows
+from rigid_lcp.contact import Contacts, choose_tangents, match_keys
 from rigid_lcp.errors import NotConverged
 from rigid_lcp.motion.acceleration_forces import LASTING
-from rigid_lcp.motion.equations import body_space, find_response, relative_velocity
+from rigid_lcp.motion.equations import find_relative_velocity, find_response, make_body_space
 from rigid_lcp.motion.state import Motion, displace_motion, replace_rates
 from rigid_lcp.motion.world import World
 
@@ -48,7 +48,7 @@ class Lasting:
         return (self.slip != 0).any(axis=1)
 
 
-def speed_scale(world: World, motion: Motion) -> float:
+def find_speed_scale(world: World, motion: Motion) -> float:
     """``sqrt(g size)`` [m/s]; without gravity the greatest speed there is."""
     gravity = float(np.linalg.norm(world.scene.gravity))
     if gravity > 0:
@@ -56,11 +56,11 @@ def speed_scale(world: World, motion: Motion) -> float:
     return float(np.abs(motion.velocity).max(initial=0.0))
 
 
-def lasting_contacts(world: World, motion: Motion) -> Lasting:
+def find_lasting(world: World, motion: Motion) -> Lasting:
     """Contacts that touch and neither approach nor part; sliding above `TOUCHING`'s is a slip."""
     contacts = world.contacts(motion, 0.5 * TOUCHING.gap * world.length)
-    velocity = relative_velocity(contacts, motion)
-    still = TOUCHING.no_speed * speed_scale(world, motion)
+    velocity = find_relative_velocity(contacts, motion)
+    still = TOUCHING.no_speed * find_speed_scale(world, motion)
     stay = velocity[:, 0] <= still
     slip = velocity[stay, 1:]
     slip[np.linalg.norm(slip, axis=1) <= still] = 0.0
@@ -75,21 +75,21 @@ def redetect_contacts(
         return lasting.contacts, lasting.slip
     way = h * world.speeds(motion.rates)
     found = world.contacts(motion, way + 10 * TOUCHING.gap * world.length)
-    rows, there = contact_rows(found.key, lasting.contacts.key)
+    rows, there = match_keys(found.key, lasting.contacts.key)
     now, before = rows[there], np.flatnonzero(there)
     if not there.all():
         within = TOUCHING.pressed_overlap * world.length
-        taken, lost = successors(found, lasting.contacts, there, within)
+        taken, lost = find_successors(found, lasting.contacts, there, within)
         now, before = np.concatenate([now, taken]), np.concatenate([before, lost])
     contacts = found[now]
     slip = carry_slip(lasting, before, contacts)
     if motion.dim == 3:  # the direction turns with the velocity, until that has reversed
-        now_slip = relative_velocity(contacts, motion)[:, 1:]
+        now_slip = find_relative_velocity(contacts, motion)[:, 1:]
         slip = np.where(((now_slip * slip).sum(axis=1) > 0)[:, None], now_slip, slip)
     return contacts, slip
 
 
-def successors(
+def find_successors(
     found: Contacts, contacts: Contacts, there: Bools, within: float
 ) -> tuple[Ints, Ints]:
     """Rows of ``found`` that bear what ``contacts`` not ``there`` any more bore, and rows of those.
@@ -120,7 +120,9 @@ def carry_slip(lasting: Lasting, rows: Bools | Ints, contacts: Contacts) -> Floa
     return np.einsum("cij,cj->ci", choose_tangents(contacts.normal), vector)
 
 
-def collided(world: World, motion: Motion, tolerance: float) -> tuple[Motion, Collision | None]:
+def collide_bodies(
+    world: World, motion: Motion, tolerance: float
+) -> tuple[Motion, Collision | None]:
     """Velocities after the collisions of touching bodies (eqs 32-36), and what they were if any.
 
     `rigid_lcp.collision.collide`, restitution on normal velocities, as time stepping has it, but
@@ -129,11 +131,11 @@ def collided(world: World, motion: Motion, tolerance: float) -> tuple[Motion, Co
     contacts = world.contacts(motion, 0.5 * TOUCHING.gap * world.length)
     if len(contacts) == 0:
         return motion, None
-    scale, velocity = speed_scale(world, motion), relative_velocity(contacts, motion)
+    scale, velocity = find_speed_scale(world, motion), find_relative_velocity(contacts, motion)
     still = TOUCHING.no_speed * scale
     if velocity[:, 0].min() >= -still:
         return motion, None
-    bodies = body_space(contacts, motion.position, world.columns, world.inverse_mass(motion))
+    bodies = make_body_space(contacts, motion.position, world.columns, world.inverse_mass(motion))
     moving = motion.rates[world.movable].ravel()
     found = collide(
         bodies, moving, contacts.restitution, contacts.friction, law="newton",
@@ -163,19 +165,19 @@ def find_share_until_rest(
         return 1.0
     way = h * world.speeds(motion.rates) + h * world.speeds(after.rates)
     found = world.contacts(after, way + TOUCHING.pressed_overlap * world.length)
-    rows, there = contact_rows(found.key, lasting.contacts.key)
+    rows, there = match_keys(found.key, lasting.contacts.key)
     there &= lasting.sliding & (lasting.contacts.friction > 0)
     if not there.any():
         return 1.0
     contacts = found[rows[there]]
-    now, then = relative_velocity(contacts, after)[:, 1:], carry_slip(lasting, there, contacts)
+    now, then = find_relative_velocity(contacts, after)[:, 1:], carry_slip(lasting, there, contacts)
     along, before = (now * then).sum(axis=1), (then * then).sum(axis=1)
-    still = TOUCHING.no_speed * speed_scale(world, after)
+    still = TOUCHING.no_speed * find_speed_scale(world, after)
     turned = (along < 0) & (np.linalg.norm(now, axis=1) > still)
     return float((before[turned] / (before[turned] - along[turned])).min(initial=1.0))
 
 
-def overlap_beyond(world: World, motion: Motion, pressed: Ints) -> float:
+def find_excess_overlap(world: World, motion: Motion, pressed: Ints) -> float:
     """Overlap that makes the step too long [m]: of contacts not ``pressed`` all the time (keys).
 
     That of lasting contacts is an error of the integration, which `remove_drift` takes out; it
@@ -200,12 +202,12 @@ def find_share_until_touch(
     found = world.contacts(after, 0.0)
     found = found[(found.gap < -TOUCHING.overlap * world.length) & ~np.isin(found.key, pressed)]
     start = world.contacts(motion, h * world.speeds(motion.rates) + h * world.speeds(after.rates))
-    rows, there = contact_rows(start.key, found.key)
+    rows, there = match_keys(start.key, found.key)
     found, start = found[there], start[rows[there]]
     aim = TOUCHING.aimed_gap * TOUCHING.gap * world.length
     ends = zip(
-        start.gap - aim, h * relative_velocity(start, motion)[:, 0], found.gap - aim,
-        h * relative_velocity(found, after)[:, 0], strict=True,
+        start.gap - aim, h * find_relative_velocity(start, motion)[:, 0], found.gap - aim,
+        h * find_relative_velocity(found, after)[:, 0], strict=True,
     )  # fmt: skip
     shares = [share for each in ends if (share := find_first_fall(*map(float, each))) is not None]
     return min(shares, default=None)
@@ -240,19 +242,19 @@ def remove_drift(world: World, motion: Motion, pressed: Ints, stuck: Ints) -> Mo
     closing[:, 0] = wanted[:, 0] = True
     gaps = np.zeros(wanted.shape)
     gaps[:, 0] = contacts.gap
-    motion = _constrained(world, motion, contacts, gaps, closing, velocities=False)
-    velocity = relative_velocity(contacts, motion)
-    return _constrained(world, motion, contacts, velocity, wanted, velocities=True)
+    motion = _constrain(world, motion, contacts, gaps, closing, velocities=False)
+    velocity = find_relative_velocity(contacts, motion)
+    return _constrain(world, motion, contacts, velocity, wanted, velocities=True)
 
 
-def _constrained(
+def _constrain(
     world: World, motion: Motion, contacts: Contacts, value: Floats, rows: Bools, *,
     velocities: bool,
 ) -> Motion:  # fmt: skip
     """``M^-1 J^T lambda`` added to velocities or places, so that ``value`` vanishes in ``rows``."""
     if not value[rows].any():
         return motion
-    bodies = body_space(contacts, motion.position, world.columns, world.inverse_mass(motion))
+    bodies = make_body_space(contacts, motion.position, world.columns, world.inverse_mass(motion))
     kept = np.flatnonzero(rows.ravel())
     matrix = bodies.matrix[kept][:, kept].toarray()
     push = np.zeros(value.size)

@@ -10,7 +10,7 @@ was an error of the step.  What that changes:
   turn of all, but that would change their energy.)
 * Energy: bodies that lie on what is fixed are lifted, by at most their weight times the overlap.  A
   body that comes to rest lost more in the same step.  Where a step would end with more energy than
-  it began with, `pay_lift` takes the lift from what restitution gave, or else from the kinetic
+  it began with, `remove_lift` takes the lift from what restitution gave, or else from the kinetic
   energy of the bodies moved.
 
 Who pays: a disc that lands on a floor is by ``v h / 2`` too deep at the midpoint, and does not come
@@ -32,10 +32,10 @@ from scipy.sparse.csgraph import connected_components
 from rigid_lcp.arrays import Bools, Floats, Ints
 from rigid_lcp.contact import Contacts
 from rigid_lcp.friction.auto import solve_friction
-from rigid_lcp.motion.equations import body_space, find_response
+from rigid_lcp.motion.equations import find_response, make_body_space
 from rigid_lcp.motion.state import Motion, displace_motion, replace_rates
 from rigid_lcp.motion.world import World
-from rigid_lcp.shapes import quaternion_of_rotation, rotate
+from rigid_lcp.shapes import make_quaternion, rotate
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def remove_overlap(world: World, motion: Motion, touching: Contacts | None = Non
             weight = np.where(np.arange(world.size) < motion.dim, 1.0, OVERLAPS.turning_ease**0.5)
             scale = sp.diags_array(np.tile(weight, inverse_mass.shape[0] // world.size))
             inverse_mass = sp.csr_array(scale @ inverse_mass @ scale)
-        bodies = body_space(found, motion.position, world.columns, inverse_mass)
+        bodies = make_body_space(found, motion.position, world.columns, inverse_mass)
         offset = np.zeros((len(found), motion.dim))
         offset[:, 0] = found.gap
         apart = solve_friction(
@@ -96,12 +96,12 @@ def remove_overlap(world: World, motion: Motion, touching: Contacts | None = Non
         move *= min(1.0, OVERLAPS.turn_of_a_move / max(turn, 1e-300))
         motion = displace_motion(motion, move)
         if motion.dim == 3:  # spins turn along: so they, and kinetic energies, stay in the bodies
-            turned = rotate(quaternion_of_rotation(move[:, 3:]), motion.spin)
+            turned = rotate(make_quaternion(move[:, 3:]), motion.spin)
             motion = replace(motion, spin=turned)
     return motion
 
 
-def part_bodies(
+def separate_bodies(
     world: World, start: Motion, end: Motion, loads: Floats | None, h: float,
     touching: Contacts | None = None, restitution: Restitution | None = None,
 ) -> Motion:  # fmt: skip
@@ -118,10 +118,10 @@ def part_bodies(
     if loads is not None:
         way = 0.5 * h * (start.rates + end.rates)[world.movable]
         work = float((np.asarray(loads)[world.movable] * way).sum())
-    return pay_lift(world, end, parted, world.energy(start) + work, restitution)
+    return remove_lift(world, end, parted, world.energy(start) + work, restitution)
 
 
-def pay_lift(
+def remove_lift(
     world: World, end: Motion, parted: Motion, budget: float,
     restitution: Restitution | None = None,
 ) -> Motion:  # fmt: skip
@@ -143,13 +143,13 @@ def pay_lift(
     payers = [moved]
     if restitution is not None:
         near = join_bodies(world, moved, restitution)
-        parted = measure_energy_taken(world, parted, near, restitution.taken_out(), owed)
+        parted = take_energy(world, parted, near, restitution.taken_out(), owed)
         payers.append(near)
     for bodies in payers:
         owed -= energy - world.energy(parted)
         energy = world.energy(parted)
         if owed > none:
-            parted = measure_energy_taken(world, parted, bodies, -parted.rates, owed)
+            parted = take_energy(world, parted, bodies, -parted.rates, owed)
     return parted
 
 
@@ -164,9 +164,7 @@ def join_bodies(world: World, moved: Bools, restitution: Restitution) -> Bools:
     return joined
 
 
-def measure_energy_taken(
-    world: World, motion: Motion, bodies: Bools, change: Floats, owed: float
-) -> Motion:
+def take_energy(world: World, motion: Motion, bodies: Bools, change: Floats, owed: float) -> Motion:
     """``motion`` with as small a part of ``change`` (n, 3) or (n, 6) [m/s, 1/s] in the velocities
     of ``bodies`` (n,) as takes ``owed`` [J] of energy, or the part that takes most, at most all."""
     rates, change = motion.rates, np.where(bodies[:, None], change, 0.0)

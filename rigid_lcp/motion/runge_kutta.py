@@ -33,23 +33,23 @@ from rigid_lcp.contact import ContactForces, Contacts
 from rigid_lcp.errors import NoSolution, NotConverged, Overlapping, ProblemError, RigidError
 from rigid_lcp.motion.acceleration_forces import find_forces
 from rigid_lcp.motion.checks import Loads
-from rigid_lcp.motion.equations import body_space, find_contact_offset, find_response
-from rigid_lcp.motion.finite_states import is_finite, too_much
+from rigid_lcp.motion.equations import find_contact_offset, find_response, make_body_space
+from rigid_lcp.motion.finite_states import explain_overflow, is_finite
 from rigid_lcp.motion.lasting_contacts import (
     TOUCHING,
     Lasting,
-    collided,
+    collide_bodies,
+    find_excess_overlap,
+    find_lasting,
     find_share_until_rest,
     find_share_until_touch,
-    lasting_contacts,
-    overlap_beyond,
     redetect_contacts,
     remove_drift,
 )
 from rigid_lcp.motion.state import Motion, replace_rates
-from rigid_lcp.motion.time_stepping import MOREAU, contact_forces
+from rigid_lcp.motion.time_stepping import MOREAU, make_contact_forces
 from rigid_lcp.motion.world import World
-from rigid_lcp.shapes import quaternion_rate
+from rigid_lcp.shapes import find_quaternion_rate
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ def advance_runge_kutta(
     """
     end, forces = time + seconds, None
     loads = loads or (lambda *_: None)
-    fastest = _travel_limit(world, motion)
+    fastest = _find_travel_limit(world, motion)
     if seconds > RUNGE_KUTTA.steps_of_a_call * fastest:
         raise NotConverged(
             f"{seconds:g} s take more than {RUNGE_KUTTA.steps_of_a_call:.0e} steps,"
@@ -128,14 +128,14 @@ def advance_runge_kutta(
             where=f"time {time:.9g} s", remedy="use method='time-stepping'",
         )  # fmt: skip
     while end - time > RUNGE_KUTTA.shortest_step * pace.longest or forces is None:
-        motion, collision = collided(world, motion, tolerance)
+        motion, collision = collide_bodies(world, motion, tolerance)
         pace.collisions += collision is not None
         pace.scaled += collision is not None and collision.restitution_scale < 1.0
         pace.cut_off += collision is not None and collision.cut_off
-        lasting = lasting_contacts(world, motion)
+        lasting = find_lasting(world, motion)
         tried, located = pace.step, 0
         while True:
-            h = min(tried, end - time, _travel_limit(world, motion))
+            h = min(tried, end - time, _find_travel_limit(world, motion))
             try:
                 rates, after = step_runge_kutta(world, motion, time, h, lasting, loads, tolerance)
             except NoSolution:  # of a stage, perhaps, that the motion does not come to
@@ -145,14 +145,16 @@ def advance_runge_kutta(
                 pace.shortened += 1
                 continue
             except ProblemError as error:
-                raise too_much(world, motion, loads(time, motion), h, time, error) from error
+                raise explain_overflow(
+                    world, motion, loads(time, motion), h, time, error
+                ) from error
             if not is_finite(world, after):  # speeds so great leave no step that is long enough
-                raise too_much(world, motion, loads(time, motion), h, time)
+                raise explain_overflow(world, motion, loads(time, motion), h, time)
             first, last = rates[0], rates[-1]
-            pressed, stuck = lasting_keys(first, last)
-            overlap = overlap_beyond(world, after, pressed)
+            pressed, stuck = list_lasting_keys(first, last)
+            overlap = find_excess_overlap(world, after, pressed)
             stop = find_share_until_rest(world, motion, after, h, lasting)
-            far = _travel_limit(world, after)
+            far = _find_travel_limit(world, after)
             if overlap > TOUCHING.overlap * world.length:
                 share = None
                 if located < RUNGE_KUTTA.located_ends:
@@ -170,7 +172,7 @@ def advance_runge_kutta(
             else:
                 break
             if tried < RUNGE_KUTTA.shortest_step * pace.longest:
-                raise _no_step(world, after, overlap, time)
+                raise _explain_failure(world, after, overlap, time)
         time += h
         pace.accepted += 1
         pace.clean += 1
@@ -179,7 +181,7 @@ def advance_runge_kutta(
         pace.steps_above += residual > tolerance
         if pace.clean >= RUNGE_KUTTA.steps_before_doubling:
             pace.step, pace.clean = min(2 * pace.step, pace.longest), 0
-        forces = contact_forces(first.contacts, first.force, first.acceleration, 1.0)
+        forces = make_contact_forces(first.contacts, first.force, first.acceleration, 1.0)
         motion = remove_drift(world, after, pressed, stuck)
     assert forces is not None
     return motion, forces
@@ -191,20 +193,20 @@ def step_runge_kutta(
 ) -> tuple[list[Rate], Motion]:  # fmt: skip
     """One classical fourth-order step: the rates of its four stages, and its end."""
 
-    def rate_at(part: float, previous: Rate | None) -> Rate:
-        stage = motion if previous is None else moved(motion, part * h, [(1.0, previous)])
+    def find_rate(part: float, previous: Rate | None) -> Rate:
+        stage = motion if previous is None else move_state(motion, part * h, [(1.0, previous)])
         pull = loads(time + part * h, stage)
         return find_state_rate(world, stage, h, lasting, pull, tolerance)
 
-    first = rate_at(0.0, None)
-    second = rate_at(0.5, first)
-    third = rate_at(0.5, second)
-    fourth = rate_at(1.0, third)
+    first = find_rate(0.0, None)
+    second = find_rate(0.5, first)
+    third = find_rate(0.5, second)
+    fourth = find_rate(1.0, third)
     weights = [(1 / 6, first), (1 / 3, second), (1 / 3, third), (1 / 6, fourth)]
-    return [first, second, third, fourth], moved(motion, h, weights)
+    return [first, second, third, fourth], move_state(motion, h, weights)
 
 
-def moved(motion: Motion, h: float, weights: list[tuple[float, Rate]]) -> Motion:
+def move_state(motion: Motion, h: float, weights: list[tuple[float, Rate]]) -> Motion:
     """The state moved for ``h`` [s] with a weighted mean of rates."""
     position = motion.position + h * sum(w * rate.position for w, rate in weights)
     angle = motion.angle + h * sum(w * rate.angle for w, rate in weights)
@@ -219,13 +221,13 @@ def find_state_rate(
     tolerance: float,
 ) -> Rate:  # fmt: skip
     """Velocities and accelerations of a state, its lasting contacts taken as closed (eq. 26)."""
-    turning = motion.spin if motion.dim == 2 else quaternion_rate(motion.angle, motion.spin)
+    turning = motion.spin if motion.dim == 2 else find_quaternion_rate(motion.angle, motion.spin)
     free = world.accelerations(motion, loads)
     contacts, slip = redetect_contacts(world, motion, h, lasting)
     if len(contacts) == 0:
         none = np.zeros((0, motion.dim))
         return Rate(motion.velocity, turning, free, contacts, none, none)
-    bodies = body_space(contacts, motion.position, world.columns, world.inverse_mass(motion))
+    bodies = make_body_space(contacts, motion.position, world.columns, world.inverse_mass(motion))
     offset = find_contact_offset(contacts, motion, replace_rates(motion, free))
     gravity = float(np.linalg.norm(world.scene.gravity))
     solution, error = find_forces(bodies, offset, contacts.friction, slip, tolerance, gravity)
@@ -237,7 +239,7 @@ def find_state_rate(
     )  # fmt: skip
 
 
-def _no_step(world: World, motion: Motion, overlap: float, time: float) -> RigidError:
+def _explain_failure(world: World, motion: Motion, overlap: float, time: float) -> RigidError:
     """What is wrong with the end ``motion`` of the shortest step, which may have an ``overlap``."""
     where, remedy = f"time {time:.9g} s", "use method='time-stepping'"
     if overlap > TOUCHING.overlap * world.length:
@@ -249,20 +251,20 @@ def _no_step(world: World, motion: Motion, overlap: float, time: float) -> Rigid
     body = int(np.argmax(speed))
     return NotConverged(
         f"the shortest step is too long for it; its points go at {speed[body]:.3g} m/s",
-        where=f"{world.scene.called(body)}, {where}",
+        where=f"{world.scene.name_body(body)}, {where}",
         remedy=f"look at its loads and at gravity, or {remedy}",
     )
 
 
-def _travel_limit(world: World, motion: Motion) -> float:
+def _find_travel_limit(world: World, motion: Motion) -> float:
     fastest = float(world.speeds(motion.rates).max())
     return RUNGE_KUTTA.way_of_a_step * world.length / fastest if fastest > 0 else np.inf
 
 
-def lasting_keys(first: Rate, last: Rate) -> tuple[Ints, Ints]:
+def list_lasting_keys(first: Rate, last: Rate) -> tuple[Ints, Ints]:
     """Keys of contacts that press at the first and last stage; of those that stick at both.
 
-    Contacts that took the place of others on the way (`successors`) have no first stage.
+    Contacts that took the place of others on the way (`find_successors`) have no first stage.
     """
     pressed, stuck = [], []
     for rate in (first, last):

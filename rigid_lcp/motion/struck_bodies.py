@@ -1,7 +1,7 @@
 """Bodies that are struck within a time step: how far they get, and what they may strike in turn.
 
 Contacts of a step are looked for as far as bodies get within it by the velocities that they begin
-it with (`moreau_margin`).  A body at rest that is struck gets further.  What it then meets shows as
+it with (`find_margin`).  A body at rest that is struck gets further.  What it then meets shows as
 an overlap at the end of the step, at a pair that had no contact in it (`find_missed_collisions`).
 A pair without restitution is moved apart and comes to rest in the next step, as it would have done
 in this one.  With restitution the step is made again, with more contacts
@@ -18,7 +18,7 @@ import numpy as np
 
 from rigid_lcp.arrays import Bools, Floats, Ints
 from rigid_lcp.contact import Contacts
-from rigid_lcp.motion.equations import relative_velocity
+from rigid_lcp.motion.equations import find_relative_velocity
 from rigid_lcp.motion.overlap_removal import OVERLAPS
 from rigid_lcp.motion.state import Motion
 from rigid_lcp.motion.world import World
@@ -27,7 +27,7 @@ LEAST_GAIN = 1e-6
 """Part by which a speed has to be greater than one that was taken into account [-]."""
 
 
-def moreau_margin(world: World, motion: Motion, accelerations: Floats, h: float) -> Floats:
+def find_margin(world: World, motion: Motion, accelerations: Floats, h: float) -> Floats:
     """How far each body's points can get within a step that nothing strikes them in [m], (n,)."""
     rates = np.abs(motion.rates) + h * np.abs(accelerations)
     return h * world.speeds(rates) + OVERLAPS.allowed * world.length
@@ -46,10 +46,10 @@ def find_missed_collisions(
     found = touching[deep & (touching.restitution > 0.0)]
     if len(found) == 0:
         return missed
-    known = np.isin(_pairs(world, found), _pairs(world, contacts))
+    known = np.isin(_number_pairs(world, found), _number_pairs(world, contacts))
     found = found[~known]
     if len(found):
-        found = found[relative_velocity(found, end)[:, 0] < -slow]
+        found = found[find_relative_velocity(found, end)[:, 0] < -slow]
         missed[found.body_a] = missed[found.body_b] = True
     return missed
 
@@ -81,7 +81,7 @@ def _pass_on(world: World, contacts: Contacts, margin: Floats, struck: Bools) ->
     return further
 
 
-def _pairs(world: World, contacts: Contacts) -> Ints:
+def _number_pairs(world: World, contacts: Contacts) -> Ints:
     """One number for the two bodies of each contact, (nc,)."""
     a, b = contacts.body_a, contacts.body_b
     return np.minimum(a, b) * len(world.mass) + np.maximum(a, b)

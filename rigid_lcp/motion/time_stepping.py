@@ -42,22 +42,22 @@ from rigid_lcp.collision import (
     find_impulses_in_turn,
     gains_energy,
 )
-from rigid_lcp.contact import ContactForces, Contacts, contact_frames, contact_rows
+from rigid_lcp.contact import ContactForces, Contacts, build_frames, match_keys
 from rigid_lcp.errors import NotConverged
 from rigid_lcp.friction.auto import solve_friction
 from rigid_lcp.friction.problem import SHARE_LEFT, BodySpace, FrictionSolution
 from rigid_lcp.motion.equations import (
-    body_space,
+    find_inertial_acceleration,
+    find_relative_velocity,
     find_response,
-    inertial_acceleration,
-    relative_velocity,
+    make_body_space,
 )
-from rigid_lcp.motion.overlap_removal import OVERLAPS, Restitution, part_bodies
+from rigid_lcp.motion.overlap_removal import OVERLAPS, Restitution, separate_bodies
 from rigid_lcp.motion.state import Motion, replace_rates
 from rigid_lcp.motion.struck_bodies import (
     find_contacts_of_struck,
+    find_margin,
     find_missed_collisions,
-    moreau_margin,
 )
 from rigid_lcp.motion.world import World
 
@@ -113,22 +113,22 @@ def step_moreau(
     than half a turn within the step.
     """
     _refuse_fast_spin(world, motion, h)
-    middle = world.drifted(motion, 0.5 * h)
+    middle = world.move_freely(motion, 0.5 * h)
     pull = None if loads is None else np.asarray(loads, dtype=float)
     accelerations = world.accelerations(middle, pull, gyroscopic=False)
     free = replace_rates(middle, middle.rates + h * accelerations)
-    margin = moreau_margin(world, motion, accelerations, h)
+    margin = find_margin(world, motion, accelerations, h)
     contacts = world.contacts(middle, margin)
     if len(contacts) == 0:
-        end = part_bodies(world, motion, world.drifted(free, 0.5 * h), pull, h)
-        return Step(end, contact_forces(contacts, np.zeros((0, motion.dim)), None, h), 0.0)
+        end = separate_bodies(world, motion, world.move_freely(free, 0.5 * h), pull, h)
+        return Step(end, make_contact_forces(contacts, np.zeros((0, motion.dim)), None, h), 0.0)
     slow = float(np.linalg.norm(world.scene.gravity)) * h
     solve = partial(judge_impulses, slow=slow, tolerance=tolerance, accept=accept)
     for turn in range(MOREAU.widenings + 1):
-        found, after, scaled, restitution = detect_step_contacts(
+        found, after, scaled, restitution = solve_step_contacts(
             world, contacts, middle, free, h, solve, known
         )
-        end = world.drifted(after, 0.5 * h)
+        end = world.move_freely(after, 0.5 * h)
         touching = world.contacts(end, 0.0)
         struck = find_missed_collisions(world, contacts, end, touching, slow)
         if turn == MOREAU.widenings or not struck.any():
@@ -137,12 +137,12 @@ def step_moreau(
         if len(wider) == len(contacts):
             break
         contacts = wider
-    end = part_bodies(world, motion, end, pull, h, touching, restitution)
-    forces = contact_forces(contacts, found.impulse, found.velocity, h)
+    end = separate_bodies(world, motion, end, pull, h, touching, restitution)
+    forces = make_contact_forces(contacts, found.impulse, found.velocity, h)
     return Step(end, forces, found.error, found.message, scaled, found.cut_off)
 
 
-def detect_step_contacts(
+def solve_step_contacts(
     world: World, contacts: Contacts, middle: Motion, free: Motion, h: float, solve: SolveFrom,
     known: ContactForces | None,
 ) -> tuple[Impulses, Motion, bool, Restitution | None]:  # fmt: skip
@@ -150,16 +150,16 @@ def detect_step_contacts(
     bodies at the midpoint with the rates they leave; whether restitution was scaled down; what it
     did, None where nothing bounced.  ``middle`` and ``free`` as `find_closing_contacts` has them.
     """
-    bodies = body_space(contacts, middle.position, world.columns, world.inverse_mass(middle))
+    bodies = make_body_space(contacts, middle.position, world.columns, world.inverse_mass(middle))
     closing = find_closing_contacts(world, contacts, middle, free, h)
-    found = find_step_impulses(bodies, closing, solve, keep_known_impulses(contacts, known, h))
-    velocities = relative_velocity(contacts, middle), relative_velocity(contacts, free)
+    found = find_step_impulses(bodies, closing, solve, carry_impulses(contacts, known, h))
+    velocities = find_relative_velocity(contacts, middle), find_relative_velocity(contacts, free)
     gained = (free.rates - middle.rates)[world.movable]
     share, full = Share(len(contacts)), closing.restitution
     while (bounce := find_bouncing(closing)).any():
         if found.error > MOREAU.retried_error:  # wedged bodies may have no impulses to bounce with
             share.leave_out()
-        elif not share.next(gains_energy(bodies, closing, *velocities, gained, found, bounce)):
+        elif not share.bisect(gains_energy(bodies, closing, *velocities, gained, found, bounce)):
             break
         closing = replace(closing, restitution=share.now * full)
         found = find_step_impulses(bodies, closing, solve, None)
@@ -194,16 +194,16 @@ def find_closing_contacts(
     ``middle``: the bodies at the midpoint with the rates of the start, ``free`` with those that
     they would have at the end without impulses.
     """
-    turning = 0.5 * h * inertial_acceleration(find_planes_at_corners(contacts), middle)
+    turning = 0.5 * h * find_inertial_acceleration(find_planes_at_corners(contacts), middle)
     if middle.dim == 3:  # spins change also while no force acts
-        coasting = replace_rates(middle, world.coasting(middle))
-        turning += 0.5 * h * relative_velocity(contacts, coasting)
+        coasting = replace_rates(middle, world.free_accelerations(middle))
+        turning += 0.5 * h * find_relative_velocity(contacts, coasting)
     return Closing(
         restitution=contacts.restitution,
         friction=contacts.friction,
         gap=contacts.gap - 0.25 * h * turning[:, 0],
-        before=relative_velocity(contacts, middle)[:, 0] - turning[:, 0],
-        offset=relative_velocity(contacts, free) + turning,
+        before=find_relative_velocity(contacts, middle)[:, 0] - turning[:, 0],
+        offset=find_relative_velocity(contacts, free) + turning,
         turning=turning[:, 0],
         slow=float(np.linalg.norm(world.scene.gravity)) * h,
         h=h,
@@ -256,15 +256,17 @@ def judge_impulses(
     bodies: BodySpace, offset: Floats, friction: Floats, start: Floats | None = None, *,
     slow: float, tolerance: float, accept: float,
 ) -> tuple[FrictionSolution, float]:  # fmt: skip
-    """Impulses and their `forces_error`, ``slow`` the velocity that gravity gives in a step."""
+    """Impulses and their `find_forces_error`, ``slow`` the velocity that gravity gives in a
+    step.
+    """
     found = solve_friction(
         bodies, offset.ravel(), friction, dim=offset.shape[1], start=start, tolerance=tolerance,
         accept=accept,
     )  # fmt: skip
-    return found, forces_error(bodies, found, slow, offset)
+    return found, find_forces_error(bodies, found, slow, offset)
 
 
-def forces_error(
+def find_forces_error(
     bodies: BodySpace, solution: FrictionSolution, free: float, offset: Floats | None = None
 ) -> float:
     """The residual of a solution over the forces that matter [-].
@@ -289,16 +291,16 @@ def forces_error(
     return share if share > SHARE_LEFT else error
 
 
-def keep_known_impulses(contacts: Contacts, known: ContactForces | None, h: float) -> Floats | None:
+def carry_impulses(contacts: Contacts, known: ContactForces | None, h: float) -> Floats | None:
     """Impulses (nc * dim,) that the contacts of the last step had, zero for new ones [N s]."""
     if known is None or len(known) == 0:
         return None
-    rows, there = contact_rows(known.key, contacts.key)
+    rows, there = match_keys(known.key, contacts.key)
     force = np.where(there[:, None], known.force[rows], 0.0)
-    return np.einsum("cij,cj->ci", contact_frames(contacts.normal), h * force).ravel()
+    return np.einsum("cij,cj->ci", build_frames(contacts.normal), h * force).ravel()
 
 
-def contact_forces(
+def make_contact_forces(
     contacts: Contacts, impulse: Floats, velocity: Floats | None, h: float
 ) -> ContactForces:
     """Contacts with the mean forces of a step of length ``h``: impulse (nc, dim) [N s] over h."""
@@ -311,7 +313,7 @@ def contact_forces(
         sliding &= slip > MOREAU.no_slip * np.abs(velocity).max(initial=0.0)
     status = np.where(normal <= 0, "open", np.where(sliding, "slide", "stick"))
     if contacts.dim == 3:
-        frames = contact_frames(contacts.normal)
+        frames = build_frames(contacts.normal)
         tangential = np.einsum("ci,cij->cj", tangential, frames[:, 1:])
     else:
         tangential = tangential[:, 0]
@@ -325,6 +327,7 @@ def _refuse_fast_spin(world: World, motion: Motion, h: float) -> None:
     if (h * spin > MOREAU.turn_of_a_step).any():
         worst = int(np.argmax(spin))
         raise NotConverged(
-            f"it turns by {h * spin[worst]:.3g} rad within a step", where=world.scene.called(worst),
+            f"it turns by {h * spin[worst]:.3g} rad within a step",
+            where=world.scene.name_body(worst),
             remedy=f"take a step shorter than {MOREAU.turn_of_a_step / spin[worst]:.3g} s",
         )  # fmt: skip

@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from numpy.typing import ArrayLike
 
 from rigid_lcp.arrays import Bools, Floats, Ints
-from rigid_lcp.contact import Contacts, detect_2d, detect_3d, shapes_2d, shapes_3d
+from rigid_lcp.contact import Contacts, detect_2d, detect_3d, pack_shapes_2d, pack_shapes_3d
 from rigid_lcp.errors import SceneError
 from rigid_lcp.friction.problem import MOST_FRICTION
 from rigid_lcp.motion.checks import (
@@ -23,10 +23,10 @@ from rigid_lcp.motion.checks import (
     require_number_in,
 )
 from rigid_lcp.motion.gyroscopic import (
-    free_rotation,
-    gyroscopic_acceleration,
-    principal_inertia,
-    world_inertia,
+    find_principal_axes,
+    find_spin_acceleration,
+    rotate_freely,
+    turn_inertia,
 )
 from rigid_lcp.motion.state import Motion, displace_motion
 from rigid_lcp.shapes import HalfSpace, require_vector
@@ -68,7 +68,7 @@ class Scene:
         self.gravity = require_vector(given, dim, "gravity", "scene", BOUNDS.state)
         self.bodies: list[Body] = []
 
-    def called(self, body: int) -> str:
+    def name_body(self, body: int) -> str:
         """Name of a body for messages; its number where it has none."""
         return self.bodies[body].name or f"body {body}"
 
@@ -109,20 +109,22 @@ class Scene:
                 restitution, 0.0, 1.0, "restitution", where, "give 0 to 1"
             )
 
-        def state(values: ArrayLike | None, default: Floats | list[float], what: str) -> Floats:
+        def check_state(
+            values: ArrayLike | None, default: Floats | list[float], what: str
+        ) -> Floats:
             given = default if values is None else values
             return require_vector(given, len(default), what, where, BOUNDS.state)
 
         origin = getattr(shape, "centroid", np.zeros(self.dim))
         turn, upright = (3, [1.0, 0.0, 0.0, 0.0]) if self.dim == 3 else (1, [0.0])
-        angle = state(angle, upright, "angle")
+        angle = check_state(angle, upright, "angle")
         length = float(np.linalg.norm(angle)) if self.dim == 3 else 1.0
         if length == 0:
             raise SceneError("the quaternion is zero", where=where, remedy="give (1, 0, 0, 0)")
         self.bodies.append(Body(
-            shape, mass, inertia, state(position, origin, "position"), angle / length,
-            state(velocity, np.zeros(self.dim), "velocity"), state(spin, np.zeros(turn), "spin"),
-            friction, restitution, name,
+            shape, mass, inertia, check_state(position, origin, "position"), angle / length,
+            check_state(velocity, np.zeros(self.dim), "velocity"),
+            check_state(spin, np.zeros(turn), "spin"), friction, restitution, name,
         ))  # fmt: skip
         return len(self.bodies) - 1
 
@@ -185,34 +187,34 @@ class World:
             return sp.diags_array(1.0 / diagonal.ravel(), format="csr")
         blocks = np.zeros((moving.sum(), 6, 6))
         blocks[:, range(3), range(3)] = 1.0 / self.mass[moving][:, None]
-        blocks[:, 3:, 3:] = np.linalg.inv(world_inertia(self.inertia, motion.angle)[moving])
+        blocks[:, 3:, 3:] = np.linalg.inv(turn_inertia(self.inertia, motion.angle)[moving])
         return sp.csr_array(sp.block_diag(blocks, format="csr"))
 
     @cached_property
     def principal(self) -> tuple[Floats, Floats]:
         """Principal moments and axes of inertia of all bodies; 3D only."""
-        return principal_inertia(self.inertia)
+        return find_principal_axes(self.inertia)
 
-    def drifted(self, motion: Motion, seconds: float) -> Motion:
+    def move_freely(self, motion: Motion, seconds: float) -> Motion:
         """The state after ``seconds`` [s] without any force; in 3D spins change as bodies turn."""
         if self.scene.dim == 2:
             return displace_motion(motion, seconds * motion.rates)
-        angle, spin = free_rotation(self.principal, motion.angle, motion.spin, seconds)
+        angle, spin = rotate_freely(self.principal, motion.angle, motion.spin, seconds)
         return Motion(motion.position + seconds * motion.velocity, angle, motion.velocity, spin)
 
-    def coasting(self, motion: Motion) -> Floats:
+    def free_accelerations(self, motion: Motion) -> Floats:
         """Generalised accelerations (n, size) while no force acts: in 3D spins change all the
         same [rad/s^2]."""
         result = np.zeros((len(self.mass), self.size))
         if self.scene.dim == 3:
-            result[:, 3:] = gyroscopic_acceleration(self.inertia, motion.angle, motion.spin)
+            result[:, 3:] = find_spin_acceleration(self.inertia, motion.angle, motion.spin)
         return result
 
     def accelerations(
         self, motion: Motion, loads: ArrayLike | None, gyroscopic: bool = True
     ) -> Floats:
         """Generalised accelerations of gravity and loads, (n, size), in 3D with those of the
-        gyroscopic torque, unless `drifted` accounts for it (``gyroscopic`` False)."""
+        gyroscopic torque, unless `move_freely` accounts for it (``gyroscopic`` False)."""
         dim = self.scene.dim
         result = np.zeros((len(self.mass), self.size))
         moving = self.movable
@@ -224,7 +226,7 @@ class World:
             if loads is not None:
                 result[moving, 2] += force[moving, 2] / self.inertia[moving]
             return result
-        inertia, spin = world_inertia(self.inertia, motion.angle)[moving], motion.spin[moving]
+        inertia, spin = turn_inertia(self.inertia, motion.angle)[moving], motion.spin[moving]
         torque = np.zeros_like(spin)
         if gyroscopic:
             torque -= np.cross(spin, np.einsum("nij,nj->ni", inertia, spin))
@@ -259,7 +261,7 @@ class World:
         if self.scene.dim == 2:
             angular = 0.5 * float((self.inertia[moving] * motion.spin[moving] ** 2).sum())
         else:
-            inertia, spin = world_inertia(self.inertia, motion.angle)[moving], motion.spin[moving]
+            inertia, spin = turn_inertia(self.inertia, motion.angle)[moving], motion.spin[moving]
             angular = 0.5 * float(np.einsum("ni,nij,nj->", spin, inertia, spin))
         return linear + angular - height
 
@@ -279,10 +281,10 @@ def make_world(scene: Scene) -> tuple[World, Motion]:
     reach = np.array([shape.reach if isfinite(shape.reach) else 0.0 for shape in shapes])
     mass = np.array([body.mass for body in bodies])
     if scene.dim == 2:
-        detect = partial(detect_2d, shapes_2d(shapes, movable, scene.called))
+        detect = partial(detect_2d, pack_shapes_2d(shapes, movable, scene.name_body))
         inertia = np.array([body.inertia for body in bodies])
     else:
-        detect = partial(detect_3d, shapes_3d(shapes, movable, scene.called))
+        detect = partial(detect_3d, pack_shapes_3d(shapes, movable, scene.name_body))
         inertia = np.array([body.inertia if body.movable else np.eye(3) for body in bodies])
     angle = np.array([body.angle for body in bodies])
     spin = np.array([body.spin for body in bodies])

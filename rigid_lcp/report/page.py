@@ -9,8 +9,16 @@ from typing import Any
 
 from rigid_lcp.motion import Scene
 from rigid_lcp.report import pictures
-from rigid_lcp.scene import RunFolder, history_of, read_frame, rebuild_frame_scene, write_history
-from trackbed.report import bullets, encode_figure, page, paragraph, picture, section, table
+from rigid_lcp.scene import RunFolder, read_frame, read_history, rebuild_frame_scene, write_history
+from trackbed.report import (
+    encode_figure,
+    make_list,
+    make_page,
+    make_paragraph,
+    make_picture,
+    make_section,
+    make_table,
+)
 from trackbed.run_files import write_whole
 
 ROWS = (
@@ -39,7 +47,7 @@ def write_report(
     *, draw: bool,
 ) -> Path:  # fmt: skip
     """Write the report of a finished run, with pictures of its frames if ``draw``; its path."""
-    history = history_of(folder)
+    history = read_history(folder)
     write_history(folder.path / "history.csv", history)
     figures = []
     if draw:
@@ -51,7 +59,7 @@ def write_report(
             (end,
              "Force chains at the end: lines from the bodies' centres to their contacts, as wide "
              "as the normal force; blue contacts stick, red ones slide."),
-            (write_picture(folder, "history", pictures.picture_history(history)),
+            (write_picture(folder, "history", pictures.draw_history(history)),
              "Energy (kinetic and potential), contacts that carry, and the greatest overlap, at "
              "the frames."),
         ]  # fmt: skip
@@ -72,14 +80,14 @@ def write_report(
     rows = [(name, form.format(summary[key])) for name, key, form in ROWS if key in summary]
     parts = [
         f"<h1>{escape(title)}</h1>",
-        paragraph(escape(claim), "claim"),
-        *(picture(path, caption, escape(caption)) for path, caption in figures),
-        section("Figures", table("", (), rows)),
-        section("Left out", bullets(escape(text) for text in summary["left_out"])),
-        section("Again", f"<pre>{escape(json.dumps(manifest['provenance'], indent=1))}</pre>"),
+        make_paragraph(escape(claim), "claim"),
+        *(make_picture(path, caption, escape(caption)) for path, caption in figures),
+        make_section("Figures", make_table("", (), rows)),
+        make_section("Left out", make_list(escape(text) for text in summary["left_out"])),
+        make_section("Again", f"<pre>{escape(json.dumps(manifest['provenance'], indent=1))}</pre>"),
     ]
     path = folder.path / "report.html"
-    write_whole(path, page(title, parts))
+    write_whole(path, make_page(title, parts))
     return path
 
 
@@ -98,8 +106,8 @@ def draw_frames(
     """Draw frames as ``picture-NAME.png`` with one window, in which the bodies of ``scene`` are,
     and one scale; their paths.  Raises `UsageError` when one can not be written."""
     places = [frame["motion"].position[: len(scene.bodies)] for frame in frames.values()]
-    window = pictures.window_of(scene, places)
-    scale = pictures.force_scale([frame["contacts"].normal_force for frame in frames.values()])
+    window = pictures.find_window(scene, places)
+    scale = pictures.choose_scale([frame["contacts"].normal_force for frame in frames.values()])
     drawn = []
     for name, frame in frames.items():
         bodies, head = rebuild_frame_scene(frame, scene), f"{title}   t = {frame['time']:.3f} s"

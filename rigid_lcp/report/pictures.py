@@ -11,7 +11,7 @@ import numpy as np
 from rigid_lcp.arrays import Floats
 from rigid_lcp.contact import ContactForces
 from rigid_lcp.motion import Motion, Scene
-from rigid_lcp.shapes import HalfSpace, rotation_matrix
+from rigid_lcp.shapes import HalfSpace, make_rotation
 
 STONE, EDGE, FIXED = "#e9e4da", "#8a8174", "#c9ced6"
 STICK, SLIDE = "#0b5fa5", "#d1495b"
@@ -19,7 +19,7 @@ FORCE_LINE_WIDTH = 7.0
 """Line width of the largest normal force [points]."""
 
 
-def window_of(scene: Scene, positions: list[Floats]) -> tuple[Floats, Floats]:
+def find_window(scene: Scene, positions: list[Floats]) -> tuple[Floats, Floats]:
     """Corners of the box that holds all bodies in all of these states [m], (dim,) each."""
     reach = np.array([min(body.shape.reach, 1e30) for body in scene.bodies])
     shown = np.array([not isinstance(body.shape, HalfSpace) for body in scene.bodies])
@@ -92,7 +92,7 @@ def draw_bodies(axes: Any, scene: Scene, motion: Motion, plane: tuple[int, int])
         elif not hasattr(shape, "vertices"):
             axes.add_patch(Circle(tuple(position[list(plane)]), shape.reach, **look))
         else:
-            placed = position + shape.vertices @ rotation_matrix(np.atleast_1d(motion.angle[n])).T
+            placed = position + shape.vertices @ make_rotation(np.atleast_1d(motion.angle[n])).T
             seen = placed[:, plane]
             axes.add_patch(Patch(seen[ConvexHull(seen).vertices], closed=True, **look))
 
@@ -121,7 +121,7 @@ def draw_state(
     return figure
 
 
-def force_scale(forces: list[Floats]) -> float:
+def choose_scale(forces: list[Floats]) -> float:
     """Normal force of the widest line [N] for all these states: in three of four none is larger.
 
     An impact carries a hundred times what a pile at rest does, and would leave it without lines.
@@ -130,7 +130,7 @@ def force_scale(forces: list[Floats]) -> float:
     return float(np.quantile(largest, 0.75)) if largest else 1.0
 
 
-def picture_history(history: dict[str, Floats]) -> Any:
+def draw_history(history: dict[str, Floats]) -> Any:
     """A figure of energy, greatest overlap and number of contacts against time."""
     from matplotlib.figure import Figure
 

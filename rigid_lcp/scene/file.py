@@ -20,9 +20,9 @@ from rigid_lcp.shapes import (
     Polygon,
     Polyhedron,
     Sphere,
-    box,
     get_shape,
-    rotation_matrix,
+    make_box,
+    make_rotation,
 )
 from trackbed.scene_files import Guide, read_scene
 
@@ -41,7 +41,7 @@ class SceneFile:
     overrides: tuple[str, ...] = ()
 
 
-def scene_read(path: Path | str, overrides: Sequence[str] = ()) -> SceneFile:
+def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> SceneFile:
     """Read and check a scene file.
 
     ``overrides`` such as ``run.duration=0.1`` or ``body.0.density=2000`` replace or add keys;
@@ -56,7 +56,7 @@ def scene_read(path: Path | str, overrides: Sequence[str] = ()) -> SceneFile:
     return SceneFile(text.path, text.text, tables, tuple(overrides))
 
 
-def scene_build(file: SceneFile) -> Scene:
+def build_scene(file: SceneFile) -> Scene:
     """Bodies of the file: ground first, then named bodies, then grains.
 
     Raises `ShapeError` and `SceneError` with the name of the body.
@@ -64,23 +64,25 @@ def scene_build(file: SceneFile) -> Scene:
     tables = file.tables
     scene = Scene(tables.dimensions, tables.gravity)
 
-    def own(table: Any) -> dict[str, Any]:
+    def merge(table: Any) -> dict[str, Any]:
         given = table.model_dump(include={"friction", "restitution"}, exclude_none=True)
         return tables.surface.model_dump() | given
 
     for i, ground in enumerate(tables.ground):
         with name_shape(f"ground {i}"):
             plane = HalfSpace(ground.normal, ground.offset)
-        scene.add(plane, name=f"ground {i}", **own(ground))
+        scene.add(plane, name=f"ground {i}", **merge(ground))
     for body in tables.body:
         keys = {"density", "position", "angle", "velocity", "spin", "fixed", "name"}
-        shape, given = shape_of(body, tables.dimensions), body.model_dump(include=keys)
-        number = scene.add(shape, **given, **own(body))
+        shape, given = make_shape(body, tables.dimensions), body.model_dump(include=keys)
+        number = scene.add(shape, **given, **merge(body))
         if body.inertia is not None:
             scene.bodies[number] = replace(scene.bodies[number], inertia=body.inertia)
     for grains in tables.grains:
         for shape, position, angle in place_grains(grains, tables.dimensions):
-            scene.add(shape, density=grains.density, position=position, angle=angle, **own(grains))
+            scene.add(
+                shape, density=grains.density, position=position, angle=angle, **merge(grains)
+            )
     return scene
 
 
@@ -104,7 +106,7 @@ def place_grains(grains: Grains, dim: int) -> Iterator[tuple[Any, Floats, Any]]:
         if dim == 2:
             angle = random.uniform(0, 2 * np.pi)
             # what was drawn lies in its cell, not the centroid
-            yield stone, position + rotation_matrix(np.array([angle])) @ stone.centroid, angle
+            yield stone, position + make_rotation(np.array([angle])) @ stone.centroid, angle
         else:
             yield stone, position, random.normal(size=4)
 
@@ -118,17 +120,17 @@ def name_shape(where: str) -> Iterator[None]:
         raise ShapeError(error.what, where=where, remedy=error.remedy) from error
 
 
-def shape_of(body: BodyTable, dim: int) -> Any:
+def make_shape(body: BodyTable, dim: int) -> Any:
     """The shape that a body's table names.  Raises `ShapeError` with the body's name."""
     with name_shape(f"body {body.name}"):
         if body.radius is not None:
             return Disc(body.radius) if dim == 2 else Sphere(body.radius)
         if body.box is not None:
-            return Polygon.rectangle(*body.box) if dim == 2 else box(*body.box)
+            return Polygon.rectangle(*body.box) if dim == 2 else make_box(*body.box)
         return (Polygon if dim == 2 else Polyhedron)(np.array(body.vertices))
 
 
-def loads_of(file: SceneFile) -> Loads | None:
+def make_loads(file: SceneFile) -> Loads | None:
     """Forces of the scene's loads at a time, or None if it has none."""
     tables = file.tables
     if not tables.load:
@@ -138,16 +140,16 @@ def loads_of(file: SceneFile) -> Loads | None:
     rows = [first + names.index(load.body) for load in tables.load]
     columns = 3 if tables.dimensions == 2 else 6
 
-    def loads(time: float, motion: Motion) -> Floats:
+    def sum_loads(time: float, motion: Motion) -> Floats:
         forces = np.zeros((len(motion.position), columns))
         for row, load in zip(rows, tables.load, strict=True):
-            forces[row, : tables.dimensions] += force_at(load, time)
+            forces[row, : tables.dimensions] += find_force(load, time)
         return forces
 
-    return loads
+    return sum_loads
 
 
-def force_at(load: Load, time: float) -> Floats:
+def find_force(load: Load, time: float) -> Floats:
     """Force of a load [N] at a time [s]: cyclic ones start at their least force, or its phase."""
     most = np.array(load.force)
     if time < load.begin or (load.end is not None and time > load.end):

@@ -13,7 +13,7 @@ import numpy as np
 from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import UsageError
 from rigid_lcp.motion import Scene
-from rigid_lcp.scene.file import SceneFile, loads_of, scene_build
+from rigid_lcp.scene.file import SceneFile, build_scene, make_loads
 from rigid_lcp.scene.run_folder import FRAME, RunFolder, read_frame, restore_frame
 from rigid_lcp.scene.simulation import SIMULATION, Simulation
 from rigid_lcp.wear import Breakage, Wear
@@ -25,23 +25,23 @@ Progress = Callable[[float, float, Simulation], None]
 HISTORY = ("time", "energy", "contacts", "sliding", "overlap", "residual", "cpu")
 
 
-def simulation_of(file: SceneFile) -> tuple[Scene, Simulation]:
+def make_simulation(file: SceneFile) -> tuple[Scene, Simulation]:
     """The scene and its simulation at time zero.
 
     Raises `SceneError`, `ShapeError`, or `Overlapping` for bodies that overlap.
     """
-    tables, scene = file.tables, scene_build(file)
+    tables, scene = file.tables, build_scene(file)
     wear = None if tables.wear is None else Wear(**tables.wear.model_dump())
     run, strength, breakage = tables.run, tables.strength, None
     if strength is not None:
         breakage = Breakage(strength.tension, **strength.model_dump(exclude={"tension"}))
     return scene, Simulation(
-        scene, run.method, step=run.step, tolerance=run.tolerance, loads=loads_of(file), wear=wear,
-        breakage=breakage,
+        scene, run.method, step=run.step, tolerance=run.tolerance, loads=make_loads(file),
+        wear=wear, breakage=breakage,
     )  # fmt: skip
 
 
-def scene_run(
+def run_scene(
     file: SceneFile, run: Simulation, folder: RunFolder, *, resume: bool, progress: Progress
 ) -> None:
     """Compute frame after frame, from the last sound one on if ``resume``.
@@ -53,15 +53,15 @@ def scene_run(
     there = folder.frames() if resume else []
     spent = restore_frame(there[-1], run) if there else 0.0
     if not there:
-        folder.frame_write(0, run, 0.0)
+        folder.write_frame(0, run, 0.0)
     began = time.process_time()
     for number in range(max(len(there), 1), len(times)):
         run.advance(float(times[number] - times[number - 1]))
-        folder.frame_write(number, run, spent + time.process_time() - began)
+        folder.write_frame(number, run, spent + time.process_time() - began)
         progress(run.time, duration, run)
 
 
-def history_of(folder: RunFolder) -> dict[str, Floats]:
+def read_history(folder: RunFolder) -> dict[str, Floats]:
     """Time [s], energy [J], contacts that carry, those that slide, greatest overlap [m], worst
     residual [-] so far, processor time so far [s]: one number a frame."""
     rows = []
@@ -92,25 +92,25 @@ def plan_steps(file: SceneFile) -> tuple[int, float]:
     return count * table.frames, span / count
 
 
-def unknowns_a_contact(file: SceneFile) -> int:
+def count_unknowns(file: SceneFile) -> int:
     """Forces that are solved for at a contact: the normal one alone where no surface has friction,
     else one for each dimension."""
-    return file.tables.dimensions if _any_has(file, "friction") else 1
+    return file.tables.dimensions if _has_any(file, "friction") else 1
 
 
-def _any_has(file: SceneFile, property_: str) -> bool:
+def _has_any(file: SceneFile, property_: str) -> bool:
     tables = file.tables
     bodies: list[Any] = [tables.surface, *tables.ground, *tables.body, *tables.grains]
     return any(getattr(body, property_) for body in bodies)
 
 
-def left_out(file: SceneFile) -> list[str]:
+def list_left_out(file: SceneFile) -> list[str]:
     """Physics that the scene does not name, and that is therefore not computed."""
     tables = file.tables
     absent = []
-    if not _any_has(file, "friction"):
+    if not _has_any(file, "friction"):
         absent.append("friction: no surface has any; one unknown a contact, no tangential forces")
-    if not _any_has(file, "restitution"):
+    if not _has_any(file, "restitution"):
         absent.append("restitution: every impact is inelastic")
     if not tables.load:
         absent.append("loads: none but gravity")
@@ -123,12 +123,14 @@ def left_out(file: SceneFile) -> list[str]:
     return absent
 
 
-def summary_of(file: SceneFile, scene: Scene, run: Simulation, folder: RunFolder) -> dict[str, Any]:
+def summarise_run(
+    file: SceneFile, scene: Scene, run: Simulation, folder: RunFolder
+) -> dict[str, Any]:
     """What a run came to, for people and for ``--json``.
 
     Raises `UsageError` if a frame is gone or damaged since it was written.
     """
-    history = history_of(folder)
+    history = read_history(folder)
     contacts = run.contacts
     frames = file.tables.run.frames
     if len(history["time"]) <= frames:
@@ -144,7 +146,7 @@ def summary_of(file: SceneFile, scene: Scene, run: Simulation, folder: RunFolder
         "time": run.time,
         "steps": run.steps,
         "step": run.time / max(run.steps, 1),
-        "unknowns_a_contact": unknowns_a_contact(file),
+        "unknowns_a_contact": count_unknowns(file),
         "contacts": int((contacts.status != "open").sum()),
         "sliding": int((contacts.status == "slide").sum()),
         "largest_normal_force": float(contacts.normal_force.max(initial=0.0)),
@@ -162,7 +164,7 @@ def summary_of(file: SceneFile, scene: Scene, run: Simulation, folder: RunFolder
         "cpu_s": float(history["cpu"][-1]),
         "cpu_a_step": float(history["cpu"][-1]) / max(run.steps, 1),
     }
-    if _any_has(file, "restitution"):
+    if _has_any(file, "restitution"):
         summary |= {"steps_scaled": run.steps_scaled, "steps_cut_off": run.steps_cut_off}
     if run.worn is not None:
         summary |= {
@@ -172,5 +174,5 @@ def summary_of(file: SceneFile, scene: Scene, run: Simulation, folder: RunFolder
     if run.breakage is not None:
         summary["broken"] = len(run.broken)
     return summary | {
-        "frames": frames, "last_frame": FRAME.format(frames), "left_out": left_out(file),
+        "frames": frames, "last_frame": FRAME.format(frames), "left_out": list_left_out(file),
     }  # fmt: skip

@@ -96,7 +96,7 @@ def rebuild_frame_scene(frame: dict[str, Any], scene: Scene) -> Scene:
             mass = float(frame["body_mass"][number])
             body = replace(body, mass=mass, inertia=inertia)
             if len(corners) and not np.array_equal(corners, body.shape.vertices):
-                body = replace(body, shape=type(body.shape).of_corners(corners))
+                body = replace(body, shape=type(body.shape).from_corners(corners))
         made.bodies.append(body)
     return made
 
@@ -116,7 +116,7 @@ class RunFolder(run_folder.RunFolder):
     )  # fmt: skip
     states = "frame_*.npz"
 
-    def frame_write(self, number: int, run: Simulation, cpu: float) -> None:
+    def write_frame(self, number: int, run: Simulation, cpu: float) -> None:
         """Keep the state of a run as frame ``number``; ``cpu``: processor time so far [s].
 
         Raises as `write_whole`, and `UsageError` if the folder is not the one we locked.

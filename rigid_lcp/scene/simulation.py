@@ -32,30 +32,30 @@ from rigid_lcp.motion import (
     Scene,
     advance_runge_kutta,
     check_loads,
-    contact_forces,
+    explain_overflow,
+    explain_step_limit,
     is_finite,
+    make_contact_forces,
     make_world,
     require_line,
     require_number_in,
     require_seconds,
     require_whole_in,
     step_moreau,
-    too_many_steps,
-    too_much,
 )
-from rigid_lcp.unique import unique_forces
+from rigid_lcp.unique import find_unique_forces
 from rigid_lcp.wear import (
     Breakage,
     Broken,
     Wear,
     break_scene,
-    breaks,
+    find_breaks,
     refuse_dust,
     replace_worn,
     split_body,
+    split_wear,
     start_wear,
     step_wear,
-    wear_on_after_break,
 )
 
 
@@ -120,13 +120,13 @@ class Simulation:
         self.steps_cut_off = 0
         """Steps (at acceleration level collisions) whose collisions ran out of rounds: the rest was
         closed without restitution, which costs energy also at restitution 1."""
-        self.contacts: ContactForces = contact_forces(
+        self.contacts: ContactForces = make_contact_forces(
             self.world.contacts(self.motion, 0.0)[np.zeros(0, np.int64)],
             np.zeros((0, scene.dim)), None, 1.0,
         )  # fmt: skip
         """Contacts of the last step and the forces in it."""
         if not is_finite(self.world, self.motion):
-            raise too_much(self.world, self.motion, None, 0.0, 0.0)
+            raise explain_overflow(self.world, self.motion, None, 0.0, 0.0)
         self._refuse_overlap()
 
     def advance(self, seconds: float) -> None:
@@ -142,7 +142,7 @@ class Simulation:
         seconds = require_seconds(seconds, "the time to go on")
         if seconds / self.step > BOUNDS.steps:
             raise UsageError(
-                too_many_steps("the time to go on", seconds / self.step),
+                explain_step_limit("the time to go on", seconds / self.step),
                 remedy="go on for less, or give a longer step",
             )
         if seconds <= SIMULATION.time_round_off * self.step:
@@ -153,7 +153,7 @@ class Simulation:
                 return
             count = max(ceil(seconds / self.step - SIMULATION.time_round_off), 1)
             for _ in range(count):
-                self._time_step(seconds / count)
+                self._take_step(seconds / count)
 
     def fragment(self, body: int, line: tuple[ArrayLike, ArrayLike]) -> int:
         """Break a polygon (polyhedron) that moves in two; returns the number of the second part.
@@ -174,7 +174,7 @@ class Simulation:
     def _go_on_broken(self, scene: Scene, body: int, tension: float, strength: float) -> int:
         self.world, self.motion = make_world(scene)
         if self.worn is not None:
-            self.worn = wear_on_after_break(self.worn, scene, body)
+            self.worn = split_wear(self.worn, scene, body)
         whole = (self.contacts.body_a == body) | (self.contacts.body_b == body)
         self.contacts = self.contacts[~whole]
         part = len(scene.bodies) - 1
@@ -187,7 +187,7 @@ class Simulation:
         For grains at rest or in slow motion.  Raises `NotConverged` where they are not found.
         """
         loads = None if self.loads is None else self.loads(self.time, self.motion)
-        return unique_forces(self.world, self.motion, loads)
+        return find_unique_forces(self.world, self.motion, loads)
 
     @property
     def positions(self) -> Floats:
@@ -220,19 +220,19 @@ class Simulation:
         gap = self.world.contacts(self.motion, 0.0).gap
         return float(max(0.0, -gap.min(initial=0.0)))
 
-    def _time_step(self, h: float) -> None:
+    def _take_step(self, h: float) -> None:
         loads = None
         if self.loads is not None:
-            middle = self.world.drifted(self.motion, h / 2)
+            middle = self.world.move_freely(self.motion, h / 2)
             loads = self.loads(self.time + h / 2, middle)
         try:
             made = step_moreau(
                 self.world, self.motion, loads, h, self.contacts, self.tolerance, SIMULATION.accept
             )
         except ProblemError as error:
-            raise too_much(self.world, self.motion, loads, h, self.time, error) from error
+            raise explain_overflow(self.world, self.motion, loads, h, self.time, error) from error
         if not is_finite(self.world, made.motion):
-            raise too_much(self.world, self.motion, loads, h, self.time)
+            raise explain_overflow(self.world, self.motion, loads, h, self.time)
         self._judge(made.residual, made.message)
         self.steps_scaled += made.scaled
         self.steps_cut_off += made.cut_off
@@ -250,13 +250,13 @@ class Simulation:
                 try:
                     cut = replace_worn(self.world.scene, self.motion, self.worn)
                 except ShapeError as error:
-                    raise error.at(f"{error.where} at {self.time:.6g} s") from error
+                    raise error.relocate(f"{error.where} at {self.time:.6g} s") from error
             if cut is not None:
                 scene, self.worn = cut
                 self.world, self.motion = make_world(scene)
         if self.breakage is not None and self.steps % self.breakage.every == 0:
             forces = self.unique_forces() if self.breakage.unique else self.contacts
-            found = breaks(self.world.scene, self.motion, forces, self.breakage)
+            found = find_breaks(self.world.scene, self.motion, forces, self.breakage)
             for body, line in found:
                 scene_now = break_scene(self.world.scene, self.motion, body, line)
                 if scene_now is not None:
@@ -291,7 +291,7 @@ class Simulation:
         if len(found) and found.gap.min() < -SIMULATION.overlap_at_start * self.world.length:
             worst = int(np.argmin(found.gap))
             pair = int(found.body_a[worst]), int(found.body_b[worst])
-            names = (self.world.scene.called(k) for k in pair)
+            names = (self.world.scene.name_body(k) for k in pair)
             raise Overlapping(
                 f"they overlap by {-found.gap[worst]:.3g} m",
                 where=f"{' and '.join(names)} at the start",

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from rigid_lcp.motion import BOUNDS, too_many_steps
+from rigid_lcp.motion import BOUNDS, explain_step_limit
 from trackbed.choices import find_choices
 from trackbed.scene_files import Name, NonNegative, Positive, Problem, Real, Table, suggest_word
 
@@ -49,11 +49,11 @@ class Run(Table):
     """States that are kept, at equal times."""
 
     @model_validator(mode="after")
-    def _comes_to_an_end(self) -> Run:
+    def _check_steps(self) -> Run:
         steps = self.duration / self.step
         if not LEAST_OF_A_STEP * self.frames <= steps <= BOUNDS.steps:
             raise ValueError(
-                f"{too_many_steps('duration', steps)}, and the time between two frames must be"
+                f"{explain_step_limit('duration', steps)}, and the time between two frames must be"
                 f" at least {LEAST_OF_A_STEP:g} of one"
             )
         return self
@@ -93,7 +93,7 @@ class BodyTable(Table):
     restitution: Restitution | None = None
 
     @model_validator(mode="after")
-    def _one_shape(self) -> BodyTable:
+    def _check_body(self) -> BodyTable:
         given = [k for k in ("box", "radius", "vertices") if getattr(self, k) is not None]
         if len(given) != 1:
             raise ValueError(f"give one of box, radius and vertices, not {len(given)} of them")
@@ -121,7 +121,7 @@ class Grains(Table):
     restitution: Restitution | None = None
 
     @model_validator(mode="after")
-    def _in_order(self) -> Grains:
+    def _check_order(self) -> Grains:
         if self.size[0] > self.size[1]:
             raise ValueError("size is [smallest, largest]")
         if not 3 <= self.corners[0] <= self.corners[1]:
@@ -149,7 +149,7 @@ class Load(Table):
     end: Positive | None = None
 
     @model_validator(mode="after")
-    def _is_a_whole(self) -> Load:
+    def _check_load(self) -> Load:
         if self.end is not None and self.end <= self.begin:
             raise ValueError(f"end ({self.end:g} s) is not after begin ({self.begin:g} s)")
         if self.frequency is None and (self.least is not None or self.phase != 0.0):

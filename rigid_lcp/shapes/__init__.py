@@ -10,28 +10,28 @@ from numpy.random import Generator
 
 from rigid_lcp.shapes.disc import Disc
 from rigid_lcp.shapes.half_space import HalfSpace
-from rigid_lcp.shapes.numbers import real_numbers, require_vector
+from rigid_lcp.shapes.numbers import require_real, require_vector
 from rigid_lcp.shapes.polygon import Polygon
-from rigid_lcp.shapes.polyhedron import Polyhedron, box
+from rigid_lcp.shapes.polyhedron import Polyhedron, make_box
 from rigid_lcp.shapes.rotations import (
-    quaternion_of_matrix,
-    quaternion_of_rotation,
-    quaternion_product,
-    quaternion_rate,
+    extract_quaternion,
+    find_quaternion_rate,
+    make_quaternion,
+    make_rotation,
+    multiply_quaternions,
+    normalise_quaternion,
     rotate,
     rotate_back,
-    rotation_matrix,
     turn_quaternion,
-    unit_quaternion,
 )
 from rigid_lcp.shapes.sphere import Sphere
 from trackbed.choices import find_choice
 
 __all__ = [
-    "Disc", "HalfSpace", "Polygon", "Polyhedron", "Sphere", "box", "get_shape",
-    "quaternion_of_matrix", "quaternion_of_rotation", "quaternion_product", "quaternion_rate",
-    "real_numbers", "require_vector", "rotate", "rotate_back", "rotation_matrix",
-    "turn_quaternion", "unit_quaternion",
+    "Disc", "HalfSpace", "Polygon", "Polyhedron", "Sphere", "extract_quaternion",
+    "find_quaternion_rate", "get_shape", "make_box", "make_quaternion", "make_rotation",
+    "multiply_quaternions", "normalise_quaternion", "require_real", "require_vector", "rotate",
+    "rotate_back", "turn_quaternion",
 ]  # fmt: skip
 
 

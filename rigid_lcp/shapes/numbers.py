@@ -14,7 +14,7 @@ LEAST, MOST = 1e-50, 1e50
 """Lengths that a shape may have [m]: their fourth powers are numbers still."""
 
 
-def real_numbers(values: ArrayLike) -> Floats:
+def require_real(values: ArrayLike) -> Floats:
     """A copy of ``values`` as floats; `TypeError` or `ValueError` says what else they are.
 
     numpy drops the imaginary part of complex numbers, and takes masked ones for what they hide.
@@ -29,7 +29,7 @@ def real_numbers(values: ArrayLike) -> Floats:
 def require_finite_shape(values: ArrayLike, what: str, where: str) -> Floats:
     """A copy of finite numbers; a `ShapeError` for anything else."""
     try:
-        array = real_numbers(values)
+        array = require_real(values)
     except (TypeError, ValueError) as error:
         raise ShapeError(
             f"the {what} holds what are not numbers ({error})", where=where, remedy="give metres"
@@ -65,7 +65,7 @@ def require_vector(
 ) -> Floats:
     """A copy of ``size`` finite numbers, ``most`` at most; `SceneError` for anything else."""
     try:
-        vector = np.atleast_1d(real_numbers(values))
+        vector = np.atleast_1d(require_real(values))
     except (TypeError, ValueError):
         vector = np.zeros(0)
     if vector.shape != (size,) or not (np.abs(vector) <= most).all():

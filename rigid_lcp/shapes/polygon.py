@@ -41,7 +41,7 @@ class Polygon:
     def __init__(self, vertices: ArrayLike) -> None:
         outline = check_outline(vertices)
         start = outline.mean(axis=0)
-        area, first, _ = _moments(outline - start)
+        area, first, _ = _find_moments(outline - start)
         centroid = start + first / area
         object.__setattr__(self, "vertices", outline - centroid)
         object.__setattr__(self, "centroid", centroid)
@@ -71,7 +71,7 @@ class Polygon:
         return cls(radius * np.column_stack([np.cos(angle), np.sin(angle)]))
 
     @classmethod
-    def of_corners(cls, vertices: ArrayLike) -> Self:
+    def from_corners(cls, vertices: ArrayLike) -> Self:
         """The polygon with the ``vertices`` (n, 2) [m] of another in its body frame.
 
         They are taken as they are, the round-off of their centroid and all: so a shape is made
@@ -84,7 +84,7 @@ class Polygon:
     @cached_property
     def area(self) -> float:
         """Area [m^2]."""
-        return _moments(self.vertices)[0]
+        return _find_moments(self.vertices)[0]
 
     @cached_property
     def faces(self) -> Ints:
@@ -111,7 +111,7 @@ class Polygon:
 
     def mass_properties(self, density: float) -> tuple[float, float]:
         """Mass [kg] and moment of inertia about the centroid [kg m^2] at ``density`` [kg/m^2]."""
-        area, _, second = _moments(self.vertices)
+        area, _, second = _find_moments(self.vertices)
         return density * area, density * second
 
 
@@ -156,7 +156,7 @@ def check_outline(vertices: ArrayLike) -> Floats:
     return outline
 
 
-def _moments(outline: Floats) -> tuple[float, Floats, float]:
+def _find_moments(outline: Floats) -> tuple[float, Floats, float]:
     """Area [m^2], first moment (2,) [m^3] and polar second moment [m^4] about the origin.
 
     Green's theorem over the sides (exact).

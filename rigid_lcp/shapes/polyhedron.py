@@ -54,23 +54,23 @@ class Polyhedron:
     dim = 3
 
     def __init__(self, points: ArrayLike) -> None:
-        triangles, corners = _hull(points)
+        triangles, corners = _find_hull(points)
         found = integrate_solid(corners, triangles)
-        self._settle(corners - found[1], triangles, found)
+        self._set_fields(corners - found[1], triangles, found)
 
     @classmethod
-    def of_corners(cls, vertices: ArrayLike) -> Self:
+    def from_corners(cls, vertices: ArrayLike) -> Self:
         """The polyhedron with the ``vertices`` (v, 3) [m] of another in its body frame.
 
         They are taken as they are, the round-off of their centre of mass and all: so a shape made
         here is made again from its corners to the last bit.
         """
         made = cls.__new__(cls)
-        triangles, corners = _hull(vertices)
-        made._settle(corners, triangles, integrate_solid(corners, triangles))
+        triangles, corners = _find_hull(vertices)
+        made._set_fields(corners, triangles, integrate_solid(corners, triangles))
         return made
 
-    def _settle(
+    def _set_fields(
         self, vertices: Floats, triangles: Ints, found: tuple[float, Floats, Floats]
     ) -> None:
         self.volume, self.centroid, self.inertia = found
@@ -78,11 +78,11 @@ class Polyhedron:
         tensor over density about the centre of mass, in the body frame [m^5]."""
         self.vertices = vertices
         """Corners in the body frame [m], (v, 3)."""
-        self.faces, self.normals, self.distances = _faces(self.vertices, triangles)
+        self.faces, self.normals, self.distances = _find_faces(self.vertices, triangles)
         """Corners of each face, anticlockwise from outside; outward unit normals (f, 3);
         distances d of the faces from the centre of mass [m], (f,), as in eq. 9."""
         if len(self.faces) < 4 or self.width <= FLATNESS * self.reach:
-            raise _flat()
+            raise _explain_flat()
 
     @cached_property
     def edges(self) -> Ints:
@@ -125,7 +125,7 @@ class Polyhedron:
         return f"Polyhedron({len(self.vertices)} corners, {len(self.faces)} faces)"
 
 
-def box(length: float, width: float, height: float) -> Polyhedron:
+def make_box(length: float, width: float, height: float) -> Polyhedron:
     """A cuboid with edges along x, y and z [m].  Raises `ShapeError` unless all are positive."""
     edges = [
         require_length(value, name, "box")
@@ -135,7 +135,7 @@ def box(length: float, width: float, height: float) -> Polyhedron:
     return Polyhedron(corners * edges)
 
 
-def _hull(points: ArrayLike) -> tuple[Ints, Floats]:
+def _find_hull(points: ArrayLike) -> tuple[Ints, Floats]:
     """Triangles of the convex hull, wound outwards, and the points that are its corners."""
     from scipy.spatial import ConvexHull, QhullError
 
@@ -166,14 +166,14 @@ def _hull(points: ArrayLike) -> tuple[Ints, Floats]:
     return triangles, given[corners]
 
 
-def _flat() -> ShapeError:
+def _explain_flat() -> ShapeError:
     return ShapeError(
         f"its points lie in a plane within {FLATNESS:g} of its size", where="Polyhedron",
         remedy="give at least four points that span a volume",
     )  # fmt: skip
 
 
-def _faces(points: Floats, triangles: Ints) -> tuple[list[Ints], Floats, Floats]:
+def _find_faces(points: Floats, triangles: Ints) -> tuple[list[Ints], Floats, Floats]:
     """Planes of the hull, from the largest triangle down: loops of corners, normals, distances.
 
     A plane takes every point within `FLATNESS`; so slivers, which have no normal of their own to
@@ -192,12 +192,12 @@ def _faces(points: Floats, triangles: Ints) -> tuple[list[Ints], Floats, Floats]
         unit = area[first] / np.sqrt(squares[first])
         in_plane = np.abs((points - corner[first, 0]) @ unit) < tolerance
         if in_plane.all():
-            raise _flat()
+            raise _explain_flat()
         mine = in_plane[triangles].all(axis=1)
         unit = area[mine & free].sum(axis=0)
         unit /= np.linalg.norm(unit)
         free &= ~mine
-        loops.append(_loop(points, np.flatnonzero(in_plane), unit, tolerance))
+        loops.append(_trace_loop(points, np.flatnonzero(in_plane), unit, tolerance))
         normals.append(unit)
     distances = [
         float((points[loop] @ unit).mean()) for loop, unit in zip(loops, normals, strict=True)
@@ -205,7 +205,7 @@ def _faces(points: Floats, triangles: Ints) -> tuple[list[Ints], Floats, Floats]
     return loops, np.array(normals), np.array(distances)
 
 
-def _loop(points: Floats, corners: Ints, normal: Floats, tolerance: float) -> Ints:
+def _trace_loop(points: Floats, corners: Ints, normal: Floats, tolerance: float) -> Ints:
     """Corners of a convex face anticlockwise about its normal, without those along an edge."""
     arm = points[corners] - points[corners].mean(axis=0)
     along = arm[np.argmax(np.einsum("ci,ci->c", arm, arm))]

@@ -1,7 +1,7 @@
 """Rotations in space by unit quaternions ``(w, x, y, z)``; spins in the world frame [rad/s].
 
 A quaternion turns body coordinates to world coordinates: ``v_world = R(q) v_body``.  All
-functions take one rotation or a stack of them, (..., 4) with (..., 3).  `rotation_matrix`, `rotate`
+functions take one rotation or a stack of them, (..., 4) with (..., 3).  `make_rotation`, `rotate`
 and `rotate_back` take angles (..., 1) [rad] too, and turn vectors (..., 2) of the plane.
 Formulas: Shuster, J. Astronaut. Sci. 41 (1993) 439.
 """
@@ -15,7 +15,7 @@ from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import SceneError
 
 
-def unit_quaternion(quaternion: ArrayLike) -> Floats:
+def normalise_quaternion(quaternion: ArrayLike) -> Floats:
     """Scale quaternions (..., 4) to length one.
 
     Raises `SceneError` for one of zero length or with NaN: it names no rotation.
@@ -30,7 +30,7 @@ def unit_quaternion(quaternion: ArrayLike) -> Floats:
     return q / length
 
 
-def quaternion_product(left: Floats, right: Floats) -> Floats:
+def multiply_quaternions(left: Floats, right: Floats) -> Floats:
     """``left right``: the rotation ``right`` first, then ``left``; both (..., 4)."""
     w, v = left[..., :1], left[..., 1:]
     s, u = right[..., :1], right[..., 1:]
@@ -38,7 +38,7 @@ def quaternion_product(left: Floats, right: Floats) -> Floats:
     return np.concatenate([scalar, w * u + s * v + np.cross(v, u)], axis=-1)
 
 
-def quaternion_of_rotation(rotation_vector: ArrayLike) -> Floats:
+def make_quaternion(rotation_vector: ArrayLike) -> Floats:
     """Quaternion of a turn by ``|phi|`` [rad] about the axis ``phi / |phi|``; ``phi`` (..., 3)."""
     phi = np.asarray(rotation_vector, dtype=float)
     half = 0.5 * np.linalg.norm(phi, axis=-1, keepdims=True)
@@ -46,7 +46,7 @@ def quaternion_of_rotation(rotation_vector: ArrayLike) -> Floats:
     return np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * phi], axis=-1)
 
 
-def rotation_matrix(quaternion: Floats) -> Floats:
+def make_rotation(quaternion: Floats) -> Floats:
     """``R(q)``, (..., 3, 3), of unit quaternions (..., 4); (..., 2, 2) of angles (..., 1)."""
     components = np.moveaxis(np.asarray(quaternion, dtype=float), -1, 0)
     if len(components) == 1:
@@ -62,7 +62,7 @@ def rotation_matrix(quaternion: Floats) -> Floats:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def quaternion_of_matrix(matrix: ArrayLike) -> Floats:
+def extract_quaternion(matrix: ArrayLike) -> Floats:
     """Unit quaternions (..., 4) of rotation matrices (..., 3, 3), by their largest component.
 
     The outer product of q with itself is linear in R: its longest column is q without loss of
@@ -83,12 +83,12 @@ def quaternion_of_matrix(matrix: ArrayLike) -> Floats:
 
 def rotate(quaternion: Floats, vector: ArrayLike) -> Floats:
     """World coordinates (..., 3) of body vectors (..., 3): ``R(q) v``."""
-    return np.einsum("...ij,...j->...i", rotation_matrix(quaternion), np.asarray(vector, float))
+    return np.einsum("...ij,...j->...i", make_rotation(quaternion), np.asarray(vector, float))
 
 
 def rotate_back(quaternion: Floats, vector: ArrayLike) -> Floats:
     """Body coordinates (..., 3) of world vectors (..., 3): ``R(q)^T v``."""
-    return np.einsum("...ji,...j->...i", rotation_matrix(quaternion), np.asarray(vector, float))
+    return np.einsum("...ji,...j->...i", make_rotation(quaternion), np.asarray(vector, float))
 
 
 def turn_quaternion(quaternion: Floats, rotation_vector: ArrayLike) -> Floats:
@@ -96,13 +96,13 @@ def turn_quaternion(quaternion: Floats, rotation_vector: ArrayLike) -> Floats:
 
     ``q' = exp(phi) q``, kept at length one against round-off.  With ``phi = w t`` this is the
     exact motion under a constant spin, for any time; a spin that changes within the step needs an
-    integrator on top, such as `rigid_lcp.motion.gyroscopic.free_rotation`.
+    integrator on top, such as `rigid_lcp.motion.gyroscopic.rotate_freely`.
     """
-    turned = quaternion_product(quaternion_of_rotation(rotation_vector), quaternion)
+    turned = multiply_quaternions(make_quaternion(rotation_vector), quaternion)
     return turned / np.linalg.norm(turned, axis=-1, keepdims=True)
 
 
-def quaternion_rate(quaternion: Floats, spin: Floats) -> Floats:
+def find_quaternion_rate(quaternion: Floats, spin: Floats) -> Floats:
     """``dq/dt = (0, w) q / 2``, (..., 4), for Runge-Kutta stages."""
     pure = np.concatenate([np.zeros_like(spin[..., :1]), spin], axis=-1)
-    return 0.5 * quaternion_product(pure, quaternion)
+    return 0.5 * multiply_quaternions(pure, quaternion)

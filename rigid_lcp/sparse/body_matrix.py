@@ -2,7 +2,7 @@
 
 J is kept as one (dim, size) block for each body that a contact moves: those of contact c are
 ``block[first[c]:first[c + 1]]``, of the bodies ``body``.  Products with sparse matrices by rows
-(`csr_arrays`) are compiled: scipy's spend more on small ones in calls.
+(`split_csr`) are compiled: scipy's spend more on small ones in calls.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from rigid_lcp.arrays import Floats, Ints
 Indices = NDArray[Any]
 
 
-def csr_arrays(rows: sp.csr_array) -> tuple[Indices, Indices, Floats]:
+def split_csr(rows: sp.csr_array) -> tuple[Indices, Indices, Floats]:
     """Where each row begins, the columns and the values of a matrix by rows."""
     return rows.indptr, rows.indices, rows.data
 
@@ -121,7 +121,7 @@ def split_jacobian(
 
 
 @njit(cache=True)
-def diagonal_blocks(start: Indices, index: Indices, value: Floats, size: int) -> Floats:
+def find_diagonal_blocks(start: Indices, index: Indices, value: Floats, size: int) -> Floats:
     """The (size, size) blocks on the diagonal of a matrix by rows; what else it has is left."""
     blocks = np.zeros(((len(start) - 1) // size, size, size))
     for i in range(len(start) - 1):
@@ -133,7 +133,7 @@ def diagonal_blocks(start: Indices, index: Indices, value: Floats, size: int) ->
 
 
 @njit(cache=True)
-def body_pairs(first: Ints, body: Ints, bodies: int) -> Ints:
+def list_body_pairs(first: Ints, body: Ints, bodies: int) -> Ints:
     """``row * bodies + column`` of every block that a contact adds to, as `add_contacts` goes."""
     total = 0
     for c in range(len(first) - 1):
@@ -179,7 +179,7 @@ def invert_block(block: Floats, inverse: Floats) -> bool:
 
 
 @njit(cache=True)
-def contact_stiffness(a: Floats, b: Floats) -> tuple[Floats, Floats, bool]:
+def find_contact_stiffness(a: Floats, b: Floats) -> tuple[Floats, Floats, bool]:
     """``A^-1`` and ``A^-1 B`` of every contact, (nc, dim, dim), and whether every A has one."""
     contacts, dim = a.shape[:2]
     inverse, stiffness = np.empty(a.shape), np.zeros(a.shape)
@@ -195,7 +195,7 @@ def contact_stiffness(a: Floats, b: Floats) -> tuple[Floats, Floats, bool]:
     return inverse, stiffness, True
 
 
-def _add_contacts(dim: int, size: int) -> Any:
+def _make_adder(dim: int, size: int) -> Any:
     """The kernel below for blocks of so many rows and columns, whose loops the compiler unrolls; of
     any where these are zero."""
 
@@ -225,7 +225,7 @@ def _add_contacts(dim: int, size: int) -> Any:
     return add
 
 
-_add_2d, _add_3d, _add_any = (_add_contacts(*shape) for shape in ((2, 3), (3, 6), (0, 0)))
+_add_2d, _add_3d, _add_any = (_make_adder(*shape) for shape in ((2, 3), (3, 6), (0, 0)))
 
 
 @njit(cache=True)
@@ -287,7 +287,7 @@ def multiply_blocks(blocks: Floats, vectors: Floats) -> Floats:
 
 
 @njit(cache=True)
-def dense_delassus(
+def build_dense_delassus(
     start: Indices, index: Indices, value: Floats,
     mass_start: Indices, mass_index: Indices, inverse_mass: Floats,
 ) -> Floats:  # fmt: skip

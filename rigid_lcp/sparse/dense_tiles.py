@@ -30,15 +30,15 @@ _VECTOR, _WORD = ir.VectorType(ir.DoubleType(), TILE), ir.IntType(64)
 _FUSED = ("contract",)
 
 
-def _word(number: int) -> Any:
+def _make_word(number: int) -> Any:
     return ir.Constant(_WORD, number)
 
 
-def _vector_at(builder: Any, numbers: Any, place: Any) -> Any:
+def _point_to_vector(builder: Any, numbers: Any, place: Any) -> Any:
     return builder.bitcast(builder.gep(numbers, [place]), _VECTOR.as_pointer())
 
 
-def _spread(builder: Any, numbers: Any, place: Any) -> Any:
+def _broadcast(builder: Any, numbers: Any, place: Any) -> Any:
     """A vector of one number."""
     short = ir.IntType(32)
     number = builder.load(builder.gep(numbers, [place]))
@@ -47,16 +47,16 @@ def _spread(builder: Any, numbers: Any, place: Any) -> Any:
     return builder.shuffle_vector(lone, lone, every)
 
 
-def _less(builder: Any, value: Any, one: Any, two: Any) -> Any:
+def _subtract(builder: Any, value: Any, one: Any, two: Any) -> Any:
     """``value - one two``, in one instruction where there is one."""
     return builder.fsub(value, builder.fmul(one, two, flags=_FUSED), flags=_FUSED)
 
 
-def _tile(vectors: int, divided: bool) -> Any:
+def _make_tile(vectors: int, divided: bool) -> Any:
     """The tile of so many vectors a row; ``divided``: T is solved for."""
 
     @intrinsic
-    def tile(
+    def fill_tile(
         typingctx: Any, out: Any, out_at: Any, source: Any, source_at: Any, stride: Any,
         left: Any, left_at: Any, left_stride: Any, right: Any, right_at: Any, right_stride: Any,
         depth: Any, triangle: Any,
@@ -67,15 +67,15 @@ def _tile(vectors: int, divided: bool) -> Any:
         )
 
         def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-            def numbers(which: int) -> Any:
+            def find_numbers(which: int) -> Any:
                 made = context.make_array(signature.args[which])
                 return made(context, builder, values[which]).data
 
-            x, s, a, b, t = (numbers(which) for which in (0, 2, 5, 8, 12))
+            x, s, a, b, t = (find_numbers(which) for which in (0, 2, 5, 8, 12))
             _, to, _, at, step, _, a_at, a_step, _, b_at, b_step, terms, _ = values
-            columns = [_word(TILE * v) for v in range(vectors)]
+            columns = [_make_word(TILE * v) for v in range(vectors)]
             places = [
-                [builder.add(builder.mul(_word(i), step), column) for column in columns]
+                [builder.add(builder.mul(_make_word(i), step), column) for column in columns]
                 for i in range(TILE)
             ]
             slots: list[list[Any]] = []
@@ -83,42 +83,44 @@ def _tile(vectors: int, divided: bool) -> Any:
                 slots.append([])
                 for place in row:
                     slot: Any = cgutils.alloca_once(builder, _VECTOR)  # type: ignore[no-untyped-call]
-                    given = _vector_at(builder, s, builder.add(at, place))
+                    given = _point_to_vector(builder, s, builder.add(at, place))
                     builder.store(builder.load(given, align=8), slot)
                     slots[-1].append(slot)
             with cgutils.for_range(builder, terms) as loop:
                 begin = builder.add(b_at, builder.mul(loop.index, b_step))
                 beside = [
-                    builder.load(_vector_at(builder, b, builder.add(begin, column)), align=8)
+                    builder.load(_point_to_vector(builder, b, builder.add(begin, column)), align=8)
                     for column in columns
                 ]
                 begin = builder.add(a_at, builder.mul(loop.index, a_step))
                 for i in range(TILE):
-                    share = _spread(builder, a, builder.add(begin, _word(i)))
+                    share = _broadcast(builder, a, builder.add(begin, _make_word(i)))
                     for slot, other in zip(slots[i], beside, strict=True):
-                        builder.store(_less(builder, builder.load(slot), share, other), slot)
+                        builder.store(_subtract(builder, builder.load(slot), share, other), slot)
             rows = [[builder.load(slot) for slot in row] for row in slots]
             for i in range(TILE if divided else 0):
                 for k in range(i):
-                    share = _spread(builder, t, _word(i * TILE + k))
+                    share = _broadcast(builder, t, _make_word(i * TILE + k))
                     rows[i] = [
-                        _less(builder, value, share, above)
+                        _subtract(builder, value, share, above)
                         for value, above in zip(rows[i], rows[k], strict=True)
                     ]
-                scale = _spread(builder, t, _word(i * TILE + i))
+                scale = _broadcast(builder, t, _make_word(i * TILE + i))
                 rows[i] = [builder.fmul(value, scale) for value in rows[i]]
             for row, made in zip(places, rows, strict=True):
                 for place, value in zip(row, made, strict=True):
-                    builder.store(value, _vector_at(builder, x, builder.add(to, place)), align=8)
+                    builder.store(
+                        value, _point_to_vector(builder, x, builder.add(to, place)), align=8
+                    )
             return context.get_dummy_value()
 
         return signature, generate
 
-    return tile
+    return fill_tile
 
 
-_tile_4, _tile_8, _tile_12 = (_tile(vectors, False) for vectors in (1, 2, 3))
-_divided_4, _divided_8, _divided_12 = (_tile(vectors, True) for vectors in (1, 2, 3))
+_tile_4, _tile_8, _tile_12 = (_make_tile(vectors, False) for vectors in (1, 2, 3))
+_divided_4, _divided_8, _divided_12 = (_make_tile(vectors, True) for vectors in (1, 2, 3))
 
 
 @njit(cache=True)

@@ -36,7 +36,7 @@ ELIMINATION = EliminationNumbers()
 
 
 @njit(cache=True)
-def symmetric_pattern(blocks: int, rows: Ints, columns: Ints) -> tuple[Ints, Ints]:
+def list_neighbours(blocks: int, rows: Ints, columns: Ints) -> tuple[Ints, Ints]:
     """Neighbours of each block, itself among them, rising: ``neighbour[start[i]:start[i + 1]]``."""
     start = np.zeros(blocks + 1, dtype=np.int64)
     for k in range(len(rows)):
@@ -62,24 +62,24 @@ def symmetric_pattern(blocks: int, rows: Ints, columns: Ints) -> tuple[Ints, Int
     return start, every[:done].copy()
 
 
-def elimination_order(start: Ints, neighbour: Ints, size: int) -> Ints:
+def order_elimination(start: Ints, neighbour: Ints, size: int) -> Ints:
     """Which block is eliminated at each place, (blocks,); ``size``: rows of a block."""
-    order = minimum_degree(start, neighbour)
-    flops = elimination_flops(start, neighbour, order, size)
+    order = order_by_degree(start, neighbour)
+    flops = count_flops(start, neighbour, order, size)
     if flops > ELIMINATION.dissected_flops:
-        other = nested_dissection(start, neighbour)
-        if other is not None and elimination_flops(start, neighbour, other, size) < flops:
+        other = order_by_dissection(start, neighbour)
+        if other is not None and count_flops(start, neighbour, other, size) < flops:
             return other
     return order
 
 
-def elimination_flops(start: Ints, neighbour: Ints, order: Ints, size: int) -> float:
+def count_flops(start: Ints, neighbour: Ints, order: Ints, size: int) -> float:
     """About what LU factors cost in this order, column by column."""
     below = find_column_parents(start, neighbour, order)[1].astype(float)
     return float(2.0 * size**3 * (below * (below + 1.0) + 1.0 / 3.0).sum())
 
 
-def nested_dissection(start: Ints, neighbour: Ints) -> Ints | None:
+def order_by_dissection(start: Ints, neighbour: Ints) -> Ints | None:
     """Blocks in METIS's order of nested dissection; None where ``pymetis`` is not installed, as
     there are processors that it is not built for."""
     try:
@@ -94,12 +94,12 @@ def nested_dissection(start: Ints, neighbour: Ints) -> Ints | None:
     return np.asarray(order, dtype=np.int64)
 
 
-def minimum_degree(start: Ints, neighbour: Ints) -> Ints:
+def order_by_degree(start: Ints, neighbour: Ints) -> Ints:
     """Blocks in an order of minimum degree: that of SuperLU (multiple), or for few blocks our own,
     which costs less than to call it."""
     blocks = len(start) - 1
     if blocks <= ELIMINATION.table_blocks:
-        found: Ints = minimum_degree_dense(start, neighbour)
+        found: Ints = order_by_degree_dense(start, neighbour)
         return found
     graph = sp.csc_array((np.full(len(neighbour), -1.0), neighbour, start), (blocks, blocks))
     laplacian = graph + sp.diags_array(np.full(blocks, 2.0 * blocks))
@@ -111,7 +111,7 @@ def minimum_degree(start: Ints, neighbour: Ints) -> Ints:
 
 
 @njit(cache=True)
-def minimum_degree_dense(start: Ints, neighbour: Ints) -> Ints:
+def order_by_degree_dense(start: Ints, neighbour: Ints) -> Ints:
     """The same by a full table of neighbours, in the time of its size."""
     blocks = len(start) - 1
     linked = np.zeros((blocks, blocks), dtype=np.bool_)
@@ -175,7 +175,7 @@ def find_column_parents(start: Ints, neighbour: Ints, order: Ints) -> tuple[Ints
 
 
 @njit(cache=True)
-def postorder(parent: Ints) -> Ints:
+def find_postorder(parent: Ints) -> Ints:
     """Columns so that each subtree is a run that ends with its root."""
     blocks = len(parent)
     child, sister = np.full(blocks, -1), np.full(blocks, -1)

@@ -4,7 +4,7 @@ Block column j of the factors has the rows of the matrix's column j and those of
 parent is j (its first row below the diagonal).  Columns that follow each other and have nearly the
 same rows are eliminated together, as one dense *front*; what a front leaves on its rows is added to
 its parent's (Duff and Reid, ACM TOMS 9 (1983) 302; Liu, SIAM Review 34 (1992) 82).  Fronts are
-merged where one larger front costs less than two, empty places included (`front_cost`), and
+merged where one larger front costs less than two, empty places included (`find_front_cost`), and
 those of more than `FRONT_COLUMNS` split.  All of it depends on the pattern alone and is found once.
 """
 
@@ -19,10 +19,10 @@ from rigid_lcp.arrays import Ints
 from rigid_lcp.sparse.dense_tiles import TILE
 from rigid_lcp.sparse.elimination_order import (
     ELIMINATION,
-    elimination_order,
     find_column_parents,
-    postorder,
-    symmetric_pattern,
+    find_postorder,
+    list_neighbours,
+    order_elimination,
 )
 
 FRONT_COLUMNS = ELIMINATION.front_columns
@@ -60,16 +60,16 @@ class EliminationTree(NamedTuple):
     that wait at one time."""
 
 
-def elimination_tree(blocks: int, size: int, rows: Ints, columns: Ints) -> EliminationTree:
+def build_tree(blocks: int, size: int, rows: Ints, columns: Ints) -> EliminationTree:
     """The tree of a matrix of ``blocks`` block rows with entries at (rows, columns).
 
     ``size``: rows of a block.  The pattern is taken for symmetric: where (i, j) is an entry, (j, i)
     may become one.
     """
-    start, neighbour = symmetric_pattern(blocks, np.asarray(rows), np.asarray(columns))
-    order = elimination_order(start, neighbour, size)
+    start, neighbour = list_neighbours(blocks, np.asarray(rows), np.asarray(columns))
+    order = order_elimination(start, neighbour, size)
     parent, count = find_column_parents(start, neighbour, order)
-    after = postorder(parent)
+    after = find_postorder(parent)
     order = order[after]
     parent, count = find_column_parents(start, neighbour, order)
     first = merge_columns(parent, count, size)
@@ -91,13 +91,13 @@ def elimination_tree(blocks: int, size: int, rows: Ints, columns: Ints) -> Elimi
 
 
 @njit(cache=True)
-def padded(count: int) -> int:
+def round_up(count: int) -> int:
     """The next multiple of `TILE`."""
     return (count + TILE - 1) // TILE * TILE
 
 
 @njit(cache=True)
-def front_cost(width: int, below: int, size: int) -> float:
+def find_front_cost(width: int, below: int, size: int) -> float:
     """Flops that a front of so many block columns and rows below them is worth."""
     m, r = float((width + below) * size), float(below * size)
     return FRONT_COST + ENTRY_COST * m * m + (m**3 - r**3) * 2.0 / 3.0
@@ -117,9 +117,9 @@ def merge_columns(parent: Ints, count: Ints, size: int) -> Ints:
         while fronts > 0 and first <= parent[first - 1] <= k:
             child = begin[fronts - 1]
             below = count[first - 1]
-            together = front_cost(k + 1 - child, count[k], size)
-            apart = front_cost(first - child, below, size)
-            apart += front_cost(k + 1 - first, count[k], size)
+            together = find_front_cost(k + 1 - child, count[k], size)
+            apart = find_front_cost(first - child, below, size)
+            apart += find_front_cost(k + 1 - first, count[k], size)
             if together > apart:
                 break
             first = child

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.sparse.dense_tiles import divide_rows, subtract_product
-from rigid_lcp.sparse.elimination_tree import EliminationTree, padded
+from rigid_lcp.sparse.elimination_tree import EliminationTree, round_up
 
 Spots = NDArray[np.uint64]
 
@@ -46,7 +46,7 @@ def factor_fronts(
     for f in range(fronts):
         pivots = (tree.first[f + 1] - tree.first[f]) * size
         rows = (tree.row_start[f + 1] - tree.row_start[f]) * size
-        p, r = padded(pivots), padded(rows)
+        p, r = round_up(pivots), round_up(rows)
         m = p + r
         begin, half = tree.factor_start[f], p * m
         factors[begin : begin + 2 * half] = 0.0
@@ -62,7 +62,7 @@ def factor_fronts(
             depth -= 1
             child = waiting[depth]
             places = tree.relative[tree.row_start[child] : tree.row_start[child + 1]]
-            stride = padded(len(places) * size)
+            stride = round_up(len(places) * size)
             top -= stride * stride
             add_update(factors, begin, rest, stack, top, places, size, pivots, rows, spots)
         if not eliminate_pivots(factors, begin, pivots, p, m, triangles):
@@ -111,9 +111,9 @@ def add_update(
 
     ``spots``: space for the place of each number.
     """
-    p, r = padded(pivots), padded(rows)
+    p, r = round_up(pivots), round_up(rows)
     m, count = p + r, len(places) * size
-    stride, inner = padded(count), 0  # rows of it that are pivots here: the first, as they rise
+    stride, inner = round_up(count), 0  # rows of it that are pivots here: the first, as they rise
     for k in range(len(places)):
         at = places[k] * size
         if at < pivots:
@@ -203,7 +203,7 @@ def solve_fronts(tree: EliminationTree, factors: Floats, right: Floats) -> Float
     x = right.reshape(-1, size)[tree.order].ravel()
     space = np.empty(tree.front_most)
     for f in range(fronts):
-        p, m = front_part(tree, f, x, space)
+        p, m = load_part(tree, f, x, space)
         lower = tree.factor_start[f] + p * m
         for k in range(0, p, 4):
             at = lower + k * m
@@ -218,9 +218,9 @@ def solve_fronts(tree: EliminationTree, factors: Floats, right: Floats) -> Float
                 factors[at + m + k + 4 : at + 2 * m], factors[at + 2 * m + k + 4 : at + 3 * m],
                 factors[at + 3 * m + k + 4 : at + 4 * m], one, two, three, four,
             )  # fmt: skip
-        keep_part(tree, f, x, space, m)
+        store_part(tree, f, x, space, m)
     for f in range(fronts - 1, -1, -1):
-        p, m = front_part(tree, f, x, space)
+        p, m = load_part(tree, f, x, space)
         for k in range(p - 4, -1, -4):
             at = tree.factor_start[f] + k * m
             for i in range(3, -1, -1):
@@ -229,7 +229,7 @@ def solve_fronts(tree: EliminationTree, factors: Floats, right: Floats) -> Float
                 for j in range(i + 1, 4):
                     own -= row[j] * space[k + j]
                 space[k + i] = own / row[i]
-        keep_part(tree, f, x, space, p)
+        store_part(tree, f, x, space, p)
     solution = np.empty((len(x) // size, size))
     solution[tree.order] = x.reshape(-1, size)
     return solution.ravel()
@@ -255,14 +255,14 @@ def multiply_rows(one: Floats, two: Floats) -> float:
 
 
 @njit(cache=True)
-def front_part(tree: EliminationTree, f: int, x: Floats, space: Floats) -> tuple[int, int]:
+def load_part(tree: EliminationTree, f: int, x: Floats, space: Floats) -> tuple[int, int]:
     """Puts the numbers of x (blocks * size,) that a front works on in ``space``, padded with zeros;
     its padded pivots, and these with its padded rows."""
     size = tree.size
     begin, pivots = tree.first[f] * size, (tree.first[f + 1] - tree.first[f]) * size
     rows = tree.rows[tree.row_start[f] : tree.row_start[f + 1]]
-    p = padded(pivots)
-    m = p + padded(len(rows) * size)
+    p = round_up(pivots)
+    m = p + round_up(len(rows) * size)
     for i in range(pivots):
         space[i] = x[begin + i]
     for i in range(pivots, p):
@@ -276,14 +276,14 @@ def front_part(tree: EliminationTree, f: int, x: Floats, space: Floats) -> tuple
 
 
 @njit(cache=True)
-def keep_part(tree: EliminationTree, f: int, x: Floats, space: Floats, end: int) -> None:
-    """Put back what `front_part` took, up to ``end`` of it: its pivots, or its rows too."""
+def store_part(tree: EliminationTree, f: int, x: Floats, space: Floats, end: int) -> None:
+    """Put back what `load_part` took, up to ``end`` of it: its pivots, or its rows too."""
     size = tree.size
     begin, pivots = tree.first[f] * size, (tree.first[f + 1] - tree.first[f]) * size
     rows = tree.rows[tree.row_start[f] : tree.row_start[f + 1]]
     for i in range(pivots):
         x[begin + i] = space[i]
-    p = padded(pivots)
+    p = round_up(pivots)
     if end > p:
         for k in range(len(rows)):
             for i in range(size):

@@ -23,7 +23,7 @@ What the limit is:
 Without friction the energy is convex.  With it, it is first asked whether all contacts hold
 (`find_held_forces`), from one factorisation.  Else the relaxation is done from nothing.  Between
 states that are near round-off may decide, so all is done in the problem's own order
-(`put_in_own_order`), and the way to the state with the load rounded to 1e-9: the same numbers,
+(`reorder_problem`), and the way to the state with the load rounded to 1e-9: the same numbers,
 whatever the order of contacts and bodies.  From there the last digits are found.
 
 On large piles that slide the tangent of springs and sliders along the way has eigenvalues with
@@ -31,7 +31,7 @@ negative real parts, and the relaxation does not settle (`docs/rigid-indetermina
 the answer then says so.
 
 A time step has any of the impulses that fit.  What hangs on single forces (force chains, grains
-that break) wants those that elastic contacts would choose at that moment (`unique_forces`).
+that break) wants those that elastic contacts would choose at that moment (`find_unique_forces`).
 """
 
 from __future__ import annotations
@@ -46,23 +46,23 @@ from scipy.sparse.linalg import splu
 from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.contact import ContactForces
 from rigid_lcp.errors import NotConverged, ProblemError
-from rigid_lcp.friction.problem import BodySpace, FrictionProblem, friction_problem
+from rigid_lcp.friction.problem import BodySpace, FrictionProblem, make_problem
 from rigid_lcp.motion import (
     Motion,
     World,
-    body_space,
-    contact_forces,
     find_contact_offset,
+    make_body_space,
+    make_contact_forces,
     replace_rates,
 )
-from rigid_lcp.unique.elastic_network import ElasticNetwork, coulomb_spring, slider_forces
+from rigid_lcp.unique.elastic_network import ElasticNetwork, find_slider_forces, find_spring_forces
 from rigid_lcp.unique.micro_displacements import (
     ElasticForces,
-    bodies_of,
-    contact_stiffness,
-    free_motion,
-    mass_free_jacobian,
-    stiffest_mode,
+    bound_stiffest_mode,
+    find_free_motion,
+    require_bodies,
+    require_stiffness,
+    scale_jacobian,
 )
 
 
@@ -96,7 +96,7 @@ class LimitNumbers:
 LIMIT = LimitNumbers()
 
 
-def elastic_limit(
+def find_elastic_limit(
     problem: FrictionProblem, stiffness: ArrayLike = 1.0, *, begin: ArrayLike | None = None,
     tolerance: float = 1e-12, iterations_max: int = 2000,
 ) -> ElasticForces:  # fmt: skip
@@ -110,27 +110,29 @@ def elastic_limit(
     forces, which begin at none, as with friction each state may lead to its own.  Raises
     `ProblemError` for displacements that do not fit; never for want of convergence.
     """
-    freedoms = bodies_of(problem).jacobian.shape[1]
+    freedoms = require_bodies(problem).jacobian.shape[1]
     begun = np.zeros(freedoms) if begin is None else np.asarray(begin, dtype=float)
     if begun.shape != (freedoms,) or not np.isfinite(begun).all():
         raise ProblemError(
             f"begin is not {freedoms} finite displacements, one for each freedom", where="begin",
             remedy="give the displacement of an answer for the same bodies, or none",
         )  # fmt: skip
-    mine, contact, row, column = put_in_own_order(problem)
-    jacobian, root = mass_free_jacobian(bodies_of(mine))
-    k = contact_stiffness(problem, stiffness)[contact]
+    mine, contact, row, column = reorder_problem(problem)
+    jacobian, root = scale_jacobian(require_bodies(mine))
+    k = require_stiffness(problem, stiffness)[contact]
     # a power of two: round-off of the mode is then none of the stiffness
-    mode = 2.0 ** int(np.ceil(np.log2(stiffest_mode(jacobian, k) or 1.0)))
+    mode = 2.0 ** int(np.ceil(np.log2(bound_stiffest_mode(jacobian, k) or 1.0)))
     # in units of the stiffest mode: h = 1 is a step without overshoot
-    network = ElasticNetwork(jacobian, free_motion(jacobian, mine.offset), k / mode, mine.friction)
+    network = ElasticNetwork(
+        jacobian, find_free_motion(jacobian, mine.offset), k / mode, mine.friction
+    )
     if problem.friction.any() and begin is None:
         found = find_held_forces(mine, network, tolerance)
         if found is None:
             found = _relax_from_nothing(mine, network, tolerance, iterations_max)
     else:
         # deformations of displacements: others would be a self-stress for good
-        deformation = -mode * (bodies_of(mine).jacobian @ begun[column]).reshape(k.shape)
+        deformation = -mode * (require_bodies(mine).jacobian @ begun[column]).reshape(k.shape)
         found, _ = _relax(mine, network, deformation, LIMIT.first_step, tolerance, iterations_max)
     force, displacement = np.empty_like(found.r), begun.copy()
     force[row] = found.r
@@ -138,7 +140,7 @@ def elastic_limit(
     return replace(found, r=force, displacement=displacement)
 
 
-def put_in_own_order(problem: FrictionProblem) -> tuple[FrictionProblem, Ints, Ints, Ints]:
+def reorder_problem(problem: FrictionProblem) -> tuple[FrictionProblem, Ints, Ints, Ints]:
     """The problem with contacts and bodies in an order that is theirs and not that of their
     numbers; the numbers of its contacts (nc,), forces (nc * dim,), freedoms (ndof,) in ``problem``.
 
@@ -146,7 +148,7 @@ def put_in_own_order(problem: FrictionProblem) -> tuple[FrictionProblem, Ints, I
     order of sums.  Contacts are sorted by what q does to their normal velocities through W twice,
     bodies by how fast it moves them: numbers that no two have alike but by symmetry.
     """
-    bodies = bodies_of(problem)
+    bodies = require_bodies(problem)
     dim, size = problem.dim, bodies.body_size
     once = bodies.product(problem.offset)
     contact = np.argsort(bodies.product(once)[::dim], kind="stable")
@@ -159,7 +161,7 @@ def put_in_own_order(problem: FrictionProblem) -> tuple[FrictionProblem, Ints, I
     for each in (jacobian, inverse_mass):
         each.sort_indices()
     space = BodySpace(jacobian, inverse_mass, size)
-    mine = friction_problem(space, problem.offset[row], problem.friction[contact], dim)
+    mine = make_problem(space, problem.offset[row], problem.friction[contact], dim)
     return mine, contact, row, column
 
 
@@ -183,7 +185,7 @@ def find_held_forces(
     for _ in range(LIMIT.held_steps):
         displacement = displacement + solve(network.free + jacobian.T @ trial.ravel())
         before, trial = trial, -(weighted @ displacement).reshape(springs.shape)
-        force = slider_forces(trial, problem.friction * np.maximum(trial[:, 0], 0.0))
+        force = find_slider_forces(trial, problem.friction * np.maximum(trial[:, 0], 0.0))
         if not np.abs(trial - force).max() <= LIMIT.outside_cone * np.abs(trial).max():
             return None
         change = float(np.linalg.norm(trial - before))
@@ -192,7 +194,7 @@ def find_held_forces(
             and problem.residual(force.ravel()) <= tolerance
         ):
             deformation = -(jacobian @ displacement).reshape(springs.shape)
-            r = coulomb_spring(deformation, network.stiffness, problem.friction).ravel()
+            r = find_spring_forces(deformation, network.stiffness, problem.friction).ravel()
             return ElasticForces(r, displacement, problem.residual(r), "solved", 1)
     return None
 
@@ -202,7 +204,7 @@ def _relax_from_nothing(
 ) -> ElasticForces:
     """Relaxation from no displacements: to the state of the load in `LIMIT`'s digits, which the
     round-off of q has no part in, and from there to that of the load itself."""
-    free = rounded(network.free)
+    free = round_numbers(network.free)
     rough = replace(problem, offset=network.jacobian @ free)
     near = ElasticNetwork(network.jacobian, free, network.stiffness, problem.friction)
     none = np.zeros(network.stiffness.shape)
@@ -217,7 +219,7 @@ def _relax_from_nothing(
     )  # fmt: skip
 
 
-def rounded(numbers: Floats) -> Floats:
+def round_numbers(numbers: Floats) -> Floats:
     """Numbers to so small a part as `LIMIT` has of the greatest of them."""
     unit = 2.0 ** np.ceil(np.log2(np.abs(numbers).max(initial=0.0) or 1.0)) * LIMIT.rounded
     return np.asarray(np.round(numbers / unit) * unit)
@@ -239,21 +241,21 @@ def _relax(
     for _ in range(LIMIT.steps):
         if solved or network.newton_steps >= iterations_max or h <= LIMIT.shortest_step:
             break
-        move, converged = network.implicit_step(deformation, h)
+        move, converged = network.find_implicit_step(deformation, h)
         if not converged:
             h /= 4.0
             continue
         way = way + move
         deformation = deformation - (jacobian @ move).reshape(shape)
         previous, earlier = force, change
-        force = coulomb_spring(deformation, network.stiffness, problem.friction)
+        force = find_spring_forces(deformation, network.stiffness, problem.friction)
         residual = problem.residual(force.ravel())
         size = float(np.linalg.norm(force))
         change = float(np.linalg.norm(force - previous)) / size if size > 0 else 0.0
         stalled = change < LIMIT.stalled_change and change > 0.5 * earlier
         settled = change <= tolerance or (stalled and change < LIMIT.settled_change)
         if residual > tolerance and change < LIMIT.turned_change:
-            deformation = turned(deformation, -(jacobian @ move).reshape(shape))
+            deformation = turn_deformation(deformation, -(jacobian @ move).reshape(shape))
         solved = residual <= tolerance and settled
         if stalled:
             # what is left is round-off, which a shorter step makes smaller
@@ -273,7 +275,7 @@ def _relax(
     return found, deformation
 
 
-def turned(deformation: Floats, growth: Floats) -> Floats:
+def turn_deformation(deformation: Floats, growth: Floats) -> Floats:
     """Deformations (nc, dim), those that go on sliding turned into their ``growth`` in a step.
 
     A spring that slides points along the whole way of its contact; in space it turns into the
@@ -287,7 +289,9 @@ def turned(deformation: Floats, growth: Floats) -> Floats:
     return new
 
 
-def unique_forces(world: World, motion: Motion, loads: ArrayLike | None = None) -> ContactForces:
+def find_unique_forces(
+    world: World, motion: Motion, loads: ArrayLike | None = None
+) -> ContactForces:
     """Forces of elastic contacts at the state ``motion``, the same for any order and solver.
 
     ``loads`` (n, 3) or (n, 6) [N, N m].  All contacts are equally stiff.  For grains at rest or in
@@ -297,16 +301,16 @@ def unique_forces(world: World, motion: Motion, loads: ArrayLike | None = None) 
     contacts = world.contacts(motion, 0.5 * LIMIT.closed_gap * world.length)
     none = np.zeros((len(contacts), motion.dim))
     if len(contacts) == 0:
-        return contact_forces(contacts, none, None, 1.0)
-    space = body_space(contacts, motion.position, world.columns, world.inverse_mass(motion))
+        return make_contact_forces(contacts, none, None, 1.0)
+    space = make_body_space(contacts, motion.position, world.columns, world.inverse_mass(motion))
     free = replace_rates(motion, world.accelerations(motion, loads))
-    problem = friction_problem(
+    problem = make_problem(
         space, find_contact_offset(contacts, motion, free), contacts.friction, motion.dim
     )
-    found = elastic_limit(problem, tolerance=LIMIT.tolerance)
+    found = find_elastic_limit(problem, tolerance=LIMIT.tolerance)
     if not found.solved:
         raise NotConverged(
             f"the forces of elastic contacts were not found (residual {found.residual:.2g})",
             where="unique_forces", remedy=found.message,
         )  # fmt: skip
-    return contact_forces(contacts, found.r.reshape(none.shape), None, 1.0)
+    return make_contact_forces(contacts, found.r.reshape(none.shape), None, 1.0)

@@ -2,13 +2,13 @@
 
 Unknown is the move d of the mass-free coordinates, which balances inertia, load and springs,
 
-    d / h = Q + J^T f(xi - J d),    f: `coulomb_spring`
+    d / h = Q + J^T f(xi - J d),    f: `find_spring_forces`
 
 Newton's method on this equation is quick near a solution, but where contacts slide its slope is
 not symmetric, and from afar it stalls.  Without friction the equation is the minimum of a convex
 energy, which Newton's method with a line search always finds.  With friction it is a friction
-problem with a softer W (`ElasticNetwork.friction_step`), for which there are solvers that go on
-where Newton's method stops; its end is left to Newton's method, for the last digits.
+problem with a softer W (`ElasticNetwork.find_friction_step`), for which there are solvers that go
+on where Newton's method stops; its end is left to Newton's method, for the last digits.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from rigid_lcp.arrays import Floats, Ints
-from rigid_lcp.friction.methods import gauss_seidel, newton
-from rigid_lcp.friction.problem import friction_problem
+from rigid_lcp.friction.methods import solve_gauss_seidel, solve_newton
+from rigid_lcp.friction.problem import make_problem
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class NetworkNumbers:
 NETWORK = NetworkNumbers()
 
 
-def slider_forces(trial: Floats, allowed: Floats) -> Floats:
+def find_slider_forces(trial: Floats, allowed: Floats) -> Floats:
     """Forces (nc, dim) [N] of springs with ``trial`` forces (nc, dim) and friction limits (nc,)."""
     force = trial.copy()
     force[:, 0] = np.maximum(trial[:, 0], 0.0)
@@ -58,7 +58,7 @@ def slider_forces(trial: Floats, allowed: Floats) -> Floats:
     return force
 
 
-def coulomb_spring(deformation: Floats, stiffness: Floats, friction: Floats) -> Floats:
+def find_spring_forces(deformation: Floats, stiffness: Floats, friction: Floats) -> Floats:
     """Eq. 38 with springs: ``f_N = k xi_N`` in compression, ``f_T = k_T xi_T`` up to friction.
 
     A function of xi alone, as eq. 38 is written: it forgets the path that led there.
@@ -66,11 +66,11 @@ def coulomb_spring(deformation: Floats, stiffness: Floats, friction: Floats) -> 
     ``stiffness`` (nc, dim) [N/m]; ``friction`` (nc,); the force (nc, dim) [N].
     """
     trial = stiffness * deformation
-    return slider_forces(trial, friction * np.maximum(trial[:, 0], 0.0))
+    return find_slider_forces(trial, friction * np.maximum(trial[:, 0], 0.0))
 
 
-def slider_slope(trial: Floats, stiffness: Floats, friction: Floats) -> Floats:
-    """Derivative of `coulomb_spring` by deformation, (nc, dim, dim) [N/m].
+def find_slider_slope(trial: Floats, stiffness: Floats, friction: Floats) -> Floats:
+    """Derivative of `find_spring_forces` by deformation, (nc, dim, dim) [N/m].
 
     At a kink: the closed, sticking side.  Tangential stiffness is the same both ways.
     """
@@ -137,21 +137,21 @@ class ElasticNetwork:
         """
         moved = deformation - (self.jacobian @ move).reshape(deformation.shape)
         trial = np.asarray(self.stiffness * moved)
-        force = slider_forces(trial, self.friction * np.maximum(trial[:, 0], 0.0))
+        force = find_slider_forces(trial, self.friction * np.maximum(trial[:, 0], 0.0))
         imbalance = np.asarray(move / h - self.free - self.jacobian.T @ force.ravel())
         return trial, imbalance, float(np.linalg.norm(imbalance))
 
-    def newton_direction(self, trial: Floats, imbalance: Floats, h: float) -> Floats:
+    def find_newton_direction(self, trial: Floats, imbalance: Floats, h: float) -> Floats:
         """``-(1 / h + J^T f' J)^-1`` times the imbalance; f' at ``trial`` forces (nc, dim)."""
         self.newton_steps += 1
-        blocks = slider_slope(trial, self.stiffness, self.friction)
+        blocks = find_slider_slope(trial, self.stiffness, self.friction)
         count, dim, _ = blocks.shape
         pointer = np.arange(count + 1)
         law = sp.bsr_array((blocks, pointer[:-1], pointer), shape=(count * dim, count * dim))
         slope = self.identity / h + self.jacobian.T @ (law @ self.jacobian)
         return np.asarray(splu(sp.csc_array(slope)).solve(-imbalance))
 
-    def coulomb_step(
+    def find_coulomb_step(
         self, deformation: Floats, move: Floats, h: float, steps: int
     ) -> tuple[Floats, bool]:
         """Newton's method under Coulomb's law from a first ``move``; move, whether found."""
@@ -159,7 +159,7 @@ class ElasticNetwork:
         for _ in range(steps):
             if error <= NETWORK.balance * self.load:
                 return move, True
-            direction = self.newton_direction(trial, imbalance, h)
+            direction = self.find_newton_direction(trial, imbalance, h)
             for halvings in range(NETWORK.halvings):
                 tried = move + direction / 2**halvings
                 found = self.find_imbalance(deformation, tried, h)
@@ -171,7 +171,7 @@ class ElasticNetwork:
         # no more descent: round-off, if the balance is as good as it can be
         return move, error <= NETWORK.no_descent * self.load
 
-    def friction_step(self, deformation: Floats, h: float) -> tuple[Floats, bool]:
+    def find_friction_step(self, deformation: Floats, h: float) -> tuple[Floats, bool]:
         """The implicit step as a friction problem; move, whether found.
 
         With forces f for unknowns, ``u = (W + 1 / (k h)) f + J Q - xi / h``: a closed contact has
@@ -181,40 +181,40 @@ class ElasticNetwork:
         soft = self.delassus + sp.diags_array(1.0 / (h * self.stiffness.ravel()))
         offset = self.jacobian @ self.free - deformation.ravel() / h
         order, rows = self.own_order
-        problem = friction_problem(
+        problem = make_problem(
             sp.csr_array(sp.csr_array(soft)[rows][:, rows]), offset[rows], self.friction[order],
             deformation.shape[1],
         )  # fmt: skip
-        found = gauss_seidel(problem, self.force[rows], NETWORK.swept, NETWORK.sweeps)
+        found = solve_gauss_seidel(problem, self.force[rows], NETWORK.swept, NETWORK.sweeps)
         self.newton_steps += NETWORK.sweeps // 100  # the cost of as many sweeps
         if found.residual > NETWORK.exact:
-            polished = newton(problem, found.r, NETWORK.polished)
+            polished = solve_newton(problem, found.r, NETWORK.polished)
             self.newton_steps += int(polished.work.get("factorisations", 0.0))
             found = min(polished, found, key=lambda each: each.residual)
         if found.residual > NETWORK.most_residual:
             return np.zeros(self.jacobian.shape[1]), False
         self.force[rows] = found.r
         move = h * (self.free + self.jacobian.T @ self.force)
-        return self.coulomb_step(deformation, move, h, NETWORK.last_steps)
+        return self.find_coulomb_step(deformation, move, h, NETWORK.last_steps)
 
-    def frictionless_step(self, deformation: Floats, move: Floats, h: float) -> Floats:
+    def find_frictionless_step(self, deformation: Floats, move: Floats, h: float) -> Floats:
         """The move (ndof,) of least energy, from a first ``move``."""
 
-        def energy(move: Floats, trial: Floats) -> float:
+        def find_energy(move: Floats, trial: Floats) -> float:
             springs = float(np.sum(np.maximum(trial[:, 0], 0.0) ** 2 / (2 * self.stiffness[:, 0])))
             return float(move @ move / (2 * h) - self.free @ move + springs)
 
         trial, imbalance, error = self.find_imbalance(deformation, move, h)
-        value = energy(move, trial)
+        value = find_energy(move, trial)
         for _ in range(NETWORK.energy_steps):
             if error <= NETWORK.energy_balance * self.load:
                 break
-            direction = self.newton_direction(trial, imbalance, h)
+            direction = self.find_newton_direction(trial, imbalance, h)
             descent = float(imbalance @ direction)
             for halvings in range(NETWORK.energy_halvings):
                 tried = move + direction / 2**halvings
                 found = self.find_imbalance(deformation, tried, h)
-                value_tried = energy(tried, found[0])
+                value_tried = find_energy(tried, found[0])
                 promised = NETWORK.decrease * descent / 2**halvings
                 if value_tried <= value + promised + 1e-15 * abs(value):
                     break
@@ -223,11 +223,11 @@ class ElasticNetwork:
             move, value, (trial, imbalance, error) = tried, value_tried, found
         return move
 
-    def implicit_step(self, deformation: Floats, h: float) -> tuple[Floats, bool]:
+    def find_implicit_step(self, deformation: Floats, h: float) -> tuple[Floats, bool]:
         """Move d (ndof,) of one implicit step from deformations xi (nc, dim), whether found."""
         move = np.zeros(self.jacobian.shape[1])
         if not self.friction.any():
-            move = self.frictionless_step(deformation, move, h)
-            return self.coulomb_step(deformation, move, h, NETWORK.frictionless_steps)
-        found, converged = self.coulomb_step(deformation, move, h, NETWORK.first_steps)
-        return (found, True) if converged else self.friction_step(deformation, h)
+            move = self.find_frictionless_step(deformation, move, h)
+            return self.find_coulomb_step(deformation, move, h, NETWORK.frictionless_steps)
+        found, converged = self.find_coulomb_step(deformation, move, h, NETWORK.first_steps)
+        return (found, True) if converged else self.find_friction_step(deformation, h)

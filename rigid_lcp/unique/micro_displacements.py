@@ -6,8 +6,8 @@ displacements dq on top of their positions, these deform the contacts, and the d
 relaxed, overdamped, until the forces are consistent (eq. 27):
 
     xi = D dq                     (37)  deformations, [m]
-    f = f(xi)                     (38)  `rigid_lcp.unique.elastic_network.coulomb_spring`, or yours
-    a = A f + b                   (26)  contact accelerations
+    f = f(xi)                     (38)  `rigid_lcp.unique.elastic_network.find_spring_forces`, or
+    yours a = A f + b                   (26)  contact accelerations
     D (dq' - dq) = -h a           (40)  repeated until (27) holds
 
 What the paper leaves open, and what is done here:
@@ -18,14 +18,14 @@ What the paper leaves open, and what is done here:
 - D is said to be lengthy; in the coordinates of eqs 9 and 20 it is just ``-J``.
 - "We have to project -h a into the image space of D": ``A f = J M^-1 J^T f`` is in the image of J
   by itself, so only b can have a part outside.  It is projected once, by least squares
-  (`free_motion`), and eq. 40 is then solved exactly by ``dq' - dq = h M^-1 (Q + J^T f)``.
+  (`find_free_motion`), and eq. 40 is then solved exactly by ``dq' - dq = h M^-1 (Q + J^T f)``.
 - "As many variables as degrees of freedom, i.e., the system is unique": so it is for forces that
   are an increasing function of xi, hence without friction or with all contacts sticking, where
   the limit is the weighted minimum-norm solution (`rigid_lcp.unique.elastic_limit`).  Coulomb's law
   where contacts slide is no such function: the state reached can then depend on where the
   relaxation begins, so it begins at no displacements.
-- h is not given: `stable_step` derives it.  The number of iterations grows as the ratio of the
-  stiffest to the softest mode; `elastic_limit` finds the same forces without that cost.
+- h is not given: `find_stable_step` derives it.  The number of iterations grows as the ratio of the
+  stiffest to the softest mode; `find_elastic_limit` finds the same forces without that cost.
 - The last line of eq. 27 lacks ``a_T f_T <= 0``: friction opposes sliding.  The residual has it.
 """
 
@@ -41,8 +41,8 @@ from scipy.sparse.linalg import splu
 
 from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import ProblemError
-from rigid_lcp.friction.problem import BodySpace, FrictionProblem, Status, natural_residual
-from rigid_lcp.unique.elastic_network import coulomb_spring
+from rigid_lcp.friction.problem import BodySpace, FrictionProblem, Status, find_natural_residual
+from rigid_lcp.unique.elastic_network import find_spring_forces
 
 ForceLaw = Callable[[Floats, Floats, Floats], Floats]
 """Eq. 38: ``law(deformation, stiffness, friction) -> force``, see `coulomb_spring`."""
@@ -69,7 +69,7 @@ class ElasticForces:
         return self.status == "solved"
 
 
-def contact_stiffness(problem: FrictionProblem, stiffness: ArrayLike) -> Floats:
+def require_stiffness(problem: FrictionProblem, stiffness: ArrayLike) -> Floats:
     """Stiffness of every contact and direction (nc, dim) [N/m] from one number, (nc,) or (nc, dim).
 
     Only ratios matter for the forces.  Raises `ProblemError` for what is not above zero.
@@ -95,7 +95,7 @@ def contact_stiffness(problem: FrictionProblem, stiffness: ArrayLike) -> Floats:
     return np.array(np.broadcast_to(k[:, None] if k.ndim == 1 else k, shape))
 
 
-def mass_free_jacobian(bodies: BodySpace) -> tuple[sp.csr_array, sp.csr_array]:
+def scale_jacobian(bodies: BodySpace) -> tuple[sp.csr_array, sp.csr_array]:
     """``(J M^-1/2, M^-1/2)``: coordinates in which every body has unit mass, ``dq = M^-1/2 y``."""
     size, inverse = bodies.body_size, sp.coo_array(bodies.inverse_mass)
     row, column = inverse.coords
@@ -108,7 +108,7 @@ def mass_free_jacobian(bodies: BodySpace) -> tuple[sp.csr_array, sp.csr_array]:
     return sp.csr_array(bodies.jacobian @ root), root
 
 
-def stiffest_mode(jacobian: sp.csr_array, stiffness: Floats) -> float:
+def bound_stiffest_mode(jacobian: sp.csr_array, stiffness: Floats) -> float:
     """Bound from above on the greatest eigenvalue of ``K^1/2 A K^1/2`` [1/s^2].
 
     The greatest row sum of magnitudes (Gershgorin); ``jacobian`` is mass free.
@@ -118,7 +118,7 @@ def stiffest_mode(jacobian: sp.csr_array, stiffness: Floats) -> float:
     return float(sums.max(initial=0.0))
 
 
-def stable_step(jacobian: sp.csr_array, stiffness: Floats) -> float:
+def find_stable_step(jacobian: sp.csr_array, stiffness: Floats) -> float:
     """Step h [s^2] of eq. 40 at which no mode of sticking or frictionless contacts overshoots.
 
     A step multiplies the error of a mode of ``K^1/2 A K^1/2`` with eigenvalue l by ``1 - h l``: it
@@ -126,11 +126,11 @@ def stable_step(jacobian: sp.csr_array, stiffness: Floats) -> float:
     sliding contact alone has ``l <= (1 + mu^2)^1/2 l_max``, below 2 up to ``mu = 1.7``; for
     several there is no proof.
     """
-    mode = stiffest_mode(jacobian, stiffness)
+    mode = bound_stiffest_mode(jacobian, stiffness)
     return 1.0 / mode if mode > 0 else 1.0
 
 
-def free_motion(jacobian: sp.csr_array, offset: Floats) -> Floats:
+def find_free_motion(jacobian: sp.csr_array, offset: Floats) -> Floats:
     """Mass-free accelerations y (ndof,) without contact forces: least squares of ``J y = b``.
 
     This is the projection before eq. 40, and the external forces Q that belong to b.
@@ -148,7 +148,7 @@ def free_motion(jacobian: sp.csr_array, offset: Floats) -> Floats:
     return motion
 
 
-def bodies_of(problem: FrictionProblem) -> BodySpace:
+def require_bodies(problem: FrictionProblem) -> BodySpace:
     """The problem's bodies, which micro-displacements need; raises `ProblemError` without."""
     if problem.bodies is None:
         raise ProblemError(
@@ -158,24 +158,24 @@ def bodies_of(problem: FrictionProblem) -> BodySpace:
     return problem.bodies
 
 
-def micro_displacements(
+def relax_displacements(
     problem: FrictionProblem, stiffness: ArrayLike = 1.0, step: float | None = None,
-    tolerance: float = 1e-12, *, law: ForceLaw = coulomb_spring, iterations_max: int = 200_000,
+    tolerance: float = 1e-12, *, law: ForceLaw = find_spring_forces, iterations_max: int = 200_000,
 ) -> ElasticForces:  # fmt: skip
     """Contact forces by the paper's overdamped relaxation of micro-displacements, from none.
 
     ``problem`` with bodies; ``stiffness`` [N/m], see `contact_stiffness`; ``step`` h [s^2]
-    (default: `stable_step`); ``tolerance`` on the scale-free residual; ``law``: eq. 38.  Never
+    (default: `find_stable_step`); ``tolerance`` on the scale-free residual; ``law``: eq. 38.  Never
     raises for want of convergence: see ``status``.  When not to use it: for many grains, where
     `rigid_lcp.unique.elastic_limit` has the same answer at a fraction of the cost.
     """
-    bodies = bodies_of(problem)
+    bodies = require_bodies(problem)
     shape = (problem.contacts, problem.dim)
-    k = contact_stiffness(problem, stiffness)
-    jacobian, root = mass_free_jacobian(bodies)
-    free = root @ free_motion(jacobian, problem.offset)
+    k = require_stiffness(problem, stiffness)
+    jacobian, root = scale_jacobian(bodies)
+    free = root @ find_free_motion(jacobian, problem.offset)
     if step is None:
-        step = stable_step(jacobian, k)
+        step = find_stable_step(jacobian, k)
     displacement = np.zeros(len(free))
     lost = problem.offset - bodies.jacobian @ free
 
@@ -185,7 +185,7 @@ def micro_displacements(
         force = law(deformation, k, problem.friction)
         motion = bodies.inverse_mass @ (bodies.jacobian.T @ force.ravel()) + free
         acceleration = (bodies.jacobian @ motion + lost).reshape(shape)
-        residual = natural_residual(force, acceleration, problem.friction, problem.rho)
+        residual = find_natural_residual(force, acceleration, problem.friction, problem.rho)
         if not residual >= best[0]:
             best = (residual, force, displacement)
         if residual <= tolerance or not np.isfinite(residual):

@@ -4,16 +4,15 @@ from rigid_lcp.wear.abrasion import (
     Wear,
     WearState,
     replace_worn,
+    split_wear,
     start_wear,
     step_wear,
-    wear_on_after_break,
 )
-from rigid_lcp.wear.breakage import Breakage, Broken, break_scene, breaks, refuse_dust
+from rigid_lcp.wear.breakage import Breakage, Broken, break_scene, find_breaks, refuse_dust
 from rigid_lcp.wear.cuts import WornShape
 from rigid_lcp.wear.fragmentation import split_body
 
 __all__ = [
-    "Breakage", "Broken", "Wear", "WearState", "WornShape", "break_scene", "breaks",
-    "refuse_dust", "replace_worn", "split_body", "start_wear",
-    "step_wear", "wear_on_after_break",
+    "Breakage", "Broken", "Wear", "WearState", "WornShape", "break_scene", "find_breaks",
+    "refuse_dust", "replace_worn", "split_body", "split_wear", "start_wear", "step_wear",
 ]  # fmt: skip

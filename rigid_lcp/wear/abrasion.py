@@ -19,24 +19,24 @@ from sys import float_info
 import numpy as np
 
 from rigid_lcp.arrays import Floats, Ints
-from rigid_lcp.contact import FEATURE_BITS, MOST_EDGES, ContactForces, Contacts, contact_frames
+from rigid_lcp.contact import FEATURE_BITS, MOST_EDGES, ContactForces, Contacts, build_frames
 from rigid_lcp.errors import ShapeError
 from rigid_lcp.motion import (
     Body,
     Motion,
     Scene,
-    relative_velocity,
+    find_relative_velocity,
     require_number_in,
     require_whole_in,
 )
 from rigid_lcp.shapes import Polygon, Polyhedron, rotate_back
 from rigid_lcp.wear.cuts import (
     WornShape,
+    make_unworn,
     rub_corners,
-    unworn,
     wear_shape,
 )
-from rigid_lcp.wear.fragmentation import scene_at, take_on_motion
+from rigid_lcp.wear.fragmentation import make_part, restart_scene
 
 
 @dataclass(frozen=True)
@@ -79,22 +79,22 @@ class WearState:
 
 def start_wear(scene: Scene) -> WearState:
     """The grains of a scene as they are, nothing lost."""
-    return WearState([_unworn(body) for body in scene.bodies])
+    return WearState([_make_unworn(body) for body in scene.bodies])
 
 
-def wear_on_after_break(state: WearState, scene: Scene, body: int) -> WearState:
+def split_wear(state: WearState, scene: Scene, body: int) -> WearState:
     """The state of a scene in which ``body`` was broken and its second part added at the end.
 
     The parts are wear's new beginning; what the whole had not yet lost is dropped.
     """
     grains = list(state.grains)
-    grains[body] = _unworn(scene.bodies[body])
-    return replace(state, grains=[*grains, _unworn(scene.bodies[-1])])
+    grains[body] = _make_unworn(scene.bodies[body])
+    return replace(state, grains=[*grains, _make_unworn(scene.bodies[-1])])
 
 
-def _unworn(body: Body) -> WornShape | None:
+def _make_unworn(body: Body) -> WornShape | None:
     wears = body.movable and isinstance(body.shape, Polygon | Polyhedron)
-    return unworn(body.shape) if wears else None
+    return make_unworn(body.shape) if wears else None
 
 
 def find_features(state: WearState, contacts: Contacts, row: int) -> Iterator[tuple[int, Ints]]:
@@ -138,8 +138,8 @@ def find_slip_work(contacts: ContactForces, before: Motion, after: Motion, h: fl
         0.5 * (before.position + after.position), before.angle,
         0.5 * (before.velocity + after.velocity), 0.5 * (before.spin + after.spin),
     )  # fmt: skip
-    slip = relative_velocity(contacts, mean)
-    force = np.einsum("cij,cj->ci", contact_frames(contacts.normal), contacts.force)
+    slip = find_relative_velocity(contacts, mean)
+    force = np.einsum("cij,cj->ci", build_frames(contacts.normal), contacts.force)
     return np.maximum(-(force[:, 1:] * slip[:, 1:]).sum(axis=1), 0.0) * h
 
 
@@ -172,26 +172,26 @@ def replace_worn(scene: Scene, motion: Motion, state: WearState) -> tuple[Scene,
     Grains keep the motion of the whole: velocity ``v + w x d`` where the centre of mass is now.
     Raises `ShapeError` as `wear_shape` does.
     """
-    worn = scene_at(scene, motion)
+    worn = restart_scene(scene, motion)
     made = replace(state, grains=list(state.grains))
     for k, grain in enumerate(state.grains):
         try:
             cut = None if grain is None else wear_shape(grain)
         except ShapeError as error:
-            raise error.at(f"wear of {scene.called(k)}") from error
+            raise error.relocate(f"wear of {scene.name_body(k)}") from error
         if cut is None:
             continue
         made.grains[k], way = cut
         before = worn.bodies[k]
-        worn.bodies[k] = after = take_on_motion(before, cut[0].shape, way)
+        worn.bodies[k] = after = make_part(before, cut[0].shape, way)
         made.mass += before.mass - after.mass
-        made.energy += energy_of(before, scene.gravity) - energy_of(after, scene.gravity)
+        made.energy += find_energy(before, scene.gravity) - find_energy(after, scene.gravity)
     if all(new is old for new, old in zip(made.grains, state.grains, strict=True)):
         return None
     return worn, made
 
 
-def energy_of(body: Body, gravity: Floats) -> float:
+def find_energy(body: Body, gravity: Floats) -> float:
     """Kinetic and potential energy of a body [J]."""
     spin = rotate_back(body.angle, body.spin) if len(body.spin) == 3 else body.spin
     inertia = np.reshape(body.inertia, (len(spin), len(spin)))

@@ -37,7 +37,7 @@ from rigid_lcp.arrays import Floats
 from rigid_lcp.contact import ContactForces
 from rigid_lcp.errors import SceneError, ShapeError
 from rigid_lcp.motion import Body, Motion, Scene, require_number_in, require_whole_in
-from rigid_lcp.shapes import rotation_matrix
+from rigid_lcp.shapes import make_rotation
 from rigid_lcp.wear.cuts import find_volume
 from rigid_lcp.wear.fragmentation import split_body
 
@@ -60,7 +60,7 @@ class Break:
     """[Pa]"""
 
 
-def mean_stress(points: Floats, forces: Floats, centre: Floats, volume: float) -> Floats:
+def find_mean_stress(points: Floats, forces: Floats, centre: Floats, volume: float) -> Floats:
     """Mean stress of a grain, symmetric part, (dim, dim) [Pa], tension positive.
 
     ``points`` (n, dim) [m] and ``forces`` (n, dim) [N] on the grain; ``centre`` of mass (dim,);
@@ -70,7 +70,7 @@ def mean_stress(points: Floats, forces: Floats, centre: Floats, volume: float) -
     return np.asarray((stress + stress.T) / 2)
 
 
-def brazilian_tension(stress: Floats) -> float:
+def find_tension(stress: Floats) -> float:
     """Greatest tension [Pa] at the centre of a disc with mean ``stress`` (2, 2), see the module.
 
     Negative where even that is compression.
@@ -115,7 +115,7 @@ def find_splitting_line(
     apart = points[j] - points[i]
     distance = float(np.linalg.norm(apart))
     if points.shape[1] == 2:
-        tension = brazilian_tension(mean_stress(points, forces, centre, volume))
+        tension = find_tension(find_mean_stress(points, forces, centre, volume))
     else:
         tension = squeeze / distance**2
     if tension < strength:
@@ -198,7 +198,7 @@ def gather_forces(contacts: ContactForces, body: int) -> tuple[Floats, Floats]:
     )
 
 
-def breaks(
+def find_breaks(
     scene: Scene, motion: Motion, contacts: ContactForces, breakage: Breakage
 ) -> list[tuple[int, Break]]:
     """The grains that break under their contact forces, and where, by their number."""
@@ -251,7 +251,7 @@ def break_scene(scene: Scene, motion: Motion, body: int, line: Break) -> Scene |
 
 def find_plane_normal(body: Body, quaternion: Floats, along: Floats) -> Floats:
     """Normal of the plane through the line: across it, along the longest axis left (3D)."""
-    arms = body.shape.vertices @ rotation_matrix(quaternion).T
+    arms = body.shape.vertices @ make_rotation(quaternion).T
     across = arms - np.outer(arms @ along, along)
     _, vectors = np.linalg.eigh(across.T @ across)
     normal = vectors[:, -1] - (vectors[:, -1] @ along) * along

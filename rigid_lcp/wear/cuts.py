@@ -47,7 +47,7 @@ class WornShape:
     """Volume worn there and not yet cut off (k,); within round-off of zero it may be less."""
 
 
-def unworn(shape: Solid) -> WornShape:
+def make_unworn(shape: Solid) -> WornShape:
     """The shape as it is, nothing lost."""
     return WornShape(shape, np.zeros((0, shape.dim)), np.zeros(0), np.zeros(0))
 
@@ -117,37 +117,37 @@ def cut_shape(shape: Solid, normal: Floats, volume: float) -> tuple[Solid, Float
             f"{volume:.3g} {unit} wore off a grain of {whole:.3g} {unit} between two cuts",
             where="wear", remedy="cut more often (every), or take a smaller coefficient",
         )  # fmt: skip
-    depth = cut_depth(shape, normal, volume)
+    depth = find_cut_depth(shape, normal, volume)
     if depth < CUTS.least_depth * shape.reach:
         return None
     height = shape.vertices @ normal
     try:
-        return take_part(shape, height - height.max() + depth)
+        return cut_part(shape, height - height.max() + depth)
     except ShapeError:
         return None
 
 
-def take_part(shape: Solid, height: Floats) -> tuple[Solid, Floats]:
+def cut_part(shape: Solid, height: Floats) -> tuple[Solid, Floats]:
     """The part of a shape where ``height`` (v,) over a plane is negative, and where its centre of
     mass lies in the frame of ``shape`` (dim,) [m].
 
     Raises `ShapeError` for corners that can not be kept apart, or more edges than have names.
     """
-    part = type(shape)(cut_points(shape, height))
-    made = type(shape).of_corners(part.vertices)  # as a run that goes on makes it again
+    part = type(shape)(find_part_corners(shape, height))
+    made = type(shape).from_corners(part.vertices)  # as a run that goes on makes it again
     if len(made.edges) + 2 > (MOST_EDGES if shape.dim == 3 else 1 << FEATURE_BITS):
         raise ShapeError(f"it has {len(made.edges)} edges", where="cut", remedy="wear it less")
     return made, part.centroid
 
 
-def cut_points(shape: Solid, height: Floats) -> Floats:
+def find_part_corners(shape: Solid, height: Floats) -> Floats:
     """Corners (n, dim) of the part of a shape where ``height`` (v,) over a plane is negative.
 
     Corners nearly in the plane go to both parts as they are: slivers would have no faces.  Those
     of a polygon are in order.
     """
     on = np.abs(height) <= CUTS.clearance * shape.reach
-    first, second, share = cross_edges(shape, np.where(on, 0.0, height))
+    first, second, share = find_crossed_edges(shape, np.where(on, 0.0, height))
     crossing = (1 - share) * shape.vertices[first] + share * shape.vertices[second]
     kept = np.concatenate([np.flatnonzero(~on & (height < 0)), np.flatnonzero(on)])
     points = np.vstack([shape.vertices[kept], crossing])
@@ -156,7 +156,7 @@ def cut_points(shape: Solid, height: Floats) -> Floats:
     return points
 
 
-def cross_edges(shape: Solid, height: Floats) -> tuple[Ints, Ints, Floats]:
+def find_crossed_edges(shape: Solid, height: Floats) -> tuple[Ints, Ints, Floats]:
     """Both corners (m,) of the edges on which ``height`` (v,) changes its sign, and at which share
     (m, 1) of their length."""
     first, second = shape.edges[:, 0], shape.edges[:, 1]
@@ -165,7 +165,7 @@ def cross_edges(shape: Solid, height: Floats) -> tuple[Ints, Ints, Floats]:
     return first, second, (height[first] / (height[first] - height[second]))[:, None]
 
 
-def cut_depth(shape: Solid, normal: Floats, volume: float) -> float:
+def find_cut_depth(shape: Solid, normal: Floats, volume: float) -> float:
     """Depth t [m] to which a plane with ``normal`` takes ``volume`` off the top."""
     height = shape.vertices @ normal
     depths = np.unique(height.max() - height)
@@ -174,19 +174,19 @@ def cut_depth(shape: Solid, normal: Floats, volume: float) -> float:
         if below - above < 1e-13 * shape.reach:
             continue
         places = above + (below - above) * np.array([0.25, 0.5, 0.75])
-        areas = [section_area(shape, normal, height - height.max() + t) for t in places]
+        areas = [measure_section(shape, normal, height - height.max() + t) for t in places]
         # A(s) on s in [0, 1] through three places, and its integral
         area = np.polynomial.Polynomial.fit(
             [0.25, 0.5, 0.75], areas, 2, domain=[0, 1], window=[0, 1]
         )
         inside = area.integ() * float(below - above)
         if taken + float(inside(1.0)) >= volume:
-            return float(above + (below - above) * _root(inside, volume - taken))
+            return float(above + (below - above) * _find_root(inside, volume - taken))
         taken += float(inside(1.0))
     return float(depths[-1])
 
 
-def _root(rising: np.polynomial.Polynomial, value: float) -> float:
+def _find_root(rising: np.polynomial.Polynomial, value: float) -> float:
     """Where in [0, 1] a rising polynomial has a value: bisection to the last digit."""
     low, high = 0.0, 1.0
     while high - low > 1e-16 * high:
@@ -197,9 +197,9 @@ def _root(rising: np.polynomial.Polynomial, value: float) -> float:
     return high
 
 
-def section_area(shape: Solid, normal: Floats, height: Floats) -> float:
+def measure_section(shape: Solid, normal: Floats, height: Floats) -> float:
     """Area [m^2], in 2D length [m], of the section where ``height`` (v,) is zero at no corner."""
-    first, second, share = cross_edges(shape, height)
+    first, second, share = find_crossed_edges(shape, height)
     points = (1 - share) * shape.vertices[first] + share * shape.vertices[second]
     if shape.dim == 2:
         return float(np.linalg.norm(points[1] - points[0]))

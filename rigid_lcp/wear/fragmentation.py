@@ -16,13 +16,13 @@ from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import ShapeError
 from rigid_lcp.motion import Body, Motion, Scene, turn_arm
 from rigid_lcp.shapes import rotate, rotate_back
-from rigid_lcp.wear.cuts import CUTS, Solid, find_volume, take_part
+from rigid_lcp.wear.cuts import CUTS, Solid, cut_part, find_volume
 
 LEAST_WIDTH = 1e-3
 """Least width of a part across the cut in 2D, as a share of the width of the whole [-]."""
 
 
-def scene_at(scene: Scene, motion: Motion) -> Scene:
+def restart_scene(scene: Scene, motion: Motion) -> Scene:
     """The same bodies, starting from the state ``motion``."""
     made = Scene(scene.dim, scene.gravity)
     made.bodies = [
@@ -45,8 +45,8 @@ def split_body(
     number of the whole, the second is added at the end; surface values are those of the whole.
     Raises `ShapeError` for what can not be split: a disc, a fixed body, a sliver.
     """
-    made = scene_at(scene, motion)
-    whole, where = made.bodies[body], scene.called(body)
+    made = restart_scene(scene, motion)
+    whole, where = made.bodies[body], scene.name_body(body)
     if not whole.movable or not hasattr(whole.shape, "vertices"):
         raise ShapeError(
             "only polygons and polyhedra that move can be split", where=where,
@@ -54,13 +54,13 @@ def split_body(
         )  # fmt: skip
     height = measure_height(whole, np.asarray(point), np.asarray(direction), where)
     try:
-        parts = [take_part(whole.shape, side * height) for side in (-1.0, 1.0)]
+        parts = [cut_part(whole.shape, side * height) for side in (-1.0, 1.0)]
     except ShapeError as error:
         raise ShapeError(
             "the cut leaves corners too near to one another, or to a face, to be kept apart",
             where=where, remedy="move the plane a little",
         ) from error  # fmt: skip
-    made.bodies[body], added = (take_on_motion(whole, *part) for part in parts)
+    made.bodies[body], added = (make_part(whole, *part) for part in parts)
     made.bodies.append(added)
     return made
 
@@ -92,7 +92,7 @@ def measure_height(whole: Body, point: Floats, direction: Floats, where: str) ->
     return height
 
 
-def take_on_motion(whole: Body, shape: Solid, way: Floats) -> Body:
+def make_part(whole: Body, shape: Solid, way: Floats) -> Body:
     """A part of a body, its centre of mass a ``way`` (dim,) [m] off in the body frame, in the
     motion of the whole: ``v + w x d``."""
     mass, inertia = shape.mass_properties(whole.mass / find_volume(whole.shape))

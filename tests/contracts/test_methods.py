@@ -14,11 +14,11 @@ import pytest
 from rigid_lcp import solve_friction
 from rigid_lcp.errors import RigidError
 from rigid_lcp.friction.auto.solve import find_methods
-from rigid_lcp.friction.problem.cones import natural_residual
+from rigid_lcp.friction.problem.cones import find_natural_residual
 from rigid_lcp.friction.problem.definition import (
     FrictionProblem,
     FrictionSolution,
-    friction_problem,
+    make_problem,
 )
 from tests.rigid_static_problems import beam, pyramid, table, tower
 
@@ -67,7 +67,7 @@ def test_block_on_a_slope(name: str, mu: float, dim: int) -> None:
     q = np.zeros(dim)
     q[0], q[-1] = -weight, 0.4 * weight
     friction = min(0.4, mu) * weight
-    found = solve(friction_problem(np.eye(dim), q, mu, dim), name)
+    found = solve(make_problem(np.eye(dim), q, mu, dim), name)
     if found is None:
         return
     assert found.solved, found.message
@@ -95,7 +95,7 @@ def test_what_is_said_is_true(name: str, case: str) -> None:
     assert np.isfinite(found.r).all()
     np.testing.assert_allclose(found.u, problem.velocity(found.r), atol=1e-9)
     force, velocity = (x.reshape(-1, problem.dim) for x in (found.r, problem.velocity(found.r)))
-    residual = natural_residual(force, velocity, problem.friction, problem.rho)
+    residual = find_natural_residual(force, velocity, problem.friction, problem.rho)
     assert found.residual == pytest.approx(residual, rel=1e-3, abs=1e-14)
     assert not found.solved or residual <= TOLERANCE
     assert found.solved or "->" in found.message, f"{name} does not say what to do about a {case}"

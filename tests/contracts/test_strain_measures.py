@@ -12,7 +12,7 @@ import pytest
 from numba import njit
 from scipy.spatial.transform import Rotation
 
-from qdem_fem.element.kinematics import isotropic
+from qdem_fem.element.kinematics import apply_hooke
 from qdem_fem.element.strain_measures import MEASURES
 from qdem_fem.files import Floats
 
@@ -33,7 +33,7 @@ def draw_gradients(scale: float, seed: int = 0, count: int = 20) -> Floats:
 
 def stress_small(H: Floats) -> Floats:
     """Nominal stress of linear elasticity."""
-    return isotropic((H + np.swapaxes(H, 1, 2)) / 2, LAMBDA, MU)
+    return apply_hooke((H + np.swapaxes(H, 1, 2)) / 2, LAMBDA, MU)
 
 
 @every_measure

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters.bed.radii import expect_grain_count, sample_radii
+from adapters.bed.radii import draw_radii, expect_grain_count
 from adapters.bed.sample import draw_sample_start
 from adapters.bed.state import FloatArray
 from adapters.engines.contract import EngineStart, get_engine
@@ -21,7 +21,7 @@ from adapters.errors import EngineMissing, SceneError
 from adapters.files.window import Window, read_window
 from adapters.scene.file import load_scene
 from adapters.scene.tables import Scene
-from trackbed.scenes import scene_path
+from trackbed.scenes import find_scene_file
 
 SMALL = (
     "sample.count=60",
@@ -88,8 +88,8 @@ def computed(engine_name: str, launcher: tuple[str, ...], folder: Path) -> Windo
     """A cycle of rain, then two load cycles, each stage a fresh run of the scene's decks."""
     words = ", ".join(f'"{word}"' for word in launcher)
     overrides = (*SMALL, f'engine.name="{engine_name}"', f"engine.launcher=[{words}]")
-    scene = load_scene(scene_path("cluster"), overrides)
-    radius = sample_radii(scene.sample.grain_radius.law, scene.grain_count, scene.sample.seed)
+    scene = load_scene(find_scene_file("cluster"), overrides)
+    radius = draw_radii(scene.sample.grain_radius.law, scene.grain_count, scene.sample.seed)
     position, _ = draw_sample_start(radius, scene.container, 0.15, scene.sample.seed)
     start = start_at_rest(scene, position, radius, folder / "rain")
     engine, window = get_engine(engine_name), folder / "window"
@@ -131,7 +131,7 @@ def test_srun_takes_the_number_of_processes_from_the_job(
     srun.chmod(0o755)
     monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
     monkeypatch.setenv("SLURM_NTASKS", "2")
-    launcher = load_scene(scene_path("cluster")).engine.launcher
+    launcher = load_scene(find_scene_file("cluster")).engine.launcher
     assert launcher == ("srun",)
     computed("liggghts", launcher, tmp_path)
     assert grids(tmp_path) == {"2 by 1 by 1"}
@@ -140,12 +140,12 @@ def test_srun_takes_the_number_of_processes_from_the_job(
 def test_yade_has_no_use_for_srun() -> None:
     """It would run as often as the job has processes, in one folder."""
     with pytest.raises(SceneError, match="one process"):
-        load_scene(scene_path("cluster"), ['engine.name="yade"'])
+        load_scene(find_scene_file("cluster"), ['engine.name="yade"'])
 
 
 def test_what_the_scene_says_of_itself() -> None:
     """A million grains fill a third of a metre; piston mass and load an area are the paper's."""
-    cluster, paper = (load_scene(scene_path(name)) for name in ("cluster", "karrech"))
+    cluster, paper = (load_scene(find_scene_file(name)) for name in ("cluster", "karrech"))
     law = cluster.sample.grain_radius.law
     assert expect_grain_count(law, cluster.container, 1 / 3) == pytest.approx(1e6, rel=0.02)
 

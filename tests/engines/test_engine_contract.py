@@ -27,7 +27,7 @@ from adapters.procedure.run import run_scene
 from adapters.scene.file import load_scene
 from tests.engine_sample import AFTER, FIRST, JUMP, QUIET, SECOND, TINY, Sample, at_rest, window_of
 from tests.forked_commands import Commands, awaited, gone
-from trackbed.scenes import read_template, scene_path
+from trackbed.scenes import find_scene_file, read_template
 
 HISTORY = 7
 """Columns of ``history.txt``."""
@@ -204,7 +204,7 @@ def test_moved_grains_keep_their_springs(sample: Sample, tmp_path: Path) -> None
     history would have none.  Contacts that the shift leaves alone keep it.
     """
     before = at_rest(sample.window(SECOND).state(-1))
-    lifted = before.moved(before.position + np.array([0.0, 0.0, 1e-3]))
+    lifted = before.move_to(before.position + np.array([0.0, 0.0, 1e-3]))
     start = sample.start(SECOND)
     start = replace(
         start,
@@ -244,7 +244,7 @@ def test_new_contacts_start_without_a_spring(sample: Sample, tmp_path: Path) -> 
     start = sample.start(SECOND)
     start = replace(
         start,
-        moved=before.moved(position),
+        moved=before.move_to(position),
         piston_mesh=start.piston_mesh + 1,
         piston_height=max(start.piston_height, position[top, 2] + before.radius[top]),
     )
@@ -350,8 +350,10 @@ def test_other_scenes(name: str, tmp_path: Path, changes: tuple[str, ...]) -> No
     """Less, or other, physics is prepared, loaded and read: without friction no deck and no file
     has a tangential force, and a piston on a part of the section presses that part only."""
     overrides = (*TINY, *SHORT, "procedure.total_cycles=4", f'engine.name="{name}"', *changes)
-    run_scene(scene_path("karrech-coarse"), tmp_path / "run", overrides=overrides, progress=QUIET)
-    scene = load_scene(scene_path("karrech-coarse"), overrides)
+    run_scene(
+        find_scene_file("karrech-coarse"), tmp_path / "run", overrides=overrides, progress=QUIET
+    )
+    scene = load_scene(find_scene_file("karrech-coarse"), overrides)
     window = window_of(tmp_path / "run", "window_000001")
     assert len(window) == 3
     error = np.sqrt(np.mean((window.piston.contact_force - window.piston.target_force) ** 2))

@@ -24,7 +24,7 @@ from adapters.errors import EngineFailed, EngineMissing, TrackbedError
 from adapters.scene.file import load_scene
 from adapters.scene.tables import Scene
 from tests.engine_sample import FIRST, SECOND, TINY, Sample, at_rest
-from trackbed.scenes import scene_path
+from trackbed.scenes import find_scene_file
 
 pytestmark = pytest.mark.engine("lammps")
 
@@ -261,7 +261,7 @@ def test_runs_where_neither_apt_engine_is(tmp_path: Path) -> None:
     words = [word for override in (*TINY, *SHORT) for word in ("--set", override)]
     words += ["--engine", "lammps", "--run-folder", str(tmp_path / "run")]
     done = subprocess.run(
-        [sys.executable, "-m", "trackbed", "run", str(scene_path("karrech-coarse")), *words],
+        [sys.executable, "-m", "trackbed", "run", str(find_scene_file("karrech-coarse")), *words],
         env=os.environ | {"PATH": str(tmp_path / "nothing")},
         cwd=Path(trackbed.__file__).parents[1], capture_output=True, text=True,
     )  # fmt: skip
@@ -276,7 +276,7 @@ def test_auto_is_lammps_where_nothing_else_is(
     """The default engine of a user without root, whose scene need not name one."""
     monkeypatch.setenv("PATH", str(tmp_path))
     assert get_engine("auto").name == "lammps"
-    text = scene_path("karrech-coarse").read_text()
+    text = find_scene_file("karrech-coarse").read_text()
     scene_file = tmp_path / "scene.toml"
     scene_file.write_text(re.sub(r'^name = "auto".*\n', "", text, flags=re.MULTILINE))
     assert scene_file.read_text() != text

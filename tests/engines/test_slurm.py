@@ -20,7 +20,7 @@ import pytest
 from adapters.files.run_folder import RunFolder
 from tests.engines.test_cluster_scene import SMALL
 from tests.forked_commands import processes_in
-from trackbed.scenes import scene_path
+from trackbed.scenes import find_scene_file
 
 ROOT = Path(__file__).parents[2]
 TINY = (
@@ -74,7 +74,7 @@ class JobSweep:
         self.launcher("bad", 'echo "ERROR: no licence"; exit 3')
         (folder / "cluster.toml").write_text(CLUSTER)
         scene = folder / "scene.toml"
-        scene.write_text(scene_path("karrech-coarse").read_text())
+        scene.write_text(find_scene_file("karrech-coarse").read_text())
         where = ["--scheduler", "slurm", "--cluster-config", folder / "cluster.toml"]
         self.words = [
             "sweep", scene, *set_words(settings), *words, "--into", self.into, *where, "--json",
@@ -173,7 +173,7 @@ def test_srun_starts_the_engine(
         "procedure.total_cycles=3",
     ]  # fmt: skip
     answer("srun", f"--mpi={mpi}", "-n", 1, "true")  # the plugin may lack its library
-    (tmp_path / "scene.toml").write_text(scene_path("cluster").read_text())
+    (tmp_path / "scene.toml").write_text(find_scene_file("cluster").read_text())
     text = JOB.format(python=sys.executable).rstrip()
     words = shlex.join(set_words(settings))
     (tmp_path / "job.sh").write_text(f"{text} {words}\n")

@@ -14,19 +14,19 @@ from adapters.bed import contact_law as law
 from adapters.bed.sample import GRAVITY
 from adapters.bed.state import FloatArray
 from adapters.engines.contract import EngineStart
-from adapters.engines.yade import YadeEngine, damping_ratio
+from adapters.engines.yade import YadeEngine, find_damping_ratio
 from adapters.files.window import Window, read_state, read_window
 from adapters.scene.file import load_scene
 from adapters.scene.tables import Scene
 from tests import engine_sample
 from tests.yade_few_grains import track_run
 from trackbed.scenes import read_template
-from validation.bench.few_grains import RADIUS, Track, grain_mass, head_on, table_1
+from validation.bench.few_grains import RADIUS, Track, collide, find_grain_mass, load_table_1
 
 pytestmark = pytest.mark.engine("yade")
 
 ALPHA = 0.44
-PAIR_MASS = grain_mass(table_1()) / 2
+PAIR_MASS = find_grain_mass(load_table_1()) / 2
 """Effective mass of two grains of Table 1 [kg]."""
 ENGINE = YadeEngine()
 TINY = ('engine.name="yade"', *engine_sample.TINY[:4])
@@ -44,13 +44,13 @@ def test_alpha_is_the_viscous_force_and_contacts_never_pull(speed: float) -> Non
     So grains rebound with 0.335 instead of the paper's 0.2145, at any speed.  With 1,000 steps in
     the contact the first-order error is 4e-4: bar 2e-3.
     """
-    scene = table_1(f"material.grain.viscous_alpha={ALPHA}")
-    hit, _ = head_on(scene, speed, run=track_run)
+    scene = load_table_1(f"material.grain.viscous_alpha={ALPHA}")
+    hit, _ = collide(scene, speed, run=track_run)
     ratio = law.DAMPING_FACTOR * ALPHA
-    expected = law.collision(
+    expected = law.solve_collision(
         speed, scene.stiffness.grain, RADIUS / 2, PAIR_MASS, ratio, may_pull=False
     )
-    assert damping_ratio(scene) == ratio
+    assert find_damping_ratio(scene) == ratio
     assert expected.restitution == pytest.approx(0.335, abs=5e-4)
     assert hit.restitution == pytest.approx(expected.restitution, rel=2e-3)
     assert hit.overlap_max == pytest.approx(expected.overlap_max, rel=2e-3)
@@ -60,11 +60,11 @@ def test_alpha_is_the_viscous_force_and_contacts_never_pull(speed: float) -> Non
 @pytest.mark.long
 def test_restitution_is_the_rebound(restitution: float) -> None:
     """A scene that names a restitution gets it: more damping makes up for the missing pull."""
-    scene = table_1(f"material.grain.restitution={restitution}")
-    hit, _ = head_on(scene, 0.1, run=track_run)
+    scene = load_table_1(f"material.grain.restitution={restitution}")
+    hit, _ = collide(scene, 0.1, run=track_run)
     assert hit.restitution == pytest.approx(restitution, rel=2e-3)
-    literal = law.DAMPING_FACTOR * law.alpha_of_restitution(restitution)
-    assert damping_ratio(scene) > literal
+    literal = law.DAMPING_FACTOR * law.find_alpha(restitution)
+    assert find_damping_ratio(scene) > literal
 
 
 # --- walls, each hit by one grain -----------------------------------------------------------
@@ -72,7 +72,9 @@ def test_restitution_is_the_rebound(restitution: float) -> None:
 
 def hit_wall(scene: Scene, place: FloatArray, inward: FloatArray, speed: float) -> Track:
     """A grain that meets a wall at ``place`` [m] straight, from 2.25 steps away."""
-    expected = law.hertz_collision(speed, scene.stiffness.wall, RADIUS, grain_mass(scene))
+    expected = law.solve_hertz_collision(
+        speed, scene.stiffness.wall, RADIUS, find_grain_mass(scene)
+    )
     step = expected.contact_time / 500
     start = place + (RADIUS + 2.25 * speed * step) * inward
     motion = ["fix motion all nve/sphere", "run 800"]
@@ -86,7 +88,7 @@ def test_walls_are_flat_and_hertzian(name: str) -> None:
 
     A triangle covers a whole side, so a grain is pushed once wherever it meets it.
     """
-    scene = table_1("material.grain.restitution=1.0", 'engine.name="yade"')
+    scene = load_table_1("material.grain.restitution=1.0", 'engine.name="yade"')
     container = scene.container
     place, inward = np.array([0.02, 0.02, 0.0]), np.array([0.0, 0.0, 1.0])
     if name != "floor":
@@ -97,12 +99,12 @@ def test_walls_are_flat_and_hertzian(name: str) -> None:
         place = -container.radius * inward + [0.0, 0.0, 0.02]
         if name == "seam":  # nearly at the edge to the next side: the grain would touch both
             place = place + (half - 2e-4) * along
-    expected = law.hertz_collision(0.1, scene.stiffness.wall, RADIUS, grain_mass(scene))
+    expected = law.solve_hertz_collision(0.1, scene.stiffness.wall, RADIUS, find_grain_mass(scene))
     track = hit_wall(scene, place, inward, 0.1)
     depth = RADIUS - (track.position[:, 0] - place) @ inward
     assert depth.max() == pytest.approx(expected.overlap_max, rel=1e-5)
     assert np.linalg.norm(track.velocity[-1, 0]) == pytest.approx(0.1, rel=1e-5)
-    peak = law.normal_force(expected.overlap_max, scene.stiffness.wall, RADIUS)
+    peak = law.find_normal_force(expected.overlap_max, scene.stiffness.wall, RADIUS)
     assert np.linalg.norm(track.force[:, 0], axis=1).max() == pytest.approx(float(peak), rel=1e-5)
 
 
@@ -143,11 +145,11 @@ class Bed:
     def __init__(self, folder: Path, *overrides: str) -> None:
         self.folder = folder
         self.scene = scene_load_text(read_template("karrech-coarse"), *TINY, *overrides)
-        from adapters.bed.radii import sample_radii
+        from adapters.bed.radii import draw_radii
         from adapters.bed.sample import draw_sample_start
 
         scene = self.scene
-        radius = sample_radii(scene.sample.grain_radius.law, 40, 1)
+        radius = draw_radii(scene.sample.grain_radius.law, 40, 1)
         position, height = draw_sample_start(radius, scene.container, 0.05, 1)
         prepared = folder / "preparation"
         prepared.mkdir()
@@ -192,7 +194,7 @@ def test_piston_moves_by_its_forces(bed: Bed) -> None:
     """M dv/dt = F_contact - F_target, step by step: no weight, no drag, nothing added at a seam.
 
     YADE adds what was worked out outside a step to the next one unless it is summed up first: the
-    step at each cycle end would get the load twice (`bed.forces_renew`).
+    step at each cycle end would get the load twice (`bed.renew_forces`).
     """
     scene = bed.scene
     track = bed.computed(bed.after(), 2, "steps", track_steps=1).piston

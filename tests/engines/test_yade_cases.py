@@ -15,7 +15,7 @@ from adapters.engines.yade import DISC_CORNERS
 from tests.engines.test_yade import ALPHA, Bed
 from tests.yade_few_grains import track_run
 from tests.yade_piston import piston_forces, scene_partial
-from validation.bench.few_grains import table_1
+from validation.bench.few_grains import load_table_1
 
 SCRIPTS = [path for path in files("yade_scripts").iterdir() if path.name.endswith(".py")]
 
@@ -49,7 +49,7 @@ def test_a_load_cycle_is_one_call_of_the_engine() -> None:
 @pytest.mark.long
 def test_nothing_damps_but_contacts() -> None:
     """A grain that touches nothing keeps velocity and step: no numerical damping, a fixed step."""
-    scene = table_1(f"material.grain.viscous_alpha={ALPHA}")
+    scene = load_table_1(f"material.grain.viscous_alpha={ALPHA}")
     step, speed = 1e-6, 0.3
     track = track_run(
         scene,
@@ -87,7 +87,7 @@ def test_a_partial_piston_pushes_once() -> None:
         np.array([at(0.5 * reach, 5), at(0.8 * reach, 14), at(0.6 * reach, 10), at(near, 19.5)]),
     ]
     force, changed = piston_forces(scene, looks, height)
-    flat = float(law.normal_force(overlap, scene.stiffness.wall, radius))
+    flat = float(law.find_normal_force(overlap, scene.stiffness.wall, radius))
     expected = np.array([[1, 1, 2, 1], [1, 1, 2, 0], [1, 1, 1, 1]])
     assert -force[..., 2] / flat == pytest.approx(expected, abs=1e-6)
     assert list(changed) == [0, 1, 1]

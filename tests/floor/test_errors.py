@@ -34,7 +34,7 @@ def test_an_error_says_what_where_and_what_to_do() -> None:
     """The three parts of an error stand in its text; an error moved names the other place."""
     error = TrackbedError("it is broken", where="here", remedy="mend it")
     assert str(error) == "here: it is broken\n  -> mend it"
-    assert str(error.at("there")) == "there: it is broken\n  -> mend it"
+    assert str(error.relocate("there")) == "there: it is broken\n  -> mend it"
 
 
 @pytest.mark.parametrize("verb", DOORS)

@@ -47,7 +47,7 @@ def test_second_writer_is_refused(room: str, tmp_path: Path) -> None:
     """Another process gets the pid of the first; when the first is gone the folder is free."""
     code = (
         f"import sys; from pathlib import Path; from {room} import RunFolder\n"
-        "with RunFolder(Path(sys.argv[1])).locked():\n"
+        "with RunFolder(Path(sys.argv[1])).lock():\n"
         "    print('in', flush=True); sys.stdin.read()"
     )
     name = "lock" if room.startswith("adapters") else ".lock"
@@ -76,7 +76,7 @@ def test_links_are_refused(tmp_path: Path, name: str) -> None:
     folder = Folder(tmp_path / "run")
     folder.path.mkdir()
     (folder.path / name).symlink_to(tmp_path / "mine")
-    with pytest.raises(UsageError, match=rf"run: .*symbolic link \({name}\)"), folder.locked():
+    with pytest.raises(UsageError, match=rf"run: .*symbolic link \({name}\)"), folder.lock():
         pass
     assert (tmp_path / "mine").read_text() == "mine"
 
@@ -195,8 +195,8 @@ def test_an_empty_folder_is_taken_and_a_run_goes_on(tmp_path: Path) -> None:
     folder = Folder(tmp_path)
 
     def settle(resume: bool = False, force: bool = False, **scene: Any) -> bool:
-        with folder.locked():
-            return folder.settle(manifest(**scene), "text", resume=resume, force=force)
+        with folder.lock():
+            return folder.prepare(manifest(**scene), "text", resume=resume, force=force)
 
     assert settle() is False
     with pytest.raises(UsageError, match="is not finished"):
@@ -220,7 +220,7 @@ def test_an_empty_folder_is_taken_and_a_run_goes_on(tmp_path: Path) -> None:
 def test_runs_of_the_first_version_go_on(tmp_path: Path) -> None:
     """Their manifests have no format."""
     (tmp_path / "manifest.json").write_text(json.dumps(manifest()))
-    assert Folder(tmp_path).settle(manifest(), "text", resume=True, force=False)
+    assert Folder(tmp_path).prepare(manifest(), "text", resume=True, force=False)
 
 
 @pytest.mark.parametrize("damage", ["", "[]", '{"scene": '])
@@ -231,7 +231,7 @@ def test_states_without_their_manifest_are_not_lost(tmp_path: Path, damage: str)
         (tmp_path / "manifest.json").write_text(damage)
     for resume in (True, False):
         with pytest.raises(UsageError, match="missing or can not be read"):
-            Folder(tmp_path).settle(manifest(), "text", resume=resume, force=False)
+            Folder(tmp_path).prepare(manifest(), "text", resume=resume, force=False)
     assert (tmp_path / "state_1").read_text() == "hours"
 
 
@@ -239,14 +239,14 @@ def test_a_folder_of_others_is_never_taken(tmp_path: Path) -> None:
     """There may be anything behind a typo, --force or not."""
     (tmp_path / "thesis.tex").write_text("mine")
     with pytest.raises(UsageError, match=r"other files .thesis\.tex"):
-        Folder(tmp_path).settle(manifest(), "text", resume=False, force=True)
+        Folder(tmp_path).prepare(manifest(), "text", resume=False, force=True)
     assert tree(tmp_path) == {"thesis.tex": b"mine"}
 
 
 def test_a_folder_that_was_replaced_is_noticed(tmp_path: Path) -> None:
     """Removed and made again by another while we hold the lock."""
     folder = Folder(tmp_path / "run")
-    with folder.locked():
+    with folder.lock():
         folder.refuse_if_replaced()
         (folder.path / ".lock").unlink()
         with pytest.raises(UsageError, match="removed or replaced"):

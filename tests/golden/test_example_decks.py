@@ -13,11 +13,11 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 
-from adapters.bed.radii import sample_radii
+from adapters.bed.radii import draw_radii
 from adapters.bed.sample import draw_sample_start
 from adapters.engines.contract import EngineStart, get_engine
 from adapters.scene.file import load_scene
-from trackbed.scenes import scene_path
+from trackbed.scenes import find_scene_file
 
 ENGINES = {"liggghts": "piston.stl", "lammps": "piston_wall.in"}
 """Engine, and the file of its piston."""
@@ -40,9 +40,9 @@ def example(name: str) -> Path:
 
 def example_write(name: str, folder: Path) -> None:
     """The generated files of the rain and of the first window, in one folder."""
-    scene = load_scene(scene_path("karrech-coarse"), (f'engine.name="{name}"', *BED))
+    scene = load_scene(find_scene_file("karrech-coarse"), (f'engine.name="{name}"', *BED))
     engine = get_engine(name)
-    radius = sample_radii(scene.sample.grain_radius.law, scene.grain_count, scene.sample.seed)
+    radius = draw_radii(scene.sample.grain_radius.law, scene.grain_count, scene.sample.seed)
     position, height = draw_sample_start(
         radius, scene.container, scene.sample.relative_density_start, scene.sample.seed
     )

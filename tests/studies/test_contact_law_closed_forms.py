@@ -11,18 +11,18 @@ from adapters.bed import contact_law
 from validation.studies.contact_law.closed_forms import (
     LAW_OF_ENGINE,
     Law,
-    contact_time,
-    friction_impulse,
-    mean_overlap,
-    peak_force,
-    pull_factor,
-    sliding_begins,
-    sliding_rebound_tangent,
-    sliding_spin,
-    sliding_tangential_restitution,
+    find_contact_time,
+    find_mean_overlap,
+    find_peak_force,
+    find_pull_factor,
+    find_rebound_tangent,
+    find_sliding_restitution,
+    find_sliding_spin,
+    find_sliding_start,
+    integrate_impulse,
 )
-from validation.studies.contact_law.engine_runs import Motion, law_text, restitution_given
-from validation.studies.contact_law.impacts import pair_of, rebound_of
+from validation.studies.contact_law.engine_runs import Motion, choose_restitution, edit_law
+from validation.studies.contact_law.impacts import find_pair, measure_rebound
 from validation.studies.contact_law.settings import (
     COPPER,
     NORMAL,
@@ -47,19 +47,19 @@ PUBLISHED = {
 @pytest.mark.parametrize("setting", NORMAL, ids=lambda s: s.material.name)
 def test_hertz_gives_the_known_numbers(setting: Setting) -> None:
     """Overlap, force, and t_c = 2.87 (m*^2/(R* E*^2 V))^(1/5); 2.87 is rounded, by 6e-4."""
-    pair, speed = pair_of(setting), setting.impacts[0].normal
+    pair, speed = find_pair(setting), setting.impacts[0].normal
     overlap, force, time = PUBLISHED[setting.material.name]
     law = (pair.mass, pair.radius, pair.modulus, speed)
-    hit = contact_law.hertz_collision(speed, pair.modulus, pair.radius, pair.mass)
+    hit = contact_law.solve_hertz_collision(speed, pair.modulus, pair.radius, pair.mass)
     assert hit.overlap_max == pytest.approx(overlap, rel=3e-5)
-    assert peak_force(*law) == pytest.approx(force, rel=1e-4)
+    assert find_peak_force(*law) == pytest.approx(force, rel=1e-4)
     assert hit.contact_time == pytest.approx(time, rel=3e-5)
-    assert contact_time(*law) == pytest.approx(time, rel=7e-4)
+    assert find_contact_time(*law) == pytest.approx(time, rel=7e-4)
 
 
 def test_unequal_spheres_combine() -> None:
     """1/R* = 1/R_1 + 1/R_2; a thousand times the density of 125 times the volume hardly moves."""
-    pair, alone = pair_of(TEST_8), pair_of(TEST_2)
+    pair, alone = find_pair(TEST_8), find_pair(TEST_2)
     assert pair.radius == pytest.approx(0.1 * 0.5 / 0.6)
     mass = 4 / 3 * np.pi * 0.1**3 * TEST_8.material.density
     assert pair.mass == pytest.approx(mass * 125e3 / (125e3 + 1))
@@ -71,26 +71,26 @@ def test_mean_overlap_is_the_integral() -> None:
     x = np.sin(np.linspace(0, np.pi / 2, 20_001)) ** 0.8  # delta, dense at both ends
     middle, step = (x[1:] + x[:-1]) / 2, np.diff(x)
     weight = step * middle**1.5 / np.sqrt(1 - middle**2.5)
-    deepest = contact_law.hertz_collision(1.0, 1.0, 1.0, 1.0).overlap_max
-    share = mean_overlap(1.0, 1.0, 1.0, 1.0) / deepest
+    deepest = contact_law.solve_hertz_collision(1.0, 1.0, 1.0, 1.0).overlap_max
+    share = find_mean_overlap(1.0, 1.0, 1.0, 1.0) / deepest
     assert share == pytest.approx(np.sum(weight * middle) / np.sum(weight), rel=2e-3)
 
 
 def test_sliding_limits_of_test_4() -> None:
     """Sliding begins at 32.52 degrees; at 60 degrees e_t = 0.8948 and the spin is 355.2 rad/s."""
     mu, e = TEST_4.friction, TEST_4.restitution
-    assert np.degrees(np.arctan(sliding_begins(mu, e))) == pytest.approx(32.52, abs=5e-3)
+    assert np.degrees(np.arctan(find_sliding_start(mu, e))) == pytest.approx(32.52, abs=5e-3)
     tangent = np.tan(np.radians([60.0]))
-    assert sliding_tangential_restitution(tangent, mu, e)[0] == pytest.approx(0.8948, abs=5e-5)
-    spin = sliding_spin(mu, e) * 3.9 * np.cos(np.radians(60)) / TEST_4.radius
+    assert find_sliding_restitution(tangent, mu, e)[0] == pytest.approx(0.8948, abs=5e-5)
+    spin = find_sliding_spin(mu, e) * 3.9 * np.cos(np.radians(60)) / TEST_4.radius
     assert spin == pytest.approx(355.2, abs=0.05)
 
 
 def test_sliding_limits_of_test_5() -> None:
     """In units of mu and for e = 1: rebound angle = incidence - 7, spin = 5."""
     mu = 0.3
-    assert sliding_rebound_tangent(np.array([10 * mu]), mu, 1.0) / mu == pytest.approx(3.0)
-    assert sliding_spin(mu, 1.0) / mu == pytest.approx(5.0)
+    assert find_rebound_tangent(np.array([10 * mu]), mu, 1.0) / mu == pytest.approx(3.0)
+    assert find_sliding_spin(mu, 1.0) / mu == pytest.approx(5.0)
 
 
 @pytest.mark.parametrize("rule", ["secant", "incremental", "rescaled"])
@@ -102,9 +102,9 @@ def test_reference_slides_and_sticks(rule: str, restitution: float) -> None:
     """
     mu, limit, law = 0.3, 0.3 * (1 + restitution), Law(rule)
     slip = np.array([-60 * mu, 0.0, 60 * mu])
-    found = friction_impulse(slip, mu, restitution, 1.2, law, steps=4000)
+    found = integrate_impulse(slip, mu, restitution, 1.2, law, steps=4000)
     assert found == pytest.approx([-limit, 0.0, limit], rel=5e-3)
-    held = friction_impulse(np.array([0.01]), 1.0, restitution, 1.2, law, steps=4000)
+    held = integrate_impulse(np.array([0.01]), 1.0, restitution, 1.2, law, steps=4000)
     assert abs(held[0]) < 2 * 0.01 / 3.5  # no spring turns the slip round entirely
 
 
@@ -112,7 +112,7 @@ def test_reference_converges() -> None:
     """Half the step, half the distance, or less: the reference's own error is below 1e-3 mu."""
     slip = 0.3 * np.array([1.0, 3.0, 5.0])
     steps = (2_500, 5_000, 10_000, 20_000)
-    found = [friction_impulse(slip, 0.3, 0.5, 1.2, Law("rescaled"), n) for n in steps]
+    found = [integrate_impulse(slip, 0.3, 0.5, 1.2, Law("rescaled"), n) for n in steps]
     moves = [np.abs(b - a).max() for a, b in pairwise(found)]
     assert moves[2] < 0.6 * moves[0]
     assert moves[2] < 1e-3 * 0.3
@@ -126,11 +126,11 @@ def test_pull_and_damping_alone() -> None:
     slip, mu, e = np.array([8.0]), 0.4, 0.5
 
     def excess(law: Law, restitution: float = e) -> float:
-        found = friction_impulse(slip, mu, restitution, 1.2, law, steps=4000)[0]
+        found = integrate_impulse(slip, mu, restitution, 1.2, law, steps=4000)[0]
         return float(found / (mu * (1 + restitution)) - 1)
 
     pulled = excess(LAW_OF_ENGINE["lammps"])
-    assert pulled == pytest.approx(pull_factor(e) - 1, abs=1e-3)
+    assert pulled == pytest.approx(find_pull_factor(e) - 1, abs=1e-3)
     assert excess(Law("rescaled", damping="within")) == pytest.approx(0, abs=1e-3)
     assert excess(Law("secant", damping="beyond")) > 0.1
     assert excess(LAW_OF_ENGINE["liggghts"]) > excess(Law("secant", damping="beyond"))
@@ -140,8 +140,8 @@ def test_pull_and_damping_alone() -> None:
 
 def test_pull_is_what_eq_7_adds() -> None:
     """Nothing for e = 1; 6.7 % for e = 0.5, the integral of |F_n| over (1 + e) m* V."""
-    assert pull_factor(1.0) == pytest.approx(1.0, abs=1e-9)
-    assert pull_factor(0.5) == pytest.approx(1.0670, abs=1e-4)
+    assert find_pull_factor(1.0) == pytest.approx(1.0, abs=1e-9)
+    assert find_pull_factor(0.5) == pytest.approx(1.0670, abs=1e-4)
 
 
 def test_rebound_reads_a_made_motion() -> None:
@@ -162,7 +162,7 @@ def test_rebound_reads_a_made_motion() -> None:
     spin[0, :, 1] = -3.0
     spin[1, :, 1] = -3.0 + 2.5 * impulse / 2 / 0.1
     none = np.zeros((2, 2, 3))
-    found = rebound_of(setting, Motion(np.array([0.0, 1.0]), none, velocity, spin, none))
+    found = measure_rebound(setting, Motion(np.array([0.0, 1.0]), none, velocity, spin, none))
     assert found.restitution == pytest.approx([0.5])
     assert found.slip_before == pytest.approx([slip / 0.4])
     assert found.slip_after == pytest.approx([0.0], abs=1e-12)
@@ -174,18 +174,18 @@ def test_rebound_reads_a_made_motion() -> None:
 def test_sliding_law_changes_what_it_says() -> None:
     """No pull and no tangential damping, in each engine's words; none under the scenes' law."""
     lammps = "pair_coeff * * hertz 1 0.5 tangential mindlin_rescale/force 2 0.9 0.5 damping x"
-    assert law_text("lammps", "scene", lammps) == lammps
-    assert "force 2 0.0 0.5" in law_text("lammps", "sliding", lammps)
+    assert edit_law("lammps", "scene", lammps) == lammps
+    assert "force 2 0.0 0.5" in edit_law("lammps", "sliding", lammps)
     pair = "pair_style gran model ${contact_model}\n"
-    assert "limitForce on" in law_text("liggghts", "sliding", pair)
+    assert "limitForce on" in edit_law("liggghts", "sliding", pair)
     yade = '{"damping_tangential": 0.2, "friction": 1}'
-    assert law_text("yade", "sliding", yade) == '{"damping_tangential": 0.0, "friction": 1}'
-    assert "limitForce" not in law_text("liggghts", "undamped", pair)
-    assert "tangential_damping" not in law_text("liggghts", "unpulled", pair)
-    assert "limit_damping" not in law_text("lammps", "undamped", lammps)
-    assert "force 2 0.9 0.5" in law_text("lammps", "unpulled", lammps)
-    assert law_text("yade", "unpulled", yade) == yade
-    assert restitution_given("yade", "sliding", 0.5) == 0.5
-    assert restitution_given("lammps", "undamped", 0.5) == 0.5
-    assert restitution_given("lammps", "scene", 0.5) == 0.5
-    assert restitution_given("lammps", "sliding", 0.5) < 0.5
+    assert edit_law("yade", "sliding", yade) == '{"damping_tangential": 0.0, "friction": 1}'
+    assert "limitForce" not in edit_law("liggghts", "undamped", pair)
+    assert "tangential_damping" not in edit_law("liggghts", "unpulled", pair)
+    assert "limit_damping" not in edit_law("lammps", "undamped", lammps)
+    assert "force 2 0.9 0.5" in edit_law("lammps", "unpulled", lammps)
+    assert edit_law("yade", "unpulled", yade) == yade
+    assert choose_restitution("yade", "sliding", 0.5) == 0.5
+    assert choose_restitution("lammps", "undamped", 0.5) == 0.5
+    assert choose_restitution("lammps", "scene", 0.5) == 0.5
+    assert choose_restitution("lammps", "sliding", 0.5) < 0.5

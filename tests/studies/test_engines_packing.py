@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from adapters.bed import contact_law
-from adapters.bed.radii import sample_radii
+from adapters.bed.radii import draw_radii
 from adapters.bed.sample import GRAVITY, draw_sample_start, measure_bed_height
 from adapters.bed.state import FloatArray
 from adapters.engines.lammps import LammpsEngine
@@ -17,12 +17,12 @@ from adapters.errors import NotCredible
 from validation.studies.engines.packing import (
     WAYS,
     Way,
-    bed_scene,
     change_law,
+    load_bed,
     measure_window,
     run_way,
 )
-from validation.studies.engines.speed import MIRROR, SIDE, check_end, mirror_tiles, scene_of_tiles
+from validation.studies.engines.speed import MIRROR, SIDE, check_end, load_tiles, mirror_tiles
 
 pytestmark = pytest.mark.studies
 FAKE = Way("fake", "fake")
@@ -31,7 +31,7 @@ FAKE = Way("fake", "fake")
 def start_of(way: Way) -> tuple[FloatArray, FloatArray]:
     """Grains that do not touch, and their radii."""
     scene = way.scene(1)
-    radius = sample_radii(scene.sample.grain_radius.law, scene.grain_count, 1)
+    radius = draw_radii(scene.sample.grain_radius.law, scene.grain_count, 1)
     return draw_sample_start(radius, scene.container, 0.15, 1)[0], radius
 
 
@@ -79,7 +79,7 @@ def test_a_way_without_pull_says_so_to_every_contact(way: Way, tmp_path: Path) -
 
 
 def test_beds_differ_by_their_seed_alone() -> None:
-    first, second = bed_scene(1), bed_scene(2)
+    first, second = load_bed(1), load_bed(2)
     assert first.model_copy(update={"sample": second.sample}) == second
     assert first.sample.model_copy(update={"seed": 2}) == second.sample
 
@@ -89,11 +89,11 @@ def test_an_image_pushes_as_the_mirror_did() -> None:
 
     4/3 E' sqrt(R) d^(3/2) with E' = E/(1 - nu^2), and 4/3 E'/2 sqrt(R/2) (2 d)^(3/2).
     """
-    scene = scene_of_tiles("liggghts", (1, 1), **MIRROR)
+    scene = load_tiles("liggghts", (1, 1), **MIRROR)
     radius, overlap = 3.2e-3, 1e-6
-    mirror = contact_law.normal_force(overlap, scene.stiffness.mirror, radius)
-    image = contact_law.normal_force(2 * overlap, scene.stiffness.grain, radius / 2)
-    wall = contact_law.normal_force(overlap, scene.stiffness.wall, radius)
+    mirror = contact_law.find_normal_force(overlap, scene.stiffness.mirror, radius)
+    image = contact_law.find_normal_force(2 * overlap, scene.stiffness.grain, radius / 2)
+    wall = contact_law.find_normal_force(overlap, scene.stiffness.wall, radius)
     assert image == pytest.approx(mirror, rel=1e-12)
     assert wall == pytest.approx(mirror, rel=1e-4)  # 46.9e9 over 1e15, the two sides without mirror
 

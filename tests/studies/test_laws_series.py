@@ -12,7 +12,14 @@ from validation.studies.laws.run import (
     predict_by_polyfit,
     summarise_auto,
 )
-from validation.studies.laws.series import CUTS, REACH, LawCase, cut_cases, family_cases, fast_cases
+from validation.studies.laws.series import (
+    CUTS,
+    REACH,
+    LawCase,
+    cut_cases,
+    list_family_cases,
+    list_fast_cases,
+)
 
 pytestmark = pytest.mark.studies
 READ = np.geomspace(1, 1e5, 61)
@@ -37,12 +44,12 @@ def test_a_case_knows_nothing_behind_its_cut() -> None:
 
 def test_families_are_drawn_once_and_for_all() -> None:
     """The same members every time, twelve families, settling."""
-    first, again = family_cases(1), family_cases(1)
+    first, again = list_family_cases(1), list_family_cases(1)
     assert len({case.name for case in first}) == 12
     for one, other in zip(first, again, strict=True):
         np.testing.assert_array_equal(one.settlement, other.settlement)
         assert one.truth > 0.8 * one.settlement[0]
-    assert len(fast_cases(2)) == 10
+    assert len(list_fast_cases(2)) == 10
 
 
 def test_rivals_recover_their_own_law() -> None:

@@ -7,10 +7,10 @@ import pytest
 from validation.study import (
     DOCS,
     fill_page,
+    find_record,
     import_part,
     list_studies,
     read_record,
-    record_path,
 )
 
 pytestmark = pytest.mark.studies
@@ -18,8 +18,8 @@ pytestmark = pytest.mark.studies
 
 @pytest.mark.parametrize("name", list_studies())
 def test_page_and_bars(name: str) -> None:
-    rows = read_record(record_path(name))
-    template = record_path(name).with_name("page.md").read_text(encoding="utf-8")
+    rows = read_record(find_record(name))
+    template = find_record(name).with_name("page.md").read_text(encoding="utf-8")
     page = fill_page(template, import_part(name, "page").describe(rows))
     assert DOCS.joinpath(f"{name}.md").read_text(encoding="utf-8") == page
     checks = import_part(name, "bars").check_bars(rows)
@@ -28,6 +28,6 @@ def test_page_and_bars(name: str) -> None:
 
 @pytest.mark.parametrize("name", [name for name in list_studies() if name.startswith("qdem")])
 def test_every_part_is_recorded_and_no_bar_is_missed(name: str) -> None:
-    rows = read_record(record_path(name))
+    rows = read_record(find_record(name))
     assert [row["part"] for row in rows] == list(import_part(name, "run").PARTS)
     assert all(check.holds for check in import_part(name, "bars").check_bars(rows))

@@ -12,7 +12,7 @@ import scipy.sparse as sparse
 from validation import study
 from validation.studies.qdem_cost import reading as report
 from validation.studies.qdem_cost.bars import check_bars
-from validation.studies.qdem_cost.methods import Costs, answer_by, newmark_matrices
+from validation.studies.qdem_cost.methods import Costs, answer_by, march_newmark
 from validation.studies.qdem_cost.questions import BENDING, TRAVEL
 from validation.study import Row
 
@@ -35,7 +35,7 @@ def power_law(errors: list[float], exponent: float = -2.0) -> list[Row]:
 def test_cost_between_runs_and_beyond_them() -> None:
     """A power law is a line in logarithms: it is met between runs, and beyond, there marked."""
     rows = power_law([0.2, 0.1, 0.05])
-    between, beyond = report.cost_at(rows, 0.07), report.cost_at(rows, 0.01)
+    between, beyond = report.find_cost(rows, 0.07), report.find_cost(rows, 0.01)
     assert between.seconds == pytest.approx(0.01 * 0.07**-2)
     assert not between.guessed
     assert beyond.seconds == pytest.approx(0.01 * 0.01**-2)
@@ -46,37 +46,37 @@ def test_cost_between_runs_and_beyond_them() -> None:
 
 def test_cost_above_the_largest_error_is_the_cheapest_run() -> None:
     """Nothing costs less than the coarsest mesh; that is no extrapolation."""
-    cost = report.cost_at(power_law([0.2, 0.1]), 0.9)
+    cost = report.find_cost(power_law([0.2, 0.1]), 0.9)
     assert cost.seconds == pytest.approx(0.01 * 0.2**-2)
     assert not cost.guessed
 
 
 def test_cost_unknown() -> None:
     """No run, or one alone below whose error nothing is known: no number is made up."""
-    assert np.isnan(report.cost_at([], 0.1).seconds)
-    assert np.isnan(report.cost_at(power_law([0.2]), 0.1).seconds)
+    assert np.isnan(report.find_cost([], 0.1).seconds)
+    assert np.isnan(report.find_cost(power_law([0.2]), 0.1).seconds)
 
 
 def test_dominated_runs_are_off_the_frontier() -> None:
     """Dearer and no better: dropped, wherever it stands in the list."""
     good = power_law([0.2, 0.1, 0.05])
     worse = row(0.15, 5.0, good[0]["elements"] + 1)
-    assert report.frontier([worse, *good]) == good
+    assert report.find_best([worse, *good]) == good
 
 
 def test_cancelled_errors_do_not_count() -> None:
     """A lucky long step has the error that a shorter step, or a finer mesh, shows."""
     lucky = row(0.01, 1.0, 1000, step_s=2.0)
     shorter, finer = row(0.1, 2.0, 1000, step_s=1.0), row(0.05, 3.0, 2000, step_s=2.0)
-    errors = [r["error"] for r in report.dependable([lucky, shorter, finer])]
+    errors = [r["error"] for r in report.list_dependable([lucky, shorter, finer])]
     assert errors == [0.1, 0.1, 0.05]
-    assert report.cost_at([lucky, shorter, finer], 0.05).seconds == pytest.approx(3.0)
+    assert report.find_cost([lucky, shorter, finer], 0.05).seconds == pytest.approx(3.0)
 
 
 def test_order_of_convergence() -> None:
     """Error ~ elements^(-2/3) is second order; only the finest meshes count."""
     rows = power_law([0.08, 0.04, 0.02])
-    assert report.order([row(0.9, 0.1, 10), *rows]) == pytest.approx(2.0, rel=1e-6)
+    assert report.fit_order([row(0.9, 0.1, 10), *rows]) == pytest.approx(2.0, rel=1e-6)
 
 
 def test_table_marks_the_cheapest_and_what_is_extrapolated() -> None:
@@ -85,7 +85,7 @@ def test_table_marks_the_cheapest_and_what_is_extrapolated() -> None:
         r | {"method": "P1 Newmark", "cost_s": 10 * r["cost_s"]} for r in power_law([0.3, 0.03])
     ]
     rows = [{"part": "bending", "runs": power_law([0.3, 0.1]) + newmark}]
-    lines = report.describe_costs(rows, "bending").splitlines()
+    lines = report.list_costs(rows, "bending").splitlines()
     assert lines[2] == "| 30% | **0.11** | none | none | 1.1 | none |"
     assert lines[5] == "| 3% | **(11)** | none | none | 110 | none |"
 
@@ -106,7 +106,7 @@ def test_newmarks_method_on_one_mass() -> None:
     omega, a, errors = 30.0, 7.0, []
     for steps in (100, 200):
         step = 1.0 / steps
-        found = newmark_matrices(
+        found = march_newmark(
             sparse.csr_matrix([[omega**2]]), sparse.csr_matrix([[1.0]]), np.ones(1),
             lambda t: np.sin(a * t), 0, step, steps, Costs(),
         )  # fmt: skip
@@ -140,7 +140,7 @@ def test_quadratic_elements_find_the_reference() -> None:
 @pytest.mark.parametrize("name", ["another answer", "slow"])
 def test_checks_can_fail(name: str) -> None:
     """On the record all hold; with one thing wrong at least one does not."""
-    rows = study.read_record(study.record_path("qdem-cost"))
+    rows = study.read_record(study.find_record("qdem-cost"))
     assert all(check.holds for check in check_bars(rows))
     wrong = deepcopy(rows)
     for run in wrong[0]["runs"]:

@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 
 from qdem_fem.files.errors import LibraryMissing
 from qdem_fem.mesh.generation import make_box_mesh
-from validation.bench.qdem.judge import lumped_mass, stiffness
+from validation.bench.qdem.judge import build_stiffness, lump_mass
 from validation.studies.qdem_cost.matrices import (
     SAFETY,
     LinearProblem,
     MklRival,
     ScipyRival,
-    linear_problem,
-    mkl_load,
+    build_problem,
+    load_mkl,
 )
 from validation.studies.qdem_cost.race import Contestant, measure_speed
 
@@ -35,7 +35,7 @@ FloatArray = NDArray[np.float64]
 def mkl_missing() -> bool:
     """True without the Intel MKL, an extra of the benchmarks."""
     try:
-        mkl_load()
+        load_mkl()
     except LibraryMissing:
         return True
     return False
@@ -52,9 +52,9 @@ def cantilever() -> tuple[LinearProblem, FloatArray]:
     fixed = nodes[:, 0] == 0
     force = np.zeros_like(nodes)
     force[np.isclose(nodes[:, 0], 0.4)] = [30.0, 20.0, -100.0]
-    problem = linear_problem(nodes, elements, MATERIAL, fixed, force)
-    matrix = stiffness(nodes, elements, *MATERIAL[:2]).toarray()
-    mass = np.repeat(lumped_mass(nodes, elements, MATERIAL[2]), 3)
+    problem = build_problem(nodes, elements, MATERIAL, fixed, force)
+    matrix = build_stiffness(nodes, elements, *MATERIAL[:2]).toarray()
+    mass = np.repeat(lump_mass(nodes, elements, MATERIAL[2]), 3)
     free = np.repeat(~fixed, 3)
     u, v = np.zeros((2, 3 * len(nodes)))
     for _ in range(STEPS):

@@ -25,11 +25,11 @@ def block_on_floor(angle: float = 0.0, speed: float = 0.0) -> md.SoftGrains:
     scene.add(HalfSpace([0, 1], 0.0))
     scene.add(Polygon.rectangle(0.1, 0.05), density=2600, position=(0, 0.025), velocity=(speed, 0))
     world, motion = make_world(scene)
-    return md.soft_grains(world, motion, K, MU)
+    return md.soften_grains(world, motion, K, MU)
 
 
 def advance(run: md.SoftGrains, seconds: float, force: tuple[float, float] = (0.0, 0.0)) -> None:
-    md.soft_advance(run, 1, np.array([force, force]), seconds)
+    md.advance_grains(run, 1, np.array([force, force]), seconds)
 
 
 def test_block_sinks_by_its_weight_over_the_stiffness() -> None:
@@ -89,10 +89,10 @@ def test_friction_of_a_wall_is_remembered_in_a_scene_of_many_bodies() -> None:
     for k in range(4):
         scene.add(Polygon.rectangle(0.1, 0.05), density=2600, position=(0, 0.025 + 0.05 * k))
     world, motion = make_world(scene)
-    run = md.soft_grains(world, motion, K, MU)
-    md.soft_advance(run, 1, np.zeros((2, 2)), 1.0)
+    run = md.soften_grains(world, motion, K, MU)
+    md.advance_grains(run, 1, np.zeros((2, 2)), 1.0)
     start = run.motion.position[1:, 0].copy()
-    md.soft_advance(run, 1, np.zeros((2, 2)), 0.4)
+    md.advance_grains(run, 1, np.zeros((2, 2)), 0.4)
     assert np.abs(run.motion.position[1:, 0] - start).max() < 1e-4 * np.abs(start).max()
 
 
@@ -113,7 +113,7 @@ def law_twin(
 )  # fmt: skip
 def test_law_is_that_of_its_twin_and_never_pulls(gap, normal, slip, spring, mass):
     law = np.array([K, md.TANGENTIAL * K, md.DAMPING, MU])
-    found = md.contact_law(law, gap, normal, slip, spring, mass, 0.5 * mass, 1e-5)
+    found = md.apply_law(law, gap, normal, slip, spring, mass, 0.5 * mass, 1e-5)
     twin = law_twin(gap, normal, slip, spring, (mass, 0.5 * mass), 1e-5)
     assert found == pytest.approx(twin, rel=1e-12)
     assert found[0] >= 0
@@ -126,7 +126,7 @@ def test_spring_passes_to_the_nearest_contact_of_the_same_pair() -> None:
     point = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.0]])
     old_pair, old_key = np.array([5, 5]), np.array([8, 7])
     old_point = np.array([[0.9, 0.0], [0.0, 0.0]])
-    kept = md.springs_kept(pair, key, point, old_pair, old_key, old_point, np.array([3.0, 4.0]))
+    kept = md.keep_springs(pair, key, point, old_pair, old_key, old_point, np.array([3.0, 4.0]))
     np.testing.assert_array_equal(kept, [4.0, 3.0, 0.0])
 
 
@@ -145,7 +145,7 @@ def test_falling_polygons_never_gain_energy() -> None:
     for shape, position, angle in place_grains(grains, 2):
         scene.add(shape, density=2600.0, position=position, angle=angle)
     world, motion = make_world(scene)
-    run = md.soft_grains(world, motion, K, MU)
+    run = md.soften_grains(world, motion, K, MU)
 
     def energy() -> float:
         gap, spring = run.contacts[1][:, 4], run.springs.force

@@ -35,12 +35,12 @@ def test_a_trial_is_judged_by_its_displacement() -> None:
     trial = run.Trial("stack", run.RESTS, lambda: scenes.stack(3), 0.01, "<= 1e-9")
     assert run.try_ours(trial, "time-stepping")["ok"]
     moved = np.array([[0.3, 0.4, 0.0]])
-    assert run.from_way(0.3)(moved) == pytest.approx(0.4)
-    assert run.from_way(0.4, axis=1)(moved) == pytest.approx(0.3)
+    assert run.compare_move(0.3)(moved) == pytest.approx(0.4)
+    assert run.compare_move(0.4, axis=1)(moved) == pytest.approx(0.3)
 
 
 def test_threshold_of_cards() -> None:
     """By bisection, against tan(phi) / 2."""
-    off, steps = run.card_threshold_off(0.3)
+    off, steps = run.bisect_cards(0.3)
     assert off <= 1e-8
     assert steps > 30

@@ -11,14 +11,14 @@ from scipy.stats import t as student
 from adapters.jumps.schedule import schedule_jumps
 from validation.studies.settlement.beds import COARSE, CONFINED, EVERY, list_methods, list_runs
 from validation.studies.settlement.reading import (
-    cheaper_at_equal_step,
-    cheaper_by,
-    errors_of,
-    measure_spread,
+    find_errors,
+    find_speedup,
+    find_spread,
+    find_step_speedup,
+    judge_layers,
     nest,
-    profile_error,
 )
-from validation.studies.settlement.run import COLUMNS, PARTS, mean_block, thin_table
+from validation.studies.settlement.run import COLUMNS, PARTS, average_block, thin_table
 
 pytestmark = pytest.mark.studies
 
@@ -48,24 +48,24 @@ def test_errors_are_packing_by_packing_over_the_mean_of_all() -> None:
     """Full runs settle 1 and 3; a way 1.5 and 2: errors of +25 % and -50 % of their mean of 2."""
     rows = [row(EVERY, 1, 1.0), row(EVERY, 2, 2.0), row(EVERY, 2, 4.0)]
     rows += [row("way", 1, 1.5), row("way", 2, 2.0, profile=[0.6, 0.5])]
-    np.testing.assert_allclose(errors_of(rows, COARSE, "way", "settlement"), [0.25, -0.5])
+    np.testing.assert_allclose(find_errors(rows, COARSE, "way", "settlement"), [0.25, -0.5])
     spread = np.std([1.5, 2.0], ddof=1) / np.std([1.0, 2.0, 4.0], ddof=1)
-    assert measure_spread(rows, COARSE, "way") == pytest.approx(spread)
+    assert find_spread(rows, COARSE, "way") == pytest.approx(spread)
 
 
 def test_profile_error_is_rms_over_layers() -> None:
     """0.1 off in one of two layers of 0.5, in one of two runs: 0.1 sqrt(1/2) / 0.5 / 2."""
     rows = [row(EVERY, seed, 1.0) for seed in range(1, 6)]
     rows += [row("way", 1, 1.0), row("way", 2, 1.0, profile=[0.6, 0.5])]
-    assert profile_error(rows, COARSE, "way") == pytest.approx(0.1 * np.sqrt(0.5) / 0.5 / 2)
+    assert judge_layers(rows, COARSE, "way") == pytest.approx(0.1 * np.sqrt(0.5) / 0.5 / 2)
 
 
 def test_what_a_way_costs() -> None:
     """A tenth of the steps at twice the cost a step, of it 2 s a start, and 2 s of relaxation."""
     cost = {"engine": 10.0, "start_up": 2.0, "relax": 2.0}
     rows = [row(EVERY, 1, 1.0), row("way", 1, 1.0, computed=40, cost=cost)]
-    assert cheaper_by(rows, COARSE, "way") == pytest.approx(40 / 12)
-    assert cheaper_at_equal_step(rows, COARSE, "way") == pytest.approx(4000 * (8 / 400) / 12)
+    assert find_speedup(rows, COARSE, "way") == pytest.approx(40 / 12)
+    assert find_step_speedup(rows, COARSE, "way") == pytest.approx(4000 * (8 / 400) / 12)
 
 
 def test_schedules_end_at_the_last_cycle() -> None:
@@ -98,4 +98,4 @@ def test_a_thinned_table_is_even_in_the_logarithm() -> None:
     late = np.diff(np.log([cycle for cycle in table["cycle"] if cycle > 100]))
     assert late.max() / late.min() < 1.1
     assert table["settlement"] == [float(cycle) for cycle in table["cycle"]]
-    assert mean_block(found, 20, "settlement") == pytest.approx(15.5)
+    assert average_block(found, 20, "settlement") == pytest.approx(15.5)

@@ -336,7 +336,7 @@ def test_validate_record(
 
 def test_a_full_disk_has_one_exit_code(tmp_path: Path) -> None:
     """5 in all packages, and no other refusal to write has it."""
-    from adapters.files.run_folder import name_full_disk
+    from adapters.files.run_folder import explain_full_disk
     from trackbed.run_files.whole import refuse_writing
 
     def code(number: int, shown: Callable[[Path], AbstractContextManager[None]]) -> int:
@@ -347,6 +347,6 @@ def test_a_full_disk_has_one_exit_code(tmp_path: Path) -> None:
     for number, wanted in (
         (errno.ENOSPC, 5), (errno.EDQUOT, 5), (errno.EFBIG, 5), (errno.EACCES, 2), (errno.EIO, 2)
     ):  # fmt: skip
-        assert code(number, name_full_disk) == wanted
+        assert code(number, explain_full_disk) == wanted
         assert code(number, refuse_writing) == wanted
         assert explain_error(OSError(number, os.strerror(number)))[1] == wanted

@@ -7,14 +7,14 @@ import pytest
 
 from adapters.engines.plan import SEAT_DRAG_SHARE, SEAT_SHARE, plan_seating
 from adapters.scene.file import load_scene
-from trackbed.scenes import scene_path
+from trackbed.scenes import find_scene_file
 
 SHIPPED = ("karrech", "karrech-coarse", "karrech-partial")
 
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_shipped_scenes_are_seated_by_the_peak(name: str) -> None:
-    scene = load_scene(scene_path(name))
+    scene = load_scene(find_scene_file(name))
     peak = float(scene.stress_at(np.linspace(0, 1, 1001)).max()) * scene.loaded_area
     assert plan_seating(scene).force == SEAT_SHARE * peak
 
@@ -25,7 +25,9 @@ def test_drag_of_a_light_piston_is_one_the_step_can_follow(mass: float, load: fl
     """v' = v (1 - c dt/m) of the drag alone falls from step to step without a change of sign."""
     amplitude = 14150.0 * load
     settings = [f"loading.piston_mass={mass}", f"loading.amplitude={amplitude}"]
-    scene = load_scene(scene_path("karrech-coarse"), [*settings, f"loading.mean={amplitude / 2}"])
+    scene = load_scene(
+        find_scene_file("karrech-coarse"), [*settings, f"loading.mean={amplitude / 2}"]
+    )
     plan = plan_seating(scene)
     factor = 1 - plan.force / plan.speed * scene.time_step / mass
     assert 1 - SEAT_DRAG_SHARE - 1e-12 <= factor < 1

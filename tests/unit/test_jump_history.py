@@ -22,7 +22,7 @@ from adapters.jumps.slopes import (
     cut_slope_blocks,
     estimate_slopes,
     find_asked_gain,
-    unmoved,
+    remove_moves,
 )
 
 SLOPE = 3e-5
@@ -146,7 +146,9 @@ def test_bursts_err_less_than_by_the_last_window() -> None:
 
 
 @given(
-    st.floats(1e-9, 1e3), st.lists(st.floats(-1, 3), min_size=6, max_size=40), st.integers(1, 10**6)
+    st.floats(1e-9, 1e3),
+    st.lists(st.floats(-1, 3), min_size=6, max_size=40),
+    st.integers(1, 10**6),
 )
 def test_unit_of_length_is_free(unit: float, gains: list[float], h: int) -> None:
     """Gains times a factor, with a jump between: the same gain, times the factor."""
@@ -243,14 +245,14 @@ def test_kappa_is_found_with_its_error_and_taken_out() -> None:
     known = [log_stretch(10, 70)]
     for one in landings:
         bare = log_stretch(one.cycle + 1, one.cycle + 25)
-        known.append(unmoved(bare, [one], -kappa))
+        known.append(remove_moves(bare, [one], -kappa))
     slopes = estimate_slopes(known, landings)
     found, error = slopes.kappa()
     assert found == pytest.approx(kappa, rel=0.2)
     assert abs(found - kappa) < 2 * error
     assert error < 0.3 * jump_slopes.RESEATING
     bare = log_stretch(151, 175).gain.sum()
-    left = unmoved(known[1], landings, found).gain.sum() - bare
+    left = remove_moves(known[1], landings, found).gain.sum() - bare
     assert abs(left) < 0.25 * (known[1].gain.sum() - bare)
 
 

@@ -17,17 +17,17 @@ from adapters.engines.lammps_decks import (
     format_contact,
     format_dump_states,
     format_piston_wall,
-    scene_text,
+    format_scene,
     write_moved,
 )
 from adapters.files.dump import Frame
 from adapters.scene.file import load_scene
 from adapters.scene.tables import Scene
-from trackbed.scenes import scene_path
+from trackbed.scenes import find_scene_file
 
 
 def scene_of(*overrides: str) -> Scene:
-    return load_scene(scene_path("karrech-coarse"), ('engine.name="lammps"', *overrides))
+    return load_scene(find_scene_file("karrech-coarse"), ('engine.name="lammps"', *overrides))
 
 
 def bed(count: int) -> State:
@@ -60,7 +60,7 @@ def test_scene_names_its_walls_only() -> None:
     E* twice that of two grains.
     """
     scene = scene_of()
-    text = scene_text(scene)
+    text = format_scene(scene)
     fixes = {line.split()[1]: line for line in text.splitlines() if line.startswith("fix")}
     assert tuple(fixes) == LammpsEngine().wall_names(scene, piston=False)
     assert TANGENTIAL in fixes["floor"]
@@ -70,13 +70,13 @@ def test_scene_names_its_walls_only() -> None:
     mirror = fixes["symmetry_x"].split()
     stiffness = float(mirror[mirror.index("hertz") + 1])
     assert stiffness == pytest.approx(2 * float(between.split()[4]))
-    none = scene_text(scene_of("material.grain.friction=0.0", "material.wall.friction=0.0"))
+    none = format_scene(scene_of("material.grain.friction=0.0", "material.wall.friction=0.0"))
     assert "mindlin" not in none
 
 
 def test_walls_of_a_box_face_inwards(tmp_path: Path) -> None:
     """Low walls keep what is above them, high walls what is below."""
-    text = scene_path("karrech-coarse").read_text().replace('"cylinder"', '"box"')
+    text = find_scene_file("karrech-coarse").read_text().replace('"cylinder"', '"box"')
     lines = [line for line in text.splitlines() if not line.startswith("radius =")]
     at = lines.index("[sample]") + 1
     lines[at:at] = ["size_x = 0.04", "size_y = 0.03"]
@@ -85,7 +85,7 @@ def test_walls_of_a_box_face_inwards(tmp_path: Path) -> None:
     scene = load_scene(path, ('engine.name="lammps"', "sample.symmetry=[]"))
     words = {
         line.split()[1]: line.split()[-4:-1]
-        for line in scene_text(scene).splitlines()
+        for line in format_scene(scene).splitlines()
         if line.startswith("fix")
     }
     assert words["wall_x_low"] == ["xplane", "0", "NULL"]
@@ -112,7 +112,7 @@ def test_columns_are_those_of_every_engine() -> None:
 def test_moved_places_come_back_exactly(tmp_path: Path) -> None:
     """All grains by identifier, to the last bit, and the piston's atom after them."""
     scene, state = scene_of(), bed(5)
-    shifted = state.moved(state.position + 1 / 3, piston_height=0.1 + 1e-17)
+    shifted = state.move_to(state.position + 1 / 3, piston_height=0.1 + 1e-17)
     write_moved(tmp_path, scene.container, shifted)
     for axis, name in enumerate("xyz"):
         rows = (tmp_path / f"moved_{name}.txt").read_text().split("\n")
@@ -157,11 +157,9 @@ def test_contacts_from_pairs() -> None:
     rows = np.zeros((2, 12))
     rows[:, 0], rows[:, 10], rows[:, 11] = [4, 9], radius, mass
     rows[0, 1], rows[0, 5], rows[1, 9] = 2 * radius - overlap, slide, spin
-    shear = contact_law.equivalent_shear_modulus(
-        grain.young, grain.poisson, grain.young, grain.poisson
-    )
-    stiffness = float(contact_law.tangential_stiffness(overlap, shear, radius / 2))
-    alpha = contact_law.alpha_of_restitution(scene.restitution)
+    shear = contact_law.combine_shear_moduli(grain.young, grain.poisson, grain.young, grain.poisson)
+    stiffness = float(contact_law.find_tangential_stiffness(overlap, shear, radius / 2))
+    alpha = contact_law.find_alpha(scene.restitution)
     damping = 2 * contact_law.DAMPING_FACTOR * alpha * np.sqrt(mass / 2 * stiffness)
     # the surface of grain 9 that faces grain 4, along +x, moves with spin times radius along +y
     velocity = slide - spin * radius

@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 
 from adapters.bed.container import Container, Walls
 from adapters.bed.overlaps import (
-    bed_measure,
     find_behind_discs,
+    find_pairs,
     find_pairs_within,
+    list_wall_names,
+    measure_bed,
     measure_rows,
-    neighbours,
-    wall_names,
 )
 from adapters.bed.state import FloatArray
 from adapters.errors import UsageError
@@ -71,7 +71,7 @@ def test_wall_overlaps_against_numpy(seed: int) -> None:
     radius = generator.uniform(2e-3, 6e-3, n)
     position = generator.uniform(0.0, 0.05, (n, 3)) * [0.8, 0.8, 1.0]
     walls = QUARTER.walls(piston_height=0.052, piston_reach=0.03)
-    rows = neighbours(position, radius, walls, gap=0.2, behind=np.zeros((n, 4), bool))
+    rows = find_pairs(position, radius, walls, gap=0.2, behind=np.zeros((n, 4), bool))
     twin = np.array([wall_overlap_twin(walls, x, r) for x, r in zip(position, radius, strict=True)])
     wall = rows.second < 0
     assert wall.sum() == twin.size
@@ -87,7 +87,7 @@ def test_normals_are_gradients_of_the_overlap() -> None:
     position = generator.uniform(2e-3, 0.03, (12, 3))
     walls = QUARTER.walls(piston_height=0.033, piston_reach=0.02)
     behind = find_behind_discs(position, walls)
-    rows = neighbours(position, radius, walls, gap=0.05, behind=behind)
+    rows = find_pairs(position, radius, walls, gap=0.05, behind=behind)
     step = 1e-7
     for c, (i, j) in enumerate(zip(rows.first, rows.second, strict=True)):
         for grain, sign in ((i, -1.0), (j, 1.0)):
@@ -114,7 +114,7 @@ def test_two_touching_grains_on_the_floor() -> None:
     radius = np.array([1e-3, 2e-3])
     x = np.array([[0.01, 0.01, 1e-3 - 1e-7], [0.01, 0.01, 4e-3 - 3e-7]])
     walls = QUARTER.walls()
-    bed = bed_measure(x, neighbours(x, radius, walls))
+    bed = measure_bed(x, find_pairs(x, radius, walls))
     assert bed.contacts == 2
     assert bed.coordination_number == 1.0
     assert bed.coordination_with_walls == 1.5
@@ -126,7 +126,7 @@ def test_two_touching_grains_on_the_floor() -> None:
 def test_coincident_centres_have_a_direction() -> None:
     """Two grains in one place overlap by the sum of radii and have a unit normal."""
     x = np.full((2, 3), 0.02)
-    rows = neighbours(x, np.array([1e-3, 2e-3]), QUARTER.walls())
+    rows = find_pairs(x, np.array([1e-3, 2e-3]), QUARTER.walls())
     assert rows.overlap[rows.second >= 0] == pytest.approx([3e-3])
     np.testing.assert_allclose(np.linalg.norm(rows.normal, axis=1), 1.0)
 
@@ -136,15 +136,15 @@ def test_a_grain_stays_on_its_side_of_a_disc() -> None:
     pushes it down from anywhere."""
     x, radius = np.array([[0.01, 0.01, 0.0305]]), np.array([1e-3])
     disc = QUARTER.walls(piston_height=0.03, piston_reach=0.02)
-    above = neighbours(x, radius, disc)
+    above = find_pairs(x, radius, disc)
     assert above.normal[0].tolist() == [0, 0, 1]
     assert above.overlap[0] == pytest.approx(0.5e-3)
-    pushed = neighbours(x, radius, disc, behind=np.zeros((1, 4), bool))
+    pushed = find_pairs(x, radius, disc, behind=np.zeros((1, 4), bool))
     assert pushed.normal[0].tolist() == [0, 0, -1]
     assert pushed.overlap[0] == pytest.approx(1.5e-3)
-    whole = neighbours(x, radius, QUARTER.walls(piston_height=0.03))
+    whole = find_pairs(x, radius, QUARTER.walls(piston_height=0.03))
     assert whole.overlap[0] == pytest.approx(1.5e-3)
-    assert wall_names(disc) == ("floor", "symmetry_x", "symmetry_y", "piston", "cylinder")
+    assert list_wall_names(disc) == ("floor", "symmetry_x", "symmetry_y", "piston", "cylinder")
 
 
 @pytest.mark.parametrize(
@@ -161,12 +161,12 @@ def test_a_grain_stays_on_its_side_of_a_disc() -> None:
 def test_input_that_is_no_bed(position: list[list[float]], radius: list[float]) -> None:
     """NaN, infinity, radii that are not positive and shapes that differ raise `UsageError`."""
     with pytest.raises(UsageError):
-        neighbours(np.array(position), np.array(radius), QUARTER.walls())
+        find_pairs(np.array(position), np.array(radius), QUARTER.walls())
 
 
 def test_no_grain_at_all() -> None:
     """An empty bed has no rows and zero measures."""
     x = np.empty((0, 3))
-    rows = neighbours(x, np.empty(0), QUARTER.walls())
+    rows = find_pairs(x, np.empty(0), QUARTER.walls())
     assert len(rows) == 0
-    assert bed_measure(x, rows).coordination_number == 0.0
+    assert measure_bed(x, rows).coordination_number == 0.0

@@ -52,7 +52,7 @@ def shaken(run: q.Simulation, body: q.Body) -> None:
     end = body.nodes[:, 0] == 0.5
     run.prescribe(body, np.flatnonzero(end)[:2], "y", lambda t: 1e-5 * np.sin(2e4 * t))
     run.roller(body, np.flatnonzero(end)[-1], (0.0, 1.0, 1.0))
-    run.pressure(body, body.nodes[:, 2] == 0.1, q.ramp(2e-4, 1e5))
+    run.pressure(body, body.nodes[:, 2] == 0.1, q.make_ramp(2e-4, 1e5))
 
 
 CASES: dict[str, dict[str, Any]] = {
@@ -140,7 +140,7 @@ def test_state_of_periodic_bodies_in_the_middle(tmp_path: Path) -> None:
         ({"strain": "svk"}, "'finger' in the file, 'svk' here"),
         ({"precision": "float32"}, "'float64' in the file, 'float32' here"),
         ({"force": (0.0, 30.0, -201.0)}, "loads"),
-        ({"force": q.ramp(1.0, (0.0, 30.0, -200.0))}, "loads"),
+        ({"force": q.make_ramp(1.0, (0.0, 30.0, -200.0))}, "loads"),
         ({"force": lambda t: (0.0, 30.0, -200.0)}, "loads"),
         ({"gravity": (0, 0, -9.81)}, "gravity"),
         ({"step": 1e-6}, "step"),

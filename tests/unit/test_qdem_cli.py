@@ -78,7 +78,7 @@ def results(folder: Path) -> dict[str, bytes]:
 
 def stop_at(monkeypatch: pytest.MonkeyPatch, share: float, stop: Callable[[], None]) -> None:
     """Call ``stop`` once, when a run has done a share of its steps."""
-    whole, stopped = cli.Progress.at, []
+    whole, stopped = cli.Progress.report, []
 
     def at(self: cli.Progress, steps: int, total: int, when: float) -> None:
         whole(self, steps, total, when)
@@ -86,7 +86,7 @@ def stop_at(monkeypatch: pytest.MonkeyPatch, share: float, stop: Callable[[], No
             stopped.append(True)
             stop()
 
-    monkeypatch.setattr(cli.Progress, "at", at)
+    monkeypatch.setattr(cli.Progress, "report", at)
 
 
 @pytest.mark.long
@@ -348,7 +348,7 @@ def test_progress_lines_go_to_standard_error(
     monkeypatch.setattr(cli.time, "monotonic", lambda: next(clock))
     progress = cli.Progress()
     for steps in (100, 200, 320, 330):
-        progress.at(steps, 1000, steps * 1e-3)
+        progress.report(steps, 1000, steps * 1e-3)
     found = capsys.readouterr()
     assert found.out == ""
     assert found.err == "t = 0.32 s, step 320 of 1000, 34 s left\n"

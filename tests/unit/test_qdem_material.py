@@ -36,7 +36,7 @@ def test_constants_obey_the_relations_of_elasticity(
     assert m.viscous_first + 2 / 3 * shear == pytest.approx(bulk, rel=1e-15, abs=1e-15 * shear)
     assert m.is_viscous == (shear > 0 or bulk > 0)
     assert isinstance(m.wave_speed, float)
-    wide = m.per_element(3)
+    wide = m.broadcast(3)
     for name in ("lame_first", "lame_second", "viscous_first", "viscous_second", "wave_speed"):
         np.testing.assert_array_equal(getattr(wide, name), [getattr(m, name)] * 3)
 
@@ -163,8 +163,8 @@ def test_lengths_must_agree() -> None:
     with pytest.raises(MaterialError, match="young has 3, density has 2 values"):
         Material([1.0, 2.0, 3.0], 0.2, [1.0, 2.0])
     m = Material([1.0, 2.0, 3.0], 0.2, 1.0)
-    np.testing.assert_array_equal(m.per_element(3).density, [1.0, 1.0, 1.0])
+    np.testing.assert_array_equal(m.broadcast(3).density, [1.0, 1.0, 1.0])
     with pytest.raises(MaterialError, match="young has 3 values, but the mesh has 4 elements"):
-        m.per_element(4)
+        m.broadcast(4)
     with pytest.raises(MaterialError, match="but the mesh has 4 elements"):
-        Material(1.0, 0.2, [1.0]).per_element(4)
+        Material(1.0, 0.2, [1.0]).broadcast(4)

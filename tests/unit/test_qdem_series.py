@@ -17,7 +17,10 @@ from qdem_fem.files.series import Driver, is_real
 numbers = st.floats(-1e6, 1e6)
 
 
-@given(st.lists(st.tuples(st.floats(1e-3, 10), numbers), min_size=1, max_size=8), st.floats(-5, 90))
+@given(
+    st.lists(st.tuples(st.floats(1e-3, 10), numbers), min_size=1, max_size=8),
+    st.floats(-5, 90),
+)
 def test_table_is_linear_between_its_rows_and_constant_outside(
     rows: list[tuple[float, float]], time: float
 ) -> None:
@@ -40,7 +43,7 @@ def test_table_of_vectors() -> None:
 
 def test_ramp_rises_then_stays() -> None:
     """The loading of section 3.1: linear over its duration, then constant."""
-    ramp = q.ramp(0.5, [0, 0, -200.0])
+    ramp = q.make_ramp(0.5, [0, 0, -200.0])
     assert [ramp(t)[2] for t in (-1.0, 0.0, 0.25, 0.5, 7.0)] == [0, 0, -100, -200, -200]
 
 
@@ -68,7 +71,7 @@ def test_bad_tables(times: Any, values: Any, word: str) -> None:
 @pytest.mark.parametrize("duration", [0, -1.0, nan, inf, "1", None, True])
 def test_bad_ramps(duration: Any) -> None:
     with pytest.raises(ConditionError):
-        q.ramp(duration, 1.0)
+        q.make_ramp(duration, 1.0)
 
 
 def test_real_numbers() -> None:

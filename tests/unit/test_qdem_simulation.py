@@ -15,14 +15,14 @@ from qdem_fem.bodies.assembly import Assembly
 from qdem_fem.files.output import write_bodies_vtu
 from qdem_fem.march import simulation
 from qdem_fem.mesh.generation import make_box_mesh
-from validation.bench.qdem.meshes import delaunay_mesh
+from validation.bench.qdem.meshes import make_delaunay
 
 YOUNG, POISSON, DENSITY = 1e6, 0.25, 1000.0
 CORNERS = np.array([[0.0, 0, 0], [1, 0.1, 0], [0.2, 1, 0], [0.1, 0.3, 1.1]])
 
 
 def stone(count: int = 60, seed: int = 1, **material: Any) -> q.Body:
-    nodes, elements = delaunay_mesh(count, seed)
+    nodes, elements = make_delaunay(count, seed)
     values: dict[str, Any] = {"young": YOUNG, "poisson": POISSON, "density": DENSITY} | material
     return q.Body((nodes, elements), q.Material(**values))
 
@@ -143,7 +143,9 @@ LOADS: dict[str, tuple[Any, Callable[[q.Simulation, q.Body], Any]]] = {
     "free": (None, lambda run, body: setattr(body, "velocity", random_field(body, 0.5))),
     "force": (
         None,
-        lambda run, body: run.load(body, body.nodes[:, 0] > 0.99, q.ramp(0.05, [10.0, 0, 300])),
+        lambda run, body: run.load(
+            body, body.nodes[:, 0] > 0.99, q.make_ramp(0.05, [10.0, 0, 300])
+        ),
     ),
     "pressure": (
         None,
@@ -219,7 +221,7 @@ def test_units_do_not_matter(precision: Any) -> None:
     """Metres, kilograms and seconds times powers of two: the same bits in the new units."""
     results = []
     for metre, kilogram, second in ((1.0, 1.0, 1.0), (2.0**3, 2.0**-5, 2.0**4)):
-        nodes, elements = delaunay_mesh(60, 1)
+        nodes, elements = make_delaunay(60, 1)
         pascal = kilogram / metre / second**2
         material = q.Material(YOUNG * pascal, POISSON, DENSITY * kilogram / metre**3)
         body = q.Body((nodes * metre, elements), material)
@@ -228,7 +230,9 @@ def test_units_do_not_matter(precision: Any) -> None:
             body, precision=precision, step=1e-3 * second, gravity=np.array([0, 0, -9.81]) * gee
         )
         run.fix(body, nodes[:, 2] < 0.2)
-        run.load(body, nodes[:, 2] > 0.8, q.ramp(0.03 * second, np.array([900.0, 0, 0]) * newton))
+        run.load(
+            body, nodes[:, 2] > 0.8, q.make_ramp(0.03 * second, np.array([900.0, 0, 0]) * newton)
+        )
         body.velocity = random_field(body, 0.1) * metre / second
         run.advance(0.05 * second)
         results.append(body.displacement / metre)

@@ -21,14 +21,14 @@ from adapters.procedure.history import list_jumped_spans
 from adapters.procedure.progress import Progress
 from adapters.procedure.record import read_run_record
 from adapters.procedure.run import run_scene
-from adapters.procedure.status import status
+from adapters.procedure.status import read_status
 from adapters.report.figure import draw_settlement
 from adapters.report.page import write_report
 from adapters.scene.file import load_scene
-from adapters.scene.model import left_out
+from adapters.scene.model import list_omissions
 from trackbed.command import main
-from trackbed.report.page import number, per_cent, plain
-from trackbed.scenes import scene_path
+from trackbed.report.page import format_number, format_share, mark_number
+from trackbed.scenes import find_scene_file
 
 pytestmark = pytest.mark.lowest
 
@@ -49,7 +49,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run of the fake engine with its control, and its report."""
     folder = tmp_path_factory.mktemp("report") / "run"
     run_scene(
-        scene_path("karrech-coarse"),
+        find_scene_file("karrech-coarse"),
         folder,
         control=True,
         overrides=SMALL,
@@ -132,7 +132,9 @@ def test_status_ends_with_what_came_out(
     assert ("within 0.5 %" if off < 0.5 else f"{off:.0f} % ") in beside
     assert f" {max(run['speed_up'], 1 / run['speed_up']):.1f} times " in beside
     assert main(["status", str(finished), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out) == json.loads(json.dumps(asdict(status(finished))))
+    assert json.loads(capsys.readouterr().out) == json.loads(
+        json.dumps(asdict(read_status(finished)))
+    )
     empty = tmp_path / "run"
     shutil.copytree(finished, empty, ignore=shutil.ignore_patterns("window*", "jump*", "control"))
     assert main(["status", str(empty)]) == 0
@@ -318,7 +320,7 @@ def test_report_of_a_part_of_a_run(
     for sentence in sentences:
         assert sentence in page
     assert numbers["error_rows"] == []
-    assert status(copy).cycle == numbers["cycle"]
+    assert read_status(copy).cycle == numbers["cycle"]
 
 
 @pytest.mark.long
@@ -350,7 +352,7 @@ def test_failed_jumps_are_named_counted_and_charged(finished: Path, copy: Path) 
 def test_scene_without_loading(tmp_path: Path) -> None:
     """A scene that is prepared and not loaded has a report of its preparation."""
     scene = tmp_path / "scene.toml"
-    text = scene_path("karrech-coarse").read_text(encoding="utf-8")
+    text = find_scene_file("karrech-coarse").read_text(encoding="utf-8")
     text = re.sub(r"\[loading\].*?(?=\[engine\])", "", text, flags=re.DOTALL)
     scene.write_text(text, encoding="utf-8")
     run_scene(scene, tmp_path / "run", overrides=SMALL[:2], progress=Progress(quiet=True))
@@ -359,23 +361,23 @@ def test_scene_without_loading(tmp_path: Path) -> None:
     assert RunFolder(tmp_path / "run").stage_names() == ["preparation"]
     assert "prepared and not loaded" in page
     assert "the scene names none" in page
-    assert status(tmp_path / "run").state == "finished"
-    assert status(tmp_path / "run").next.startswith("trackbed report ")
+    assert read_status(tmp_path / "run").state == "finished"
+    assert read_status(tmp_path / "run").next.startswith("trackbed report ")
 
 
 def test_status(copy: Path) -> None:
     """The status tells cycles, speed-up in cycles and the next command; it notices a writer."""
-    content = status(copy)
+    content = read_status(copy)
     assert (content.state, content.cycle, content.total_cycles) == ("finished", 40, 40)
     assert content.cycles_computed + content.cycles_jumped == 40
     assert content.speed_up_so_far == pytest.approx(40 / content.cycles_computed)
     assert content.control_cycle == 40
-    with RunFolder(copy).locked():
-        assert status(copy).state == "running"
+    with RunFolder(copy).lock():
+        assert read_status(copy).state == "running"
     assert json.loads(json.dumps(asdict(content), allow_nan=False)) == asdict(content)
     remove(copy, "window_00003*", "window_00002*", "jump_00002*")
-    RunFolder(copy).event("stopped", why="stopped by SIGTERM\n  -> go on")
-    stopped = status(copy)
+    RunFolder(copy).add_event("stopped", why="stopped by SIGTERM\n  -> go on")
+    stopped = read_status(copy)
     assert (stopped.state, stopped.why) == ("stopped", "stopped by SIGTERM")
     assert stopped.next == f"trackbed resume {copy}"
 
@@ -395,20 +397,20 @@ def test_plotting_library_is_loaded_only_to_draw() -> None:
 def test_numbers_are_typeset() -> None:
     """A number keeps its full value, has a real minus sign, and a dash when not known; powers of
     ten and per cents are as in print."""
-    assert number(None, "") == number(float("nan"), "nan") == "\N{EN DASH}"
-    assert number(-0.5, "-0.5") == '<data value="-0.5">\N{MINUS SIGN}0.5</data>'
-    assert number(1.5, "1.5 <b>") == '<data value="1.5">1.5 &lt;b&gt;</data>'
-    assert plain(3.8e-7, ".1e").endswith(
+    assert mark_number(None, "") == mark_number(float("nan"), "nan") == "\N{EN DASH}"
+    assert mark_number(-0.5, "-0.5") == '<data value="-0.5">\N{MINUS SIGN}0.5</data>'
+    assert mark_number(1.5, "1.5 <b>") == '<data value="1.5">1.5 &lt;b&gt;</data>'
+    assert format_number(3.8e-7, ".1e").endswith(
         ">3.8 \N{MULTIPLICATION SIGN} 10<sup>\N{MINUS SIGN}7</sup></data>"
     )
-    assert per_cent(-0.0691).endswith(">\N{MINUS SIGN}6.9 %</data>")
+    assert format_share(-0.0691).endswith(">\N{MINUS SIGN}6.9 %</data>")
 
 
 def test_what_is_left_out_follows_from_the_scene() -> None:
     """Friction, mirrors, damping and jumps are named exactly where the scene has them."""
 
     def said(*overrides: str) -> str:
-        return " ".join(left_out(load_scene(scene_path("karrech-coarse"), overrides)))
+        return " ".join(list_omissions(load_scene(find_scene_file("karrech-coarse"), overrides)))
 
     text = said()
     assert "Elata and Berryman" in text

@@ -12,9 +12,9 @@ import pytest
 from adapters.files.run_folder import Outcome
 from adapters.procedure.record import Record
 from adapters.report import jumps as report_jumps
-from adapters.report.jumps import hung, owed
+from adapters.report.jumps import describe_hung_cycles, describe_shortfall
 from adapters.scene.file import load_scene
-from trackbed.scenes import scene_path
+from trackbed.scenes import find_scene_file
 
 
 def record(*notes: dict[str, Any]) -> Record:
@@ -26,8 +26,13 @@ def record(*notes: dict[str, Any]) -> Record:
 def test_only_what_is_left_at_the_end_is_told() -> None:
     """A debt that a later jump paid, jumps by the law, no jump: nothing.  30 of 70 um: 40 owed."""
     short, whole = {"asked": 7e-5, "gain": 3e-5}, {"asked": 7e-5, "gain": 7e-5}
-    assert owed(record()) == owed(record({})) == owed(record(short, whole)) == ""
-    assert ">40.0</data> µm less" in owed(record(whole, short))
+    assert (
+        describe_shortfall(record())
+        == describe_shortfall(record({}))
+        == describe_shortfall(record(short, whole))
+        == ""
+    )
+    assert ">40.0</data> µm less" in describe_shortfall(record(whole, short))
 
 
 @pytest.mark.parametrize(
@@ -44,12 +49,12 @@ def test_a_piston_that_hung_is_told(
 ) -> None:
     """In which cycles, and how many jumps were made then or in the k_i = 10 cycles behind; nothing
     where it did not hang, or there is no load."""
-    scene = load_scene(scene_path("karrech-coarse"), ["procedure.k_i=10"])
+    scene = load_scene(find_scene_file("karrech-coarse"), ["procedure.k_i=10"])
     made = [("jump", Outcome("jump", first, first + 5, [], {})) for first in jumps]
     run = SimpleNamespace(outcomes=[], jumps=made)
     monkeypatch.setattr(report_jumps, "find_hung_cycles", lambda *_: np.array(cycles, int))
-    found = hung(cast(Record, SimpleNamespace(scene=scene, run=run)))
+    found = describe_hung_cycles(cast(Record, SimpleNamespace(scene=scene, run=run)))
     assert re.search(said, found, re.DOTALL)
     assert bool(found) == bool(cycles)
     bare = SimpleNamespace(procedure=scene.procedure, loading=None)
-    assert hung(cast(Record, SimpleNamespace(scene=bare, run=run))) == ""
+    assert describe_hung_cycles(cast(Record, SimpleNamespace(scene=bare, run=run))) == ""

@@ -17,7 +17,7 @@ from rigid_lcp import (
     solve_friction,
 )
 from rigid_lcp.errors import ProblemError, SceneError, ShapeError, UsageError
-from rigid_lcp.friction.problem.definition import friction_problem
+from rigid_lcp.friction.problem.definition import make_problem
 
 SQUARE = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
 W = np.diag([1.0, 2.0, 1.0, 2.0])
@@ -176,7 +176,7 @@ def test_what_the_caller_owns_stays_as_it_was():
     rows = sp.csr_array((np.array([1.0, 1.0, 2.0]), np.array([0, 0, 1]), np.array([0, 2, 3])))
     q, mu = np.array([-1.0, 0.5]), np.array([0.5])
     kept = rows.data.copy(), rows.indices.copy(), rows.indptr.copy()
-    problem = friction_problem(rows, q, mu, 2)
+    problem = make_problem(rows, q, mu, 2)
     for before, after in zip(kept, (rows.data, rows.indices, rows.indptr), strict=True):
         np.testing.assert_array_equal(before, after)
     np.testing.assert_array_equal(problem.delassus.toarray(), [[2.0, 0.0], [0.0, 2.0]])

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigid_lcp import Disc, HalfSpace, Polygon
-from rigid_lcp.contact.arrays import Contacts, contact_rows
-from rigid_lcp.contact.detection_plane import detect_2d, shapes_2d, widest_face
-from rigid_lcp.contact.near_pairs import bound_shapes, near_pairs, place_shapes
+from rigid_lcp.contact.arrays import Contacts, match_keys
+from rigid_lcp.contact.detection_plane import detect_2d, find_widest_face, pack_shapes_2d
+from rigid_lcp.contact.near_pairs import bound_shapes, find_near_pairs, place_shapes
 from rigid_lcp.errors import SceneError
 
 BOX = Polygon.rectangle(1.0, 1.0)
@@ -18,7 +18,7 @@ BOX = Polygon.rectangle(1.0, 1.0)
 
 def found(shapes: list[object], places: list[tuple[float, float]], angles: list[float],
           margin: float = 1e-3) -> Contacts:  # fmt: skip
-    arrays = shapes_2d(shapes, np.array([not isinstance(s, HalfSpace) for s in shapes]))
+    arrays = pack_shapes_2d(shapes, np.array([not isinstance(s, HalfSpace) for s in shapes]))
     return detect_2d(arrays, np.array(places, float), np.array(angles, float), margin)
 
 
@@ -77,13 +77,13 @@ def test_discs() -> None:
 
 
 def test_fixed_bodies_do_not_touch_each_other() -> None:
-    arrays = shapes_2d([BOX, BOX, HalfSpace((0, 1))], np.array([False, False, False]))
+    arrays = pack_shapes_2d([BOX, BOX, HalfSpace((0, 1))], np.array([False, False, False]))
     assert len(detect_2d(arrays, np.array([(0, 0.5), (0.5, 0.5), (0, 0)]), np.zeros(3), 1.0)) == 0
 
 
 def test_shape_of_space_refused() -> None:
     with pytest.raises(SceneError, match="plane"):
-        shapes_2d([HalfSpace((0, 0, 1))], np.array([False]))
+        pack_shapes_2d([HalfSpace((0, 0, 1))], np.array([False]))
 
 
 def heap(seed: int, count: int = 40) -> tuple[list[object], np.ndarray, np.ndarray]:
@@ -99,7 +99,7 @@ def heap(seed: int, count: int = 40) -> tuple[list[object], np.ndarray, np.ndarr
 def test_broad_phase_finds_every_near_pair(seed: int) -> None:
     """Against all pairs of boxes in plain NumPy."""
     shapes, places, angles = heap(seed)
-    arrays = shapes_2d(shapes, np.ones(len(shapes), bool))
+    arrays = pack_shapes_2d(shapes, np.ones(len(shapes), bool))
     vertices, _ = place_shapes(
         arrays.kind, arrays.first, arrays.vertices, arrays.normals, places, angles
     )
@@ -107,7 +107,7 @@ def test_broad_phase_finds_every_near_pair(seed: int) -> None:
     x0, y0, x1, y1 = boxes.T
     near = (x0[:, None] <= x1) & (x0 <= x1[:, None]) & (y0[:, None] <= y1) & (y0 <= y1[:, None])
     expected = np.argwhere(np.triu(near, 1))
-    np.testing.assert_array_equal(near_pairs(arrays.kind, boxes, arrays.movable), expected)
+    np.testing.assert_array_equal(find_near_pairs(arrays.kind, boxes, arrays.movable), expected)
 
 
 @pytest.mark.long
@@ -119,7 +119,7 @@ def test_turned_scene_has_turned_contacts(seed: int, turn: float, shift: float) 
     rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
     here = found(shapes, places, angles, 1e-2)
     there = found(shapes, places @ rotation.T + shift, angles + turn, 1e-2)
-    rows, known = contact_rows(there.key, here.key)
+    rows, known = match_keys(there.key, here.key)
     sure = np.abs(here.gap - 2e-2) > 1e-9  # a contact at the margin may fall on either side
     assert known[sure].mean() > 0.9  # ties between two faces may be broken otherwise
     np.testing.assert_allclose(there.gap[rows[known]], here.gap[known], atol=1e-11)
@@ -137,10 +137,10 @@ def test_keys_name_one_contact_each(seed: int) -> None:
 
 
 def test_rows_of_keys() -> None:
-    rows, there = contact_rows(np.array([5, 3, 9]), np.array([3, 4, 9, 5]))
+    rows, there = match_keys(np.array([5, 3, 9]), np.array([3, 4, 9, 5]))
     np.testing.assert_array_equal(there, [True, False, True, True])
     np.testing.assert_array_equal(rows[there], [1, 2, 0])
-    assert not contact_rows(np.zeros(0, np.int64), np.array([1]))[1].any()
+    assert not match_keys(np.zeros(0, np.int64), np.array([1]))[1].any()
 
 
 @given(st.floats(-3, 3), st.floats(-3, 3), st.floats(0, 6))
@@ -150,5 +150,5 @@ def test_widest_face_is_the_separation(x: float, y: float, turn: float) -> None:
     own, c, s = Polygon.regular(5, 1.0), np.cos(turn), np.sin(turn)
     other = Polygon.regular(3, 0.7).vertices @ np.array([[c, s], [-s, c]]) + [x, y]
     heights = np.einsum("fvi,fi->fv", other - own.vertices[:, None], own.normals).min(axis=1)
-    face, separation = widest_face(own.vertices, own.normals, other)
+    face, separation = find_widest_face(own.vertices, own.normals, other)
     assert [separation, heights[face]] == pytest.approx([heights.max()] * 2, abs=1e-14)

@@ -7,16 +7,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_lcp import Disc, HalfSpace, Polyhedron, Sphere, box
+from rigid_lcp import Disc, HalfSpace, Polyhedron, Sphere, make_box
 from rigid_lcp.contact.manifold import MOST_KEPT
-from rigid_lcp.contact.near_pairs import bound_shapes, near_pairs
-from rigid_lcp.contact.placed_solids import place_solids, shapes_3d
+from rigid_lcp.contact.near_pairs import bound_shapes, find_near_pairs
+from rigid_lcp.contact.placed_solids import pack_shapes_3d, place_solids
 from rigid_lcp.errors import SceneError
 from rigid_lcp.shapes.rotations import (
-    quaternion_of_rotation,
-    quaternion_product,
+    make_quaternion,
+    multiply_quaternions,
+    normalise_quaternion,
     rotate,
-    unit_quaternion,
 )
 from tests.rigid_solids import (
     CUBE,
@@ -62,8 +62,8 @@ def test_aligned_boxes_have_four_contacts_whatever_the_round_off(shift: float) -
 
 def test_crossed_bars_share_a_square() -> None:
     """A bar across another: all four contacts are crossings of edges."""
-    bar = box(3.0, 1.0, 1.0)
-    across = quaternion_of_rotation([0.0, 0.0, np.pi / 2])
+    bar = make_box(3.0, 1.0, 1.0)
+    across = make_quaternion([0.0, 0.0, np.pi / 2])
     found = contacts([bar, bar], [[0, 0, 0], [0, 0, 1.0]], [UPRIGHT, across])
     wanted = [[-0.5, -0.5], [0.5, -0.5], [-0.5, 0.5], [0.5, 0.5]]
     assert np.allclose(sorted_points(found)[:, :2], wanted, atol=1e-15)
@@ -71,7 +71,7 @@ def test_crossed_bars_share_a_square() -> None:
 
 def test_a_shared_octagon_keeps_its_corners() -> None:
     """Cubes turned by 45 degrees share a regular octagon, over all of which they may bear."""
-    turned = quaternion_of_rotation([0.0, 0.0, np.pi / 4])
+    turned = make_quaternion([0.0, 0.0, np.pi / 4])
     found = contacts([CUBE, CUBE], [[0, 0, 0], [0, 0, 1.0]], [UPRIGHT, turned])
     radius = 0.5 / np.cos(np.pi / 8)
     assert len(found) == 8
@@ -95,8 +95,8 @@ def test_many_corners_are_thinned_out_evenly() -> None:
 def test_tilted_faces_have_the_gap_of_each_corner(digits: float, x: float, y: float) -> None:
     """A small box over a wide one: each corner of it has its own height as gap."""
     tilt = 10**digits * 0.09 * np.array([x, y, 0.0])
-    small, wide = box(0.4, 0.4, 0.4), box(2.0, 2.0, 1.0)
-    quaternion = quaternion_of_rotation(tilt)
+    small, wide = make_box(0.4, 0.4, 0.4), make_box(2.0, 2.0, 1.0)
+    quaternion = make_quaternion(tilt)
     found = contacts([wide, small], [[0, 0, 0], [0, 0, 0.71]], [UPRIGHT, quaternion], margin=0.1)
     corners = np.array([0, 0, 0.71]) + rotate(quaternion, small.vertices)
     low = np.sort(corners[:, 2])[:4] - 0.5
@@ -106,7 +106,7 @@ def test_tilted_faces_have_the_gap_of_each_corner(digits: float, x: float, y: fl
 
 def test_crossing_edges_have_the_cross_product_as_normal() -> None:
     first, second = ([np.pi / 4, 0, 0], [0, np.pi / 4, 0.3])
-    turns = [quaternion_of_rotation(first), quaternion_of_rotation(second)]
+    turns = [make_quaternion(first), make_quaternion(second)]
     u, w = rotate(turns[0], [1.0, 0, 0]), rotate(turns[1], [0, 1.0, 0])
     normal = np.cross(u, w) / np.linalg.norm(np.cross(u, w))
     normal *= np.sign(normal[2])
@@ -187,11 +187,11 @@ def test_numbering_does_not_matter(seed: int) -> None:
 @given(st.integers(0, 10_000))
 def test_contacts_turn_with_the_scene(seed: int) -> None:
     shapes, position, quaternion = near_pair(seed)
-    turn = unit_quaternion(np.random.default_rng(seed + 1).normal(size=4))
+    turn = normalise_quaternion(np.random.default_rng(seed + 1).normal(size=4))
     shift = np.array([0.3, -0.7, 0.2])
     found = contacts(shapes, position, quaternion)
     moved = contacts(
-        shapes, rotate(turn, position) + shift, quaternion_product(turn[None], quaternion)
+        shapes, rotate(turn, position) + shift, multiply_quaternions(turn[None], quaternion)
     )
     assert np.array_equal(found.key, moved.key)
     assert np.allclose(rotate(turn, found.point) + shift, moved.point, atol=1e-14)
@@ -218,7 +218,7 @@ def test_names_last(seed: int) -> None:
     generator = np.random.default_rng(seed)
     cubes, position = [CUBE, CUBE], np.array([[0.0, 0, 0], [*generator.uniform(-0.4, 0.4, 2), 1]])
     first = contacts(cubes, position)
-    turns = quaternion_of_rotation(1e-6 * generator.normal(size=(2, 3)))
+    turns = make_quaternion(1e-6 * generator.normal(size=(2, 3)))
     later = contacts(cubes, position + 1e-4 * generator.normal(size=(2, 3)), turns)
     assert set(first.key) == set(later.key)
     assert len(set(first.key)) == 4
@@ -247,7 +247,7 @@ def test_pairs_are_those_of_all_boxes() -> None:
     position = generator.random((61, 3))
     movable = generator.random(61) < 0.8
     movable[60] = False
-    arrays = shapes_3d(shapes, movable)
+    arrays = pack_shapes_3d(shapes, movable)
     solids = place_solids(arrays, position, np.tile(UPRIGHT, (61, 1)))
     boxes = bound_shapes(
         solids.first_vertex, solids.vertex, arrays.reach, position, np.full(61, 0.01)
@@ -259,7 +259,7 @@ def test_pairs_are_those_of_all_boxes() -> None:
         if (movable[i] or movable[j])
         and (j == 60 or ((boxes[i, :3] <= boxes[j, 3:]) & (boxes[j, :3] <= boxes[i, 3:])).all())
     ]
-    found = near_pairs(arrays.kind, boxes, movable)
+    found = find_near_pairs(arrays.kind, boxes, movable)
     assert [tuple(pair) for pair in found.tolist()] == wanted
 
 
@@ -272,4 +272,4 @@ def test_no_bodies_near_no_contacts() -> None:
 def test_shapes_of_the_plane_are_refused() -> None:
     for shape in (Disc(1.0), HalfSpace([0.0, 1.0])):
         with pytest.raises(SceneError, match="shape in space"):
-            shapes_3d([shape], np.array([True]))
+            pack_shapes_3d([shape], np.array([True]))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import rigid_lcp
-from rigid_lcp import Disc, Polygon, Polyhedron, Scene, Simulation, Sphere, box, errors
+from rigid_lcp import Disc, Polygon, Polyhedron, Scene, Simulation, Sphere, errors, make_box
 from rigid_lcp.errors import NotConverged, RigidError, ShapeError, UsageError
 
 NAMES = {
@@ -24,7 +24,7 @@ NEAR = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1e-10, 0], [1e-10, 0, 1]
 def test_a_line_or_plane_that_misses_names_the_body_and_how_far_to_move_it(dim):
     """By the way that the remedy names it goes through the centre of mass."""
     scene = Scene(dim=dim)
-    shape = Polygon.rectangle(1, 1) if dim == 2 else box(1, 1, 1)
+    shape = Polygon.rectangle(1, 1) if dim == 2 else make_box(1, 1, 1)
     scene.add(shape, density=1.0, name="stone", position=np.ones(dim))
     place = np.full(dim, 5.5)
     run, along = Simulation(scene), np.eye(dim)[1 if dim == 2 else 0]
@@ -61,7 +61,7 @@ def test_shapes_with_too_much_or_too_near_name_their_body(dim, shape, words):
 def test_a_spin_too_fast_for_the_step_names_its_body(dim):
     """1e5 rad/s for a step of 1 ms are 100 rad."""
     scene = Scene(dim=dim)
-    shape = Polygon.rectangle(0.2, 0.1) if dim == 2 else box(0.2, 0.1, 0.1)
+    shape = Polygon.rectangle(0.2, 0.1) if dim == 2 else make_box(0.2, 0.1, 0.1)
     scene.add(shape, density=1.0, spin=1e5 * np.eye(1 if dim == 2 else 3)[0], name="a")
     with pytest.raises(NotConverged, match=r"^a: it turns by 100 rad"):
         Simulation(scene).advance(0.01)

@@ -7,8 +7,8 @@ import pytest
 
 from rigid_lcp.errors import SceneError
 from rigid_lcp.report.page import draw_movie
-from rigid_lcp.scene.file import scene_read
-from rigid_lcp.scene.run import left_out, scene_run, simulation_of, summary_of
+from rigid_lcp.scene.file import load_scene
+from rigid_lcp.scene.run import list_left_out, make_simulation, run_scene, summarise_run
 from rigid_lcp.scene.run_folder import RunFolder, pack_bodies
 from tests.rigid_runs import WORN_AND_BROKEN, WORN_IN_SPACE
 
@@ -16,17 +16,17 @@ from tests.rigid_runs import WORN_AND_BROKEN, WORN_IN_SPACE
 def scene_file(tmp_path, text=WORN_AND_BROKEN):
     path = tmp_path / "scene.toml"
     path.write_text(text)
-    return scene_read(path)
+    return load_scene(path)
 
 
 @pytest.mark.long
 def test_frames_of_changed_bodies_are_drawn(tmp_path):
     """Worn and broken bodies as they were in each frame; `test_rigid_resume` goes on from them."""
     file = scene_file(tmp_path)
-    scene, run = simulation_of(file)
+    scene, run = make_simulation(file)
     folder = RunFolder(tmp_path / "run")
     folder.path.mkdir()
-    scene_run(file, run, folder, resume=False, progress=lambda *_: None)
+    run_scene(file, run, folder, resume=False, progress=lambda *_: None)
     assert run.broken
     assert run.worn.volume > 0
     assert len(draw_movie(folder, scene, "broken")) == 7
@@ -35,11 +35,11 @@ def test_frames_of_changed_bodies_are_drawn(tmp_path):
 def test_a_run_that_asks_for_neither_keeps_no_bodies(tmp_path):
     text = WORN_AND_BROKEN[: WORN_AND_BROKEN.index("[wear]")]
     file = scene_file(tmp_path, text)
-    _, run = simulation_of(file)
+    _, run = make_simulation(file)
     assert run.worn is None
     assert pack_bodies(run) == {}
-    assert sum("abrasion" in line or "fragmentation" in line for line in left_out(file)) == 2
-    assert not any("abrasion" in line for line in left_out(scene_file(tmp_path)))
+    assert sum("abrasion" in line or "fragmentation" in line for line in list_left_out(file)) == 2
+    assert not any("abrasion" in line for line in list_left_out(scene_file(tmp_path)))
 
 
 @pytest.mark.parametrize(("old", "new", "words"), [
@@ -56,14 +56,14 @@ def test_tables_that_are_refused(tmp_path, old, new, words):
 def test_wear_in_space_is_kept_and_named(tmp_path):
     """`test_rigid_resume` goes on from its frames; the summary names what went."""
     file = scene_file(tmp_path, WORN_IN_SPACE)
-    scene, run = simulation_of(file)
+    scene, run = make_simulation(file)
     folder = RunFolder(tmp_path / "run")
     folder.path.mkdir()
-    scene_run(file, run, folder, resume=False, progress=lambda *_: None)
+    run_scene(file, run, folder, resume=False, progress=lambda *_: None)
     arrays = pack_bodies(run)
     assert arrays["wear_counts"].tolist()[0] == -1
     assert arrays["wear_lost"].sum() > 0
-    summary = summary_of(file, scene, run, folder)
+    summary = summarise_run(file, scene, run, folder)
     assert summary["worn"] == run.worn.volume > 0
     assert summary["worn_mass"] == pytest.approx(2700 * arrays["wear_lost"].sum())
     last = folder.frames()[-1]  # of corners that wore in another way: computed again
@@ -74,7 +74,7 @@ def test_wear_in_space_is_kept_and_named(tmp_path):
 
 def test_bodies_of_a_frame_are_numbered_as_they_broke(tmp_path):
     file = scene_file(tmp_path)
-    _, run = simulation_of(file)
+    _, run = make_simulation(file)
     part = run.fragment(1, ([0.0, 0.1], [0.0, 1.0]))
     second = run.fragment(part, ([0.05, 0.1], [1.0, 0.0]))
     arrays = pack_bodies(run)

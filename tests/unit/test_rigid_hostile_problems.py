@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from rigid_lcp import solve_friction
 from rigid_lcp.arrays import Floats
-from rigid_lcp.friction.problem.cones import natural_map, natural_residual
-from rigid_lcp.friction.problem.definition import friction_problem, judge_forces
+from rigid_lcp.friction.problem.cones import find_natural_map, find_natural_residual
+from rigid_lcp.friction.problem.definition import judge_forces, make_problem
 from tests.rigid_static_problems import tower
 
 W = np.diag([1.0, 2.0, 1.0, 2.0])
@@ -32,7 +32,7 @@ def test_great_friction_does_not_hide_an_approach():
     """
     mu = 1e6
     for slip in (1.0, 1e5, 1e11):
-        error = natural_map(np.zeros((1, 2)), np.array([[-1.0, -slip]]), np.array([mu]), 1.0)
+        error = find_natural_map(np.zeros((1, 2)), np.array([[-1.0, -slip]]), np.array([mu]), 1.0)
         expected = -np.array([1.0, mu]) / (1 + mu**2)
         np.testing.assert_allclose(error[0], expected, rtol=1e-12)
 
@@ -42,11 +42,11 @@ def test_the_residual_of_tiny_and_huge_numbers(scale):
     """It has no units: squares that vanish or overflow made everything a solution."""
     force, velocity = np.array([[1.0, 0.2], [0.0, 0.0]]), np.array([[0.1, 0.3], [-1.0, 2.0]])
     mu = np.array([0.5, 0.3])
-    once = natural_residual(force, velocity, mu, 1.0)
-    assert natural_residual(scale * force, scale * velocity, mu, 1.0) == pytest.approx(once)
-    assert natural_residual(scale * force, velocity, mu, scale) == pytest.approx(once)
-    assert natural_residual(0 * force, scale * velocity, mu, 1.0) > 0.1
-    assert not np.isfinite(natural_residual(force, np.nan * velocity, mu, 1.0))
+    once = find_natural_residual(force, velocity, mu, 1.0)
+    assert find_natural_residual(scale * force, scale * velocity, mu, 1.0) == pytest.approx(once)
+    assert find_natural_residual(scale * force, velocity, mu, scale) == pytest.approx(once)
+    assert find_natural_residual(0 * force, scale * velocity, mu, 1.0) > 0.1
+    assert not np.isfinite(find_natural_residual(force, np.nan * velocity, mu, 1.0))
 
 
 @pytest.mark.parametrize("method", ["auto", "gauss-seidel", "pivoting"])
@@ -69,7 +69,7 @@ def test_bodies_may_come_to_rest_as_slowly_as_they_like(scale):
 
 def test_forces_without_bound_are_no_solution_and_the_message_says_so():
     """W = 0 at a contact that approaches: r = 1e18 has a residual of zero."""
-    problem = friction_problem(np.zeros((2, 2)), [-1.0, 0.0], 0.5, 2)
+    problem = make_problem(np.zeros((2, 2)), [-1.0, 0.0], 0.5, 2)
     found = judge_forces(problem, np.array([1e18, 0.0]), 1e-12, "any")
     assert found.status == "not converged"
     assert "without bound" in found.message

@@ -8,7 +8,7 @@ import pickle
 import numpy as np
 import pytest
 
-from rigid_lcp import Disc, HalfSpace, Polygon, Scene, Simulation, box
+from rigid_lcp import Disc, HalfSpace, Polygon, Scene, Simulation, make_box
 from rigid_lcp.errors import (
     NotConverged,
     Overlapping,
@@ -245,7 +245,7 @@ def test_a_line_or_plane_of_another_kind_is_named(line):
     """In space each of these was an error of numpy, in the plane the second."""
     runs = [at_rest()]
     scene = Scene(3)
-    scene.add(box(0.1, 0.1, 0.1), density=2700)
+    scene.add(make_box(0.1, 0.1, 0.1), density=2700)
     runs.append(Simulation(scene))
     for run, body in zip(runs, (1, 0), strict=True):
         with pytest.raises(SceneError, match="fragment"):

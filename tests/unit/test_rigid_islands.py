@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.sparse.csgraph import connected_components
 
-from rigid_lcp.friction.auto.islands import cut_out_island, islands, solve_islands
-from rigid_lcp.friction.methods.gauss_seidel import gauss_seidel
-from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, friction_problem
+from rigid_lcp.friction.auto.islands import cut_out_island, find_islands, solve_islands
+from rigid_lcp.friction.methods.gauss_seidel import solve_gauss_seidel
+from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, make_problem
 from tests.rigid_networks import random_bodies
 
 
@@ -20,7 +20,7 @@ def three_islands(dim: int) -> FrictionProblem:
     pairs = [(0, -1), (3, 2), (4, -1), (1, 0), (2, -1)]
     space = random_bodies(pairs, 5, dim, np.random.default_rng(3))
     offset = np.tile([-1.0, 0.4, -0.2][:dim], 5)
-    problem = friction_problem(space, offset, 0.4, dim)
+    problem = make_problem(space, offset, 0.4, dim)
     assert isinstance(problem, FrictionProblem)
     return problem
 
@@ -38,13 +38,13 @@ def test_ground_and_held_bodies_join_nothing() -> None:
     held[3:6, 3:6] = 0.0
     space = BodySpace(space.jacobian, sp.csr_array(held), 3)
     problem = FrictionProblem(None, np.zeros(4), np.zeros(2), 2, space)
-    assert [part.tolist() for part in islands(problem)] == [[0], [1]]
+    assert [part.tolist() for part in find_islands(problem)] == [[0], [1]]
 
 
 def test_no_contacts() -> None:
     problem = FrictionProblem(sp.csr_array((0, 0)), np.zeros(0), np.zeros(0), 2)
-    assert islands(problem) == []
-    assert solve_islands(problem, gauss_seidel).solved
+    assert find_islands(problem) == []
+    assert solve_islands(problem, solve_gauss_seidel).solved
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -78,10 +78,10 @@ def test_same_answer_apart_and_however_numbered(pairs, seed, dim):
     generator = np.random.default_rng(seed)
     offset = space.jacobian @ generator.normal(size=8 * space.body_size)
     problem = FrictionProblem(None, offset, np.full(len(pairs), 0.3), dim, space)
-    apart = solve_islands(problem, gauss_seidel, tolerance=1e-10, sweeps=3000)
+    apart = solve_islands(problem, solve_gauss_seidel, tolerance=1e-10, sweeps=3000)
     if apart.solved:
         assert problem.residual(apart.r) <= 1e-10
-    parts = islands(problem)
+    parts = find_islands(problem)
     order = np.concatenate([parts[k] for k in generator.permutation(len(parts))])
     rows = (order[:, None] * dim + np.arange(dim)).ravel()
     size = space.body_size
@@ -92,7 +92,7 @@ def test_same_answer_apart_and_however_numbered(pairs, seed, dim):
     )  # fmt: skip
     again = solve_islands(
         FrictionProblem(None, offset[rows], problem.friction[order], dim, moved),
-        gauss_seidel, tolerance=1e-10, sweeps=3000,
+        solve_gauss_seidel, tolerance=1e-10, sweeps=3000,
     )  # fmt: skip
     assert again.solved == apart.solved
     if apart.solved:
@@ -108,8 +108,8 @@ def test_whole_is_as_fine_as_asked() -> None:
     velocity = np.random.default_rng(5).normal(size=6)
     offset = np.concatenate([1e-3 * heavy.jacobian @ velocity, light.jacobian @ velocity])
     matrix = sp.block_diag([heavy.matrix * 1e-6, light.matrix]).tocsr()
-    problem = friction_problem(matrix, offset, 0.3, 2)
-    found = solve_islands(problem, gauss_seidel, tolerance=1e-9, sweeps=5000)
+    problem = make_problem(matrix, offset, 0.3, 2)
+    found = solve_islands(problem, solve_gauss_seidel, tolerance=1e-9, sweeps=5000)
     assert found.residual <= 1e-9
     assert found.solved
     assert found.work["islands"] == 2
@@ -118,8 +118,8 @@ def test_whole_is_as_fine_as_asked() -> None:
 def test_islands_without_a_solution_are_named() -> None:
     """A contact that approaches and can not move (W = 0) has no force; the other is solved."""
     matrix = sp.csr_array(np.diag([1.0, 1.0, 0.0, 0.0]))
-    problem = friction_problem(matrix, [-1.0, 0.0, -1.0, 0.0], 0.3, 2)
-    found = solve_islands(problem, gauss_seidel)
+    problem = make_problem(matrix, [-1.0, 0.0, -1.0, 0.0], 0.3, 2)
+    found = solve_islands(problem, solve_gauss_seidel)
     assert found.status == "no solution"
     assert "contact 1" in found.message
     np.testing.assert_array_equal(found.r, [1.0, 0.0, 0.0, 0.0])
@@ -141,5 +141,5 @@ def test_islands_are_the_connected_parts_of_w(seed, bodies, contacts, factors, d
     pattern = blocks.max(axis=(1, 3)) > 0
     _, label = connected_components(sp.csr_array(pattern), directed=False)
     expected = sorted(np.flatnonzero(label == k).tolist() for k in np.unique(label))
-    found = islands(problem if factors else as_matrix(problem))
+    found = find_islands(problem if factors else as_matrix(problem))
     assert [part.tolist() for part in found] == expected

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from rigid_lcp.errors import ProblemError, UsageError
-from rigid_lcp.friction.methods.dantzig import dantzig
-from rigid_lcp.friction.methods.gauss_seidel import gauss_seidel
-from rigid_lcp.friction.methods.interior_point import interior_point
-from rigid_lcp.friction.methods.newton import newton
-from rigid_lcp.friction.methods.pivoting import pivoting
-from rigid_lcp.friction.problem.definition import friction_problem
+from rigid_lcp.friction.methods.dantzig import solve_dantzig
+from rigid_lcp.friction.methods.gauss_seidel import solve_gauss_seidel
+from rigid_lcp.friction.methods.interior_point import solve_interior_point
+from rigid_lcp.friction.methods.newton import solve_newton
+from rigid_lcp.friction.methods.pivoting import solve_pivoting
+from rigid_lcp.friction.problem.definition import make_problem
 
-PROBLEM = friction_problem(np.diag([1.0, 2.0, 1.0, 2.0]), [-1.0, 0.5, 1.0, 0.0], 0.5, 2)
+PROBLEM = make_problem(np.diag([1.0, 2.0, 1.0, 2.0]), [-1.0, 0.5, 1.0, 0.0], 0.5, 2)
 
 
-@pytest.mark.parametrize("method", [dantzig, pivoting])
+@pytest.mark.parametrize("method", [solve_dantzig, solve_pivoting])
 @pytest.mark.parametrize("value", [0.0, -1.0, np.nan, "a", None])
 def test_tolerances_that_are_none_are_named(method, value):
     with pytest.raises(UsageError, match=rf"^tolerance: .*{value}.*\n  -> give"):
@@ -26,17 +26,21 @@ def test_tolerances_that_are_none_are_named(method, value):
 @pytest.mark.parametrize("value", ["a", -1, 0.5, None])
 def test_sweeps_that_are_none_are_named(value):
     with pytest.raises(UsageError, match=r"^sweeps: .*\n  -> give a count"):
-        pivoting(PROBLEM, sweeps=value)
+        solve_pivoting(PROBLEM, sweeps=value)
 
 
-@pytest.mark.parametrize("method", [dantzig, pivoting])
+@pytest.mark.parametrize("method", [solve_dantzig, solve_pivoting])
 @pytest.mark.parametrize("value", ["a", [1.0], [np.nan, 1.0], ["a", "b"], [1j, 0.0]])
 def test_tangential_velocities_that_are_none_are_named(method, value):
     with pytest.raises(ProblemError, match="tangential_velocity"):
         method(PROBLEM, tangential_velocity=value)
 
 
-COUNTS = {newton: "iterations", gauss_seidel: "sweeps", interior_point: "iterations"}
+COUNTS = {
+    solve_newton: "iterations",
+    solve_gauss_seidel: "sweeps",
+    solve_interior_point: "iterations",
+}
 
 
 @pytest.mark.parametrize("method", COUNTS)
@@ -51,7 +55,7 @@ def test_tolerances_and_counts_that_are_none_are_named(method):
     assert method(PROBLEM, **{COUNTS[method]: 0}).status == "not converged"
 
 
-@pytest.mark.parametrize("method", [newton, gauss_seidel])
+@pytest.mark.parametrize("method", [solve_newton, solve_gauss_seidel])
 @pytest.mark.parametrize("start", [[np.nan] * 4, [np.inf] * 4, [1.0, 2.0], "a", [1j] * 4])
 def test_starts_that_are_none_are_named(method, start):
     """NaN came back as the best forces known."""

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rigid_lcp.errors import RigidError, SceneError, ShapeError
-from rigid_lcp.scene.file import force_at, loads_of, scene_build, scene_read
+from rigid_lcp.scene.file import build_scene, find_force, load_scene, make_loads
 from rigid_lcp.scene.types import Load
 from rigid_lcp.shapes.irregular import draw_polygon
 
@@ -41,18 +41,18 @@ def written(tmp_path: Path, text: str) -> Path:
 
 
 def test_a_block_on_the_ground_has_the_mass_of_its_area(tmp_path: Path) -> None:
-    scene = scene_build(scene_read(written(tmp_path, SMALL)))
+    scene = build_scene(load_scene(written(tmp_path, SMALL)))
     block = scene.bodies[1]
     assert block.mass == pytest.approx(2000 * 0.2 * 0.1)
     assert block.inertia == pytest.approx(block.mass * (0.2**2 + 0.1**2) / 12)
     assert block.friction == 0.0
-    given = scene_build(scene_read(written(tmp_path, SMALL + "inertia = 1e6\n"))).bodies[1]
+    given = build_scene(load_scene(written(tmp_path, SMALL + "inertia = 1e6\n"))).bodies[1]
     assert (given.mass, given.inertia) == (block.mass, 1e6)
 
 
 def test_surface_serves_bodies_without_values_of_their_own(tmp_path: Path) -> None:
     text = SMALL + "friction = 0.2\n\n[surface]\nfriction = 0.7\nrestitution = 0.1\n"
-    scene = scene_build(scene_read(written(tmp_path, text)))
+    scene = build_scene(load_scene(written(tmp_path, text)))
     assert [body.friction for body in scene.bodies] == [0.7, 0.2]
     assert [body.restitution for body in scene.bodies] == [0.1, 0.1]
 
@@ -60,7 +60,7 @@ def test_surface_serves_bodies_without_values_of_their_own(tmp_path: Path) -> No
 def test_every_problem_is_named_with_its_line(tmp_path: Path) -> None:
     text = SMALL.replace("duration = 0.01", "duration = -1\nstpe = 1").replace("2000.0", "0")
     with pytest.raises(SceneError) as caught:
-        scene_read(written(tmp_path, text))
+        load_scene(written(tmp_path, text))
     message = str(caught.value)
     assert "3 problems" in message
     assert "scene.toml:4: run.duration" in message
@@ -143,7 +143,7 @@ def test_every_problem_is_named_with_its_line(tmp_path: Path) -> None:
 )
 def test_what_is_wrong_is_said(tmp_path: Path, old: str, new: str, said: str) -> None:
     with pytest.raises(SceneError, match=r"(?s)" + said):
-        scene_read(written(tmp_path, SMALL.replace(old, new)))
+        load_scene(written(tmp_path, SMALL.replace(old, new)))
 
 
 @pytest.mark.long
@@ -166,20 +166,20 @@ def test_damaged_scenes_give_sentences_only(tmp_path: Path) -> None:
                 damaged[at] = damaged[at][: random.randint(0, len(damaged[at]))]
         path = written(tmp_path, "\n".join(damaged))
         with suppress(RigidError):
-            scene_build(scene_read(path))
+            build_scene(load_scene(path))
 
 
 def test_cyclic_load_runs_between_its_forces() -> None:
     load = Load(body="a", force=[0, -8], least=[0, -2], frequency=5, begin=1.0, end=3.0)
-    np.testing.assert_allclose(force_at(load, 1.0), [0, -2])
-    np.testing.assert_allclose(force_at(load, 1.1), [0, -8])
-    np.testing.assert_allclose(force_at(load, 1.2), [0, -2], atol=1e-12)
-    np.testing.assert_array_equal(force_at(load, 0.999), [0, 0])
-    np.testing.assert_array_equal(force_at(load, 3.001), [0, 0])
+    np.testing.assert_allclose(find_force(load, 1.0), [0, -2])
+    np.testing.assert_allclose(find_force(load, 1.1), [0, -8])
+    np.testing.assert_allclose(find_force(load, 1.2), [0, -2], atol=1e-12)
+    np.testing.assert_array_equal(find_force(load, 0.999), [0, 0])
+    np.testing.assert_array_equal(find_force(load, 3.001), [0, 0])
     load = Load(body="block", force=[3.0, 0.0], least=[-3.0, 0.0], frequency=2.0, phase=np.pi / 2)
     for time in (0.0, 0.05, 0.2, 0.4):  # from a quarter of a cycle on: 3 sin(2 pi f t)
         expected = [3 * np.sin(4 * np.pi * time), 0.0]
-        np.testing.assert_allclose(force_at(load, time), expected, atol=1e-12)
+        np.testing.assert_allclose(find_force(load, time), expected, atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -191,13 +191,13 @@ def test_cyclic_load_runs_between_its_forces() -> None:
 )
 def test_a_shape_that_is_none_is_named(tmp_path: Path, old: str, new: str, said: str) -> None:
     with pytest.raises(ShapeError, match=said):
-        scene_build(scene_read(written(tmp_path, SMALL.replace(old, new))))
+        build_scene(load_scene(written(tmp_path, SMALL.replace(old, new))))
 
 
 def test_a_load_acts_on_the_named_body_alone() -> None:
-    file = scene_read(PILE)
-    scene = scene_build(file)
-    loads = loads_of(file)
+    file = load_scene(PILE)
+    scene = build_scene(file)
+    loads = make_loads(file)
     assert loads is not None
     from rigid_lcp.motion.world import make_world
 

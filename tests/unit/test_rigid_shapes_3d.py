@@ -7,12 +7,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from rigid_lcp import Polyhedron, Sphere, box
+from rigid_lcp import Polyhedron, Sphere, make_box
 from rigid_lcp.errors import ShapeError
 
 
 def test_faces_of_a_box_are_rectangles() -> None:
-    cuboid = box(1.0, 2.0, 3.0)
+    cuboid = make_box(1.0, 2.0, 3.0)
     assert len(cuboid.vertices) == 8
     assert [len(face) for face in cuboid.faces] == [4] * 6
     assert len(cuboid.edges) == 12
@@ -22,14 +22,14 @@ def test_faces_of_a_box_are_rectangles() -> None:
 
 
 def test_points_are_kept_about_the_centre_of_mass() -> None:
-    moved = Polyhedron(box(1.0, 2.0, 3.0).vertices + np.array([5.0, 6.0, 7.0]))
+    moved = Polyhedron(make_box(1.0, 2.0, 3.0).vertices + np.array([5.0, 6.0, 7.0]))
     assert np.allclose(moved.centroid, [5.0, 6.0, 7.0])
-    assert np.allclose(np.sort(moved.vertices, axis=0), np.sort(box(1, 2, 3).vertices, axis=0))
+    assert np.allclose(np.sort(moved.vertices, axis=0), np.sort(make_box(1, 2, 3).vertices, axis=0))
 
 
 def test_points_inside_faces_edges_and_hull_are_dropped() -> None:
     extra = [[0.0, 0.0, 0.0], [0.5, 0.1, 0.2], [0.5, 0.5, 0.1]]
-    cuboid = Polyhedron(np.vstack([box(1.0, 1.0, 1.0).vertices, extra]))
+    cuboid = Polyhedron(np.vstack([make_box(1.0, 1.0, 1.0).vertices, extra]))
     assert [len(face) for face in cuboid.faces] == [4] * 6
     assert len(cuboid.edges) == 12
 
@@ -46,14 +46,14 @@ def test_faces_flat_to_round_off_are_one() -> None:
 
 @pytest.mark.parametrize("unit", [1e-6, 1e6])
 def test_size_does_not_matter(unit: float) -> None:
-    assert [len(face) for face in box(unit, 2 * unit, 3 * unit).faces] == [4] * 6
+    assert [len(face) for face in make_box(unit, 2 * unit, 3 * unit).faces] == [4] * 6
 
 
 def test_mass_follows_density() -> None:
     mass, inertia = Sphere(0.5).mass_properties(3.0)
     assert mass == pytest.approx(3.0 * np.pi / 6)
     assert np.allclose(inertia, 0.4 * mass * 0.25 * np.eye(3))
-    mass, inertia = box(1.0, 1.0, 1.0).mass_properties(6.0)
+    mass, inertia = make_box(1.0, 1.0, 1.0).mass_properties(6.0)
     assert mass == pytest.approx(6.0)
     assert np.allclose(inertia, np.eye(3))
 
@@ -80,7 +80,7 @@ def test_points_that_span_no_volume_are_refused(points: np.ndarray) -> None:
         *(lambda r=r: Sphere(r) for r in ("a", -1.0, 0.0, np.nan, np.inf)),
         lambda: Polyhedron("abc"),
         lambda: Polyhedron([[0, 0, 0], [1, 0], [0, 1, 0], [0, 0, 1]]),
-        lambda: box(-1.0, -1.0, 1.0), lambda: box(1e-120, 1e-120, 1e-120),
+        lambda: make_box(-1.0, -1.0, 1.0), lambda: make_box(1e-120, 1e-120, 1e-120),
         lambda: Polyhedron(1e-120 * np.eye(4, 3)),
     ],
 )  # fmt: skip
@@ -94,14 +94,14 @@ def test_flatter_than_faces_can_be_distinguished_is_flat(high: float) -> None:
     with pytest.raises(ShapeError, match="in a plane"):
         Polyhedron([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.3, 0.3, high]])
     with pytest.raises(ShapeError, match="in a plane"):  # and no warning before it
-        box(1.0, 1.0, high)
+        make_box(1.0, 1.0, high)
 
 
 def test_a_shape_of_corners_is_made_again_to_the_last_bit() -> None:
-    stone = Polyhedron.of_corners(
+    stone = Polyhedron.from_corners(
         Polyhedron(np.random.default_rng(3).normal(size=(20, 3))).vertices
     )
-    again = Polyhedron.of_corners(stone.vertices)
+    again = Polyhedron.from_corners(stone.vertices)
     assert np.array_equal(again.vertices, stone.vertices)
     assert np.array_equal(again.normals, stone.normals)
     assert np.array_equal(again.inertia, stone.inertia)

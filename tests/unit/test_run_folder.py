@@ -145,7 +145,7 @@ def test_a_received_folder_leads_nowhere_else(run: RunFolder, tmp_path: Path, na
         place.rename(tmp_path / "away")
         before = tree(tmp_path)
     place.symlink_to(outside)
-    with pytest.raises(UsageError, match=f"symbolic link .{name}.") as caught, run.locked():
+    with pytest.raises(UsageError, match=f"symbolic link .{name}.") as caught, run.lock():
         pass
     assert "remove the link" in caught.value.remedy
     with pytest.raises(UsageError, match="symbolic link"):
@@ -226,10 +226,10 @@ def test_failed_jump(run: RunFolder) -> None:
 
 def test_events_survive_a_torn_line(run: RunFolder) -> None:
     """A line cut by a crash, or bytes that are no text, hide no other event."""
-    run.event("one", cycle=3)
+    run.add_event("one", cycle=3)
     with (run.path / "events.jsonl").open("ab") as stream:
         stream.write(b'{"event": "tor\xff\n')
-    run.event("two")
+    run.add_event("two")
     assert [e["event"] for e in run.events()][-2:] == ["one", "two"]
 
 

@@ -19,7 +19,7 @@ from adapters.jumps.schedule import schedule_jumps
 from adapters.scene.file import load_scene
 from adapters.scene.tables import Loading, Procedure, Scene
 from trackbed.scene_files.lines import find_key_lines
-from trackbed.scenes import find_scene_verb, list_scenes, read_template, scene_path
+from trackbed.scenes import find_scene_file, find_scene_verb, list_scenes, read_template
 
 pytestmark = pytest.mark.lowest
 
@@ -89,11 +89,11 @@ def test_shipped_scenes_load_without_doubts() -> None:
 def test_new_names_the_verb_that_reads_the_scene() -> None:
     """`trackbed new` says which verb goes on: that whose reader takes the scene."""
     from qdem_fem.tables.prepared import read_tables as qdem_scene
-    from rigid_lcp.scene.file import scene_read as rigid_scene
+    from rigid_lcp.scene.file import load_scene as rigid_scene
 
     readers = {"run": load_scene, "qdem": qdem_scene, "rigid": rigid_scene}
     for name in list_scenes():
-        readers[find_scene_verb(name)](scene_path(name))
+        readers[find_scene_verb(name)](find_scene_file(name))
 
 
 def test_shipped_scenes_are_what_they_say(tmp_path: Path) -> None:
@@ -108,12 +108,12 @@ def test_shipped_scenes_are_what_they_say(tmp_path: Path) -> None:
     assert scene.piston_reach == inf
     assert float(scene.stress_at(0.5) - scene.stress_at(0)) == pytest.approx(14150, rel=1e-14)
     assert scene.restitution == pytest.approx(0.2145, abs=5e-5)
-    part = load_scene(scene_path("karrech-partial"))
+    part = load_scene(find_scene_file("karrech-partial"))
     assert pi * part.piston_reach**2 / 4 == pytest.approx(part.loaded_area, rel=1e-14)
     assert part.loaded_area == pytest.approx(0.8 * part.container.area, rel=1e-14)
     assert part.loading is not None
     assert (part.loading.amplitude, part.loading.period) == (5870, 0.1)
-    coarse = load_scene(scene_path("karrech-coarse"))
+    coarse = load_scene(find_scene_file("karrech-coarse"))
     assert float(coarse.stress_at(0.5)) * coarse.loaded_area == pytest.approx(10.0, rel=1e-3)
     assert float(coarse.stress_at(3.0)) == pytest.approx(0, abs=1e-9)
 

@@ -43,7 +43,7 @@ def test_unit_is_that_of_the_header(tmp_path: Path, column: str, unit: str) -> N
     assert series.unit == unit
     assert series.cycle.tolist() == [10.0, 20.0, 30.5]
     assert series.settlement.tolist() == [0.25, 0.5, 0.75]
-    assert series.since(20).settlement.tolist() == [0.5, 0.75]
+    assert series.keep_from(20).settlement.tolist() == [0.5, 0.75]
 
 
 def test_only_computed_rows_are_taken(tmp_path: Path) -> None:
@@ -282,6 +282,6 @@ def test_settlement_before_the_count_began_is_known() -> None:
     """Behind a change of the load: the last reading up to it; rows left out change nothing."""
     series = Series(np.array([1.0, 2.0, 5.0, 9.0]), np.array([0.1, 0.2, 0.3, 0.4]))
     assert series.begun == 0
-    assert series.after(2).begun == series.after(4).begun == 0.2
-    assert series.since(5).begun == 0
-    assert series.after(2).since(4).begun == 0.2
+    assert series.restart_after(2).begun == series.restart_after(4).begun == 0.2
+    assert series.keep_from(5).begun == 0
+    assert series.restart_after(2).keep_from(4).begun == 0.2

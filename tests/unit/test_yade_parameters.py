@@ -22,20 +22,20 @@ from adapters.engines.yade import (
     cover_piston,
     cover_rim,
     cover_side,
-    damping_ratio,
+    find_damping_ratio,
     gather_shared_parameters,
 )
 from adapters.errors import EngineFailed, SceneError
 from adapters.scene.file import load_scene
 from adapters.scene.tables import Scene
 from trackbed import command
-from trackbed.scenes import scene_path
+from trackbed.scenes import find_scene_file
 
 ENGINE = YadeEngine()
 
 
 def coarse(*overrides: str) -> Scene:
-    return load_scene(scene_path("karrech-coarse"), ('engine.name="yade"', *overrides))
+    return load_scene(find_scene_file("karrech-coarse"), ('engine.name="yade"', *overrides))
 
 
 def cross(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -56,18 +56,18 @@ def areas(triangles: FloatArray) -> FloatArray:
 @pytest.mark.long
 def test_damping_of_rebound_makes_the_rebound(restitution: float) -> None:
     """Integrated without a pull, the damping rebounds as asked, and exceeds that with a pull."""
-    ratio = law.damping_of_rebound(restitution)
-    hit = law.collision(0.3, 2e9, 3e-3, 1e-4, ratio, may_pull=False)
+    ratio = law.find_rebound_damping(restitution)
+    hit = law.solve_collision(0.3, 2e9, 3e-3, 1e-4, ratio, may_pull=False)
     assert hit.restitution == pytest.approx(restitution, abs=1e-8)
-    assert ratio > law.DAMPING_FACTOR * law.alpha_of_restitution(restitution)
+    assert ratio > law.DAMPING_FACTOR * law.find_alpha(restitution)
 
 
 def test_each_key_of_the_scene_is_what_it_says() -> None:
     """viscous_alpha names the viscous force, restitution the rebound; 1 is no damping at all."""
-    assert damping_ratio(coarse()) == law.DAMPING_FACTOR * 0.44
-    text = scene_path("karrech-coarse").read_text()
+    assert find_damping_ratio(coarse()) == law.DAMPING_FACTOR * 0.44
+    text = find_scene_file("karrech-coarse").read_text()
     assert "viscous_alpha = 0.44" in text
-    assert law.damping_of_rebound(1.0) == 0.0
+    assert law.find_rebound_damping(1.0) == 0.0
 
 
 def test_pairs_have_the_friction_of_the_scene() -> None:
@@ -79,7 +79,7 @@ def test_pairs_have_the_friction_of_the_scene() -> None:
         "wall": 0.0,
         "mirror": 0.0,
     }
-    damping = damping_ratio(scene)
+    damping = find_damping_ratio(scene)
     assert all(pair["damping_normal"] == damping for pair in pairs.values())
     tangential = [pairs[name]["damping_tangential"] for name in ("grain", "wall", "mirror")]
     assert tangential == [damping, 0.0, 0.0]
@@ -241,7 +241,7 @@ def test_run_that_fails(tmp_path: Path, program, work: str, words: str, from_out
 
 def test_dry_run_prints_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """``trackbed run --dry-run`` leaves scripts and parameters, and says how to run them."""
-    words = ["run", str(scene_path("karrech-coarse")), "--engine", "yade", "--dry-run"]
+    words = ["run", str(find_scene_file("karrech-coarse")), "--engine", "yade", "--dry-run"]
     assert command.main([*words, "--run-folder", str(tmp_path / "run")]) == 0
     assert "yade -n -x -j1 prepare.py params.json" in capsys.readouterr().out
     names = {path.name for path in (tmp_path / "run" / "dry_run").iterdir()}

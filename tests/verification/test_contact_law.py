@@ -19,11 +19,11 @@ LENGTH = st.floats(1e-5, 1.0)
 @given(young=YOUNG, poisson=POISSON)
 def test_equivalent_moduli_of_equal_grains(young: float, poisson: float) -> None:
     """Two alike: E* = E/(2 (1 - nu^2)) and G* = G/(2 (2 - nu)), as below eqs 5 and 6."""
-    shear = law.shear_modulus(young, poisson)
-    assert law.equivalent_modulus(young, poisson, young, poisson) == pytest.approx(
+    shear = law.find_shear_modulus(young, poisson)
+    assert law.combine_moduli(young, poisson, young, poisson) == pytest.approx(
         young / (2 * (1 - poisson**2)), rel=1e-14
     )
-    assert law.equivalent_shear_modulus(young, poisson, young, poisson) == pytest.approx(
+    assert law.combine_shear_moduli(young, poisson, young, poisson) == pytest.approx(
         shear / (2 * (2 - poisson)), rel=1e-14
     )
 
@@ -35,11 +35,11 @@ def test_mirror_is_a_rigid_plane(young: float, poisson: float, radius: float) ->
     Two mirrored grains overlap by 2 delta, the grain and the plane by delta: with E* twice as
     large and R* twice as large the force is 2 * sqrt(2)/2^(3/2) = 1 times the same.
     """
-    plane = law.equivalent_modulus(young, poisson, inf, 0.0)
-    pair = law.equivalent_modulus(young, poisson, young, poisson)
+    plane = law.combine_moduli(young, poisson, inf, 0.0)
+    pair = law.combine_moduli(young, poisson, young, poisson)
     overlap = 1e-3 * radius
-    assert law.normal_force(overlap, plane, radius) == pytest.approx(
-        law.normal_force(2 * overlap, pair, radius / 2), rel=1e-13
+    assert law.find_normal_force(overlap, plane, radius) == pytest.approx(
+        law.find_normal_force(2 * overlap, pair, radius / 2), rel=1e-13
     )
 
 
@@ -48,26 +48,30 @@ def test_stiffness_and_inverse_of_the_normal_force(
     overlap: float, modulus: float, radius: float
 ) -> None:
     """S_n = dF/d delta = 3/2 F/delta, and the overlap under a force is the inverse of eq. 5."""
-    force = law.normal_force(overlap, modulus, radius)
-    assert law.normal_stiffness(overlap, modulus, radius) == pytest.approx(
+    force = law.find_normal_force(overlap, modulus, radius)
+    assert law.find_normal_stiffness(overlap, modulus, radius) == pytest.approx(
         1.5 * force / overlap, rel=1e-13
     )
-    assert law.overlap_under_force(force, modulus, radius) == pytest.approx(overlap, rel=1e-12)
+    assert law.find_overlap_under_force(force, modulus, radius) == pytest.approx(overlap, rel=1e-12)
 
 
 def test_no_force_without_overlap() -> None:
     """Grains apart exert nothing: force and stiffnesses are zero for an open gap."""
     gaps = np.array([-1e-3, 0.0])
-    for function in (law.normal_force, law.normal_stiffness, law.tangential_stiffness):
+    for function in (
+        law.find_normal_force,
+        law.find_normal_stiffness,
+        law.find_tangential_stiffness,
+    ):
         assert function(gaps, 1e10, 1e-3).tolist() == [0, 0]
 
 
 @given(poisson=POISSON)
 def test_ratio_of_stiffnesses(poisson: float) -> None:
     """k_t/S_n = 4 G*/E* = 2 (1 - nu)/(2 - nu), Mindlin's ratio for two equal grains."""
-    normal = law.normal_stiffness(1e-6, law.equivalent_modulus(1e9, poisson, 1e9, poisson), 1e-3)
-    shear = law.equivalent_shear_modulus(1e9, poisson, 1e9, poisson)
-    tangential = law.tangential_stiffness(1e-6, shear, 1e-3)
+    normal = law.find_normal_stiffness(1e-6, law.combine_moduli(1e9, poisson, 1e9, poisson), 1e-3)
+    shear = law.combine_shear_moduli(1e9, poisson, 1e9, poisson)
+    tangential = law.find_tangential_stiffness(1e-6, shear, 1e-3)
     assert tangential / normal == pytest.approx(2 * (1 - poisson) / (2 - poisson), rel=1e-13)
 
 
@@ -97,12 +101,14 @@ def test_elastic_impacts_of_chung_and_ooi(
     The figures have five digits, so the tolerance is half a unit of the fifth.
     """
     partner = (inf, 0.0) if wall else (young, poisson)
-    modulus = law.equivalent_modulus(young, poisson, *partner)
+    modulus = law.combine_moduli(young, poisson, *partner)
     r = radius if wall else radius / 2
     mass = 4 / 3 * pi * density * radius**3
-    hit = law.hertz_collision(speed, modulus, r, mass if wall else mass / 2)
+    hit = law.solve_hertz_collision(speed, modulus, r, mass if wall else mass / 2)
     assert hit.overlap_max == pytest.approx(overlap, rel=5e-5)
-    assert float(law.normal_force(hit.overlap_max, modulus, r)) == pytest.approx(force, rel=5e-5)
+    assert float(law.find_normal_force(hit.overlap_max, modulus, r)) == pytest.approx(
+        force, rel=5e-5
+    )
     assert hit.contact_time == pytest.approx(time, rel=5e-5)
 
 
@@ -118,9 +124,9 @@ def test_integration_meets_the_closed_form(
     speed: float, modulus: float, radius: float, mass: float
 ) -> None:
     """Without damping the integrated collision is Hertz's, at its tolerance of 1e-10 a step."""
-    closed = law.hertz_collision(speed, modulus, radius, mass)
+    closed = law.solve_hertz_collision(speed, modulus, radius, mass)
     for may_pull in (True, False):
-        ode = law.collision(speed, modulus, radius, mass, 0.0, may_pull=may_pull)
+        ode = law.solve_collision(speed, modulus, radius, mass, 0.0, may_pull=may_pull)
         assert ode.restitution == pytest.approx(1, abs=1e-7)
         assert ode.overlap_max == pytest.approx(closed.overlap_max, rel=1e-7)
         assert ode.contact_time == pytest.approx(closed.contact_time, rel=1e-6)
@@ -135,16 +141,16 @@ def test_restitution_of_both_laws(alpha: float, speed: float, radius: float) -> 
     """
     modulus, mass = 1e10, 4 / 3 * pi * 2710 * radius**3 / 2
     arguments = (speed, modulus, radius / 2, mass)
-    engine = law.collision(*arguments, law.DAMPING_FACTOR * alpha)
-    assert engine.restitution == pytest.approx(law.restitution_of_alpha(alpha), abs=1e-6)
-    literal = law.collision(*arguments, alpha)
-    assert literal.restitution == pytest.approx(law.restitution_literal(alpha), abs=1e-6)
+    engine = law.solve_collision(*arguments, law.DAMPING_FACTOR * alpha)
+    assert engine.restitution == pytest.approx(law.find_restitution(alpha), abs=1e-6)
+    literal = law.solve_collision(*arguments, alpha)
+    assert literal.restitution == pytest.approx(law.find_literal_restitution(alpha), abs=1e-6)
 
 
 def test_restitution_of_the_papers_alpha() -> None:
     """alpha = 0.44: 0.2145 as the paper defines alpha, 0.1776 with eq. 7 taken literally."""
-    assert law.restitution_of_alpha(0.44) == pytest.approx(0.2145, abs=5e-5)
-    assert law.restitution_literal(0.44) == pytest.approx(0.1776, abs=5e-5)
+    assert law.find_restitution(0.44) == pytest.approx(0.2145, abs=5e-5)
+    assert law.find_literal_restitution(0.44) == pytest.approx(0.1776, abs=5e-5)
 
 
 @pytest.mark.parametrize(
@@ -155,17 +161,17 @@ def test_restitution_without_tension(restitution: float, measured: float) -> Non
 
     Two spheres with ``limitForce on``; the measured figures have three digits.
     """
-    ratio = law.DAMPING_FACTOR * law.alpha_of_restitution(restitution)
-    hit = law.collision(1.0, 1e10, 1e-3, 1e-4, ratio, may_pull=False)
+    ratio = law.DAMPING_FACTOR * law.find_alpha(restitution)
+    hit = law.solve_collision(1.0, 1e10, 1e-3, 1e-4, ratio, may_pull=False)
     assert hit.restitution == pytest.approx(measured, abs=6e-4)
 
 
 @given(alpha=st.floats(0, 0.99))
 def test_alpha_and_restitution_are_inverse(alpha: float) -> None:
     """alpha -> e -> alpha, and e = e^(-pi alpha/...) falls from 1 as alpha grows."""
-    restitution = law.restitution_of_alpha(alpha)
+    restitution = law.find_restitution(alpha)
     assert 0 < restitution <= 1
-    assert law.alpha_of_restitution(restitution) == pytest.approx(alpha, rel=1e-9, abs=1e-15)
+    assert law.find_alpha(restitution) == pytest.approx(alpha, rel=1e-9, abs=1e-15)
     linear_oscillator = log(restitution) * sqrt(1 - alpha**2)
     assert linear_oscillator == pytest.approx(-pi * alpha, rel=1e-9, abs=1e-15)
 
@@ -175,6 +181,6 @@ def test_alpha_and_restitution_are_inverse(alpha: float) -> None:
 )
 def test_rayleigh_time_is_liggghts(young: float, time_step: float, fraction: float) -> None:
     """``check/timestep/gran`` of LIGGGHTS 3.8.0 printed these shares, smallest grain 2.07 mm."""
-    time = law.rayleigh_time(2.07e-3, 2710, young, 0.25)
+    time = law.find_rayleigh_time(2.07e-3, 2710, young, 0.25)
     last_digit = 10.0 ** -(len(str(fraction)) - 2)
     assert time_step / time == pytest.approx(fraction, abs=last_digit / 2)

@@ -257,7 +257,7 @@ def test_faulty_series_are_refused() -> None:
     huge = Series(np.arange(1.0, 11.0), 1e300 * np.arange(10.0))
     with pytest.raises(NotConverged, match=r"no finite settlement at cycle 1e[+]300"):
         fit_series(huge, get_law("linear"), 1e300)
-    late = Series(huge.cycle + 500, huge.settlement).after(500)
+    late = Series(huge.cycle + 500, huge.settlement).restart_after(500)
     with pytest.raises(NotConverged, match="no finite settlement at cycle 1000000500"):
         fit_series(late, get_law("linear"), 1e9)
     with pytest.raises(JumpRefused, match="was reached at cycle 502"):

@@ -20,12 +20,12 @@ from adapters.laws.fit.candidates import (
     count_held_out_rows,
     find_candidates,
     fit_constant_rate_gains,
-    thinned,
+    thin_rows,
 )
-from adapters.laws.fit.outlook import AGREE, compare_laws, outlook
+from adapters.laws.fit.outlook import AGREE, compare_laws, find_outlook
 from adapters.laws.fit.prediction import Prediction, Series, find_regime, fit_auto, fit_series
-from adapters.laws.fit.refusal import UNCERTAIN, refusals
-from adapters.laws.fit.regime import SHAKEDOWN, find_regimes, independent, select_tail
+from adapters.laws.fit.refusal import UNCERTAIN, find_refusals
+from adapters.laws.fit.regime import SHAKEDOWN, count_independent, find_regimes, select_tail
 from trackbed.command import main
 
 READ = np.unique(np.geomspace(1, 1000, 22).round())
@@ -86,8 +86,8 @@ def test_alike_residuals_count_for_fewer() -> None:
     """k (1 - rho) / (1 + rho): white noise counts fully, a random walk for a few."""
     random = np.random.default_rng(0)
     white = random.standard_normal((2000, 1))
-    assert 1700 < independent(white)[0] <= 2000
-    assert independent(white.cumsum(axis=0))[0] < 30
+    assert 1700 < count_independent(white)[0] <= 2000
+    assert count_independent(white.cumsum(axis=0))[0] < 30
 
 
 def test_exponent_knows_how_little_a_computed_series_says() -> None:
@@ -98,7 +98,7 @@ def test_exponent_knows_how_little_a_computed_series_says() -> None:
     """
     cycle = np.arange(1.0, 101.0)
     walks = 0.02 * np.random.default_rng(4).standard_normal((100, 200)).cumsum(axis=0)
-    found = find_regimes(*thinned(cycle, np.log(cycle)[:, None] + walks))
+    found = find_regimes(*thin_rows(cycle, np.log(cycle)[:, None] + walks))
     assert sum(abs(regime.exponent) < 2 * regime.deviation for regime in found) >= 140
     assert all(regime.jump_allowed for regime in found)
 
@@ -138,7 +138,7 @@ def test_band_holds_a_constant_rate_that_the_tail_shows(
     truth = 1 + slowing(ahead) + 3e-4 * ahead
     for seed in range(10):
         noise = 0.001 * np.random.default_rng(seed).standard_normal(len(cycle))
-        found = outlook(cycle, (truth[:-1] + np.ptp(truth[:-1]) * noise)[:, None], 1e4)
+        found = find_outlook(cycle, (truth[:-1] + np.ptp(truth[:-1]) * noise)[:, None], 1e4)
         inside += bool(found.low[0] <= truth[-1] <= found.high[0])
     assert inside >= 7
 
@@ -175,13 +175,13 @@ def test_a_band_wider_than_the_past_is_no_prediction() -> None:
     all that settled.  Beside it a logarithm is let go ahead.  At N_k itself there is a reading.
     """
     series = np.stack([READ**0.45, np.log(READ) + 1], axis=1)
-    near, far, here = (outlook(READ, series, to) for to in (1200, 1e5, READ[-1]))
+    near, far, here = (find_outlook(READ, series, to) for to in (1200, 1e5, READ[-1]))
     assert (far.high - far.low)[0] > 2 * series[-1, 0] > (near.high - near.low)[0]
-    found = refusals(far)
+    found = find_refusals(far)
     assert found[0] is not None
     assert found[0].regime == UNCERTAIN
     assert "differ too much" in found[0].why
-    assert [found[1], *refusals(near), *refusals(here)] == [None] * 5
+    assert [found[1], *find_refusals(near), *find_refusals(here)] == [None] * 5
     with pytest.raises(JumpRefused, match="differ too much") as raised:
         fit_auto(Series(READ, series[:, 0]), 1e5)
     assert (raised.value.exit_code, raised.value.regime) == (6, UNCERTAIN)
@@ -218,7 +218,7 @@ def test_collapse_is_refused_before_a_number_too_large() -> None:
 def moved(settlement: FloatArray) -> Series:
     """The series at `READ` behind a load change at cycle 20,000."""
     whole = Series(np.append(2e4, 2e4 + READ), np.append(0.0, settlement))
-    return whole.after(2e4)
+    return whole.restart_after(2e4)
 
 
 def test_sentences_count_as_the_user_does() -> None:
@@ -248,11 +248,11 @@ def test_sentences_count_as_the_user_does() -> None:
     assert [sentence.startswith(reached) for sentence in said(READ, 1e4, 100.0)] == [True] * 2
     predicted = "is predicted at cycle 120000, and 8 was given"
     assert [predicted in sentence for sentence in said(np.log(READ) + 1, 1e5, 8.0)] == [True] * 2
-    endless = outlook(READ, np.log(READ)[:, None], 1e4)
+    endless = find_outlook(READ, np.log(READ)[:, None], 1e4)
     endless = replace(endless, high=np.array([np.inf]), counted_from=2e4)
     with pytest.raises(NotConverged, match="no finite settlement at cycle 30000"):
-        refusals(endless)
-    assert "N counted" not in str(refusals(outlook(READ, READ[:, None], 1e4)))
+        find_refusals(endless)
+    assert "N counted" not in str(find_refusals(find_outlook(READ, READ[:, None], 1e4)))
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -288,7 +288,7 @@ def test_a_prediction_that_reaches_failure_is_refused(name: str, sign: int) -> N
 
 def test_which_laws_agree() -> None:
     """Of an exact logarithm the logarithm agrees, and the hyperbola, which ends, does not."""
-    found = outlook(READ, (np.log(READ) + 1)[:, None], 1e6)
+    found = find_outlook(READ, (np.log(READ) + 1)[:, None], 1e6)
     said = compare_laws(found)
     assert list(said) == list(SLOW_LAWS)
     assert said["log"].agrees
@@ -312,13 +312,13 @@ def test_agreement_is_that_of_what_comes(level: float) -> None:
     a bed at rest: one that moves by its last digit only.
     """
     read = (np.log(READ) + 1 + level)[:, None]
-    said = compare_laws(outlook(READ, read, 1100.0))
+    said = compare_laws(find_outlook(READ, read, 1100.0))
     assert [name for name, one in said.items() if not one.agrees] == ["hyperbolic"]
     assert said["hyperbolic"].prediction == pytest.approx(said["log"].prediction, rel=0.01)
-    assert all(one.agrees for one in compare_laws(outlook(READ, read, 1001.0)).values())
+    assert all(one.agrees for one in compare_laws(find_outlook(READ, read, 1001.0)).values())
     digit = 1e-3 * np.random.default_rng(1).integers(0, 2, len(READ))
     for rest in (np.zeros(len(READ)), digit):
-        said = compare_laws(outlook(READ, (level + rest)[:, None], 1100.0))
+        said = compare_laws(find_outlook(READ, (level + rest)[:, None], 1100.0))
         assert all(one.agrees for one in said.values())
 
 
@@ -332,8 +332,8 @@ def test_agreement_is_that_of_what_comes(level: float) -> None:
 def test_outlook_has_no_units_and_no_direction(seed: int, unit: float, period: float) -> None:
     """Strain, %, mm, heave; cycles, seconds, gross tonnes: the same regime, prediction and band."""
     read = noisy(np.log1p(READ / 20), seed)[:, None]
-    here = outlook(READ, read, 1e4)
-    there = outlook(READ * period, unit * read, 1e4 * period)
+    here = find_outlook(READ, read, 1e4)
+    there = find_outlook(READ * period, unit * read, 1e4 * period)
     assert here.regime[0].name == there.regime[0].name
     ends = [there.prediction, *((there.low, there.high)[:: 1 if unit > 0 else -1])]
     for one, other in zip((here.prediction, here.low, here.high), ends, strict=True):
@@ -343,9 +343,9 @@ def test_outlook_has_no_units_and_no_direction(seed: int, unit: float, period: f
 def test_band_grows_with_probability_and_holds_the_prediction() -> None:
     """A more certain band holds a less certain one; it starts from nothing at the last cycle."""
     read = noisy(np.log(READ), 5)[:, None]
-    narrow, wide = (outlook(READ, read, 1e4, probability) for probability in (0.5, 0.95))
+    narrow, wide = (find_outlook(READ, read, 1e4, probability) for probability in (0.5, 0.95))
     assert wide.low <= narrow.low <= narrow.prediction <= narrow.high <= wide.high
-    near = outlook(READ, read, 1000.001)
+    near = find_outlook(READ, read, 1000.001)
     assert abs(near.prediction - read[-1]) < 1e-4
 
 
@@ -358,17 +358,17 @@ def test_settlement_does_not_turn_round() -> None:
     for seed in range(4):
         noise = 0.02 * np.random.default_rng(seed).standard_normal(len(READ))
         read = (READ / (20 + READ) + noise)[:, None]
-        assert outlook(READ, read, 1e5).low[0] > read[-1, 0] - 0.1
+        assert find_outlook(READ, read, 1e5).low[0] > read[-1, 0] - 0.1
 
 
 def test_every_decade_weighs_the_same() -> None:
     """10,000 computed cycles become 24 rows a decade, means of their neighbours, the end kept."""
     cycle = np.arange(1.0, 10001.0)
-    few, means = thinned(cycle, np.log(cycle)[:, None])
+    few, means = thin_rows(cycle, np.log(cycle)[:, None])
     assert len(few) < 90
     assert (few[-1], means[-1, 0]) == (cycle[-1], np.log(cycle[-1]))
     np.testing.assert_allclose(means[:, 0], np.log(few), atol=1e-12)
-    assert len(thinned(READ, READ[:, None])[0]) == len(READ)
+    assert len(thin_rows(READ, READ[:, None])[0]) == len(READ)
 
 
 def test_held_out_block_is_never_fitted() -> None:
@@ -404,7 +404,7 @@ def test_short_windows_are_no_obstacle(cycle: FloatArray) -> None:
     series = Series(cycle, np.log(cycle / cycle[0] + 0.5))
     found = fit_auto(series, 1.1 * cycle[-1])
     assert found.band[0] <= found.prediction <= found.band[1]
-    assert len(thinned(cycle, cycle[:, None])[0]) >= 4
+    assert len(thin_rows(cycle, cycle[:, None])[0]) >= 4
 
 
 @pytest.mark.parametrize("level", [0.0, -2.0, 0.003, 0.1, 100 / 3])

@@ -14,7 +14,7 @@ from adapters.engines import fake as engine_fake
 from adapters.engines.fake import FakeBed
 from adapters.errors import JumpRefused, SceneError
 from adapters.files.run_folder import RunFolder
-from adapters.jumps.control import joined
+from adapters.jumps.control import join_stretch
 from adapters.jumps.rates import Stretch
 from adapters.jumps.slopes import Landing
 from adapters.laws.fit.regime import RATCHETING, STEADY
@@ -23,15 +23,15 @@ from adapters.procedure import stages
 from adapters.procedure.controlled import find_sinking_regime
 from adapters.procedure.progress import Progress
 from adapters.procedure.record import list_checks, list_decisions, read_run_record
-from adapters.procedure.status import status
-from adapters.report.control import control
+from adapters.procedure.status import read_status
+from adapters.report.control import describe_control
 from adapters.report.page import write_report
 from adapters.scene.file import load_scene
 from tests.forked_commands import Commands
 from tests.jump_curves import CURVES
 from tests.small_bed import read_rows, small_bed
 from trackbed import command
-from trackbed.scenes import scene_path
+from trackbed.scenes import find_scene_file
 
 QUIET = Progress(quiet=True)
 
@@ -66,7 +66,7 @@ def test_to_the_end_with_its_control(tmp_path: Path) -> None:
     assert sum(row["kind"] != "jumped" for row in rows) < 100
     shared = Path("window_000020") / "states.npz"
     assert (tmp_path / "run" / "control" / shared).samefile(tmp_path / "run" / shared)
-    low, high = status(tmp_path / "run").band_m or (0, 0)
+    low, high = read_status(tmp_path / "run").band_m or (0, 0)
     assert low < truth < high
     write_report(tmp_path / "run")
     page = (tmp_path / "run" / "report.html").read_text()
@@ -125,7 +125,7 @@ def test_load_step_is_taken_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     cycles = [int(row["cycle"]) for row in rows]
     assert cycles == sorted(set(cycles))
     assert float(rows[-1]["settlement"]) == pytest.approx(float(step.law(np.array(200.0))), rel=0.1)
-    assert "taken back" in control(read_run_record(tmp_path / "run"))
+    assert "taken back" in describe_control(read_run_record(tmp_path / "run"))
 
 
 def test_collapse_is_refused_with_its_code(
@@ -139,7 +139,7 @@ def test_collapse_is_refused_with_its_code(
     assert command.main(["resume", str(tmp_path / "run")]) == 6
     assert command.main(["resume", str(tmp_path / "run"), "--cycle-by-cycle"]) == 0
     assert command.main(["resume", str(tmp_path / "run")]) == 0
-    assert status(tmp_path / "run").cycles_computed == 200
+    assert read_status(tmp_path / "run").cycles_computed == 200
 
 
 @pytest.mark.long
@@ -163,7 +163,7 @@ def test_a_piston_that_breaks_in_is_refused(
     assert (why in capsys.readouterr().err) == (code == 6)
     if code:
         assert command.main(["resume", str(tmp_path / "run"), "--cycle-by-cycle"]) == 0
-    assert (status(tmp_path / "run").cycles_computed == 100) == (code == 6)
+    assert (read_status(tmp_path / "run").cycles_computed == 100) == (code == 6)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.12])
@@ -182,13 +182,13 @@ def test_what_a_piston_sinks_more_behind_jumps_is_no_ratcheting(share: float) ->
         none = np.full(cycles, np.nan)
         return Stretch(first, gain * (1 + 0.1 * random.standard_normal(cycles)), none, none)
 
-    sunk = joined(sunk, window(20, 20))
+    sunk = join_stretch(sunk, window(20, 20))
     regimes, raw = [], []
     for jump in range(9):
         h = min(int(0.9 * cycle), 20 * 2**jump)
         landings.append(Landing(cycle + h, settled * np.log((cycle + h) / cycle)))
         cycle += h + 5
-        sunk = joined(sunk, window(cycle, 10))
+        sunk = join_stretch(sunk, window(cycle, 10))
         cycle += 10
         regimes.append(find_sinking_regime(sunk, landings))
         raw.append(find_sinking_regime(sunk, []))
@@ -203,12 +203,12 @@ def test_no_jump_pays_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     words = ["--tolerance", "1e-6", "--cycles", "110", "--run-folder", str(tmp_path / "run")]
     assert command.main(["run", str(scene), *words]) == 0
     assert capsys.readouterr().err.count("no jump pays") == 1
-    assert status(tmp_path / "run").cycles_computed == 110
+    assert read_status(tmp_path / "run").cycles_computed == 110
 
 
 def test_scene_keys(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A tolerance stands instead of k and h; both, or none, is an error with a sentence."""
-    scene = scene_path("karrech-coarse")
+    scene = find_scene_file("karrech-coarse")
     loaded = load_scene(scene, ["procedure.tolerance=0.02"]).procedure
     assert loaded is not None
     assert (loaded.tolerance, loaded.k, loaded.h) == (0.02, None, None)

@@ -32,9 +32,9 @@ from adapters.procedure.seating import (
 from adapters.scene.file import load_scene
 from adapters.scene.tables import Scene
 from tests.small_bed import read_rows
-from trackbed.scenes import scene_path
+from trackbed.scenes import find_scene_file
 
-COARSE = scene_path("karrech-coarse")
+COARSE = find_scene_file("karrech-coarse")
 HANGS = 30.0
 
 
@@ -145,7 +145,7 @@ def settle(
     hang(monkeypatch, lambda cycle: (cycle >= hung[0]) & (cycle <= hung[1]))
     said: list[str] = []
     progress = Progress(quiet=True)
-    monkeypatch.setattr(progress, "say", said.append)
+    monkeypatch.setattr(progress, "print_line", said.append)
     procedure.run_scene(
         COARSE,
         folder,

@@ -19,9 +19,9 @@ from adapters.laws import get_law
 from adapters.moves import RETIRED, get_move
 from adapters.moves.contract import Jump, restore_mean
 from adapters.moves.profile import extrapolate_blocks, weigh_grains
-from adapters.moves.smoothed import clipped, smoothed
+from adapters.moves.smoothed import clip_moves, smooth_moves
 from adapters.procedure.run import record_scene, resume, run_scene
-from adapters.procedure.status import status
+from adapters.procedure.status import read_status
 from adapters.scene.file import load_scene
 from tests.settling_bed import CYCLE, LOG, QUARTER, QUIET, bed, moved
 from tests.small_bed import read_rows, small_bed
@@ -54,7 +54,7 @@ def test_a_run_by_a_way_that_left_is_not_resumed(tmp_path: Path) -> None:
     manifest = json.loads((run / "manifest.json").read_text())
     manifest["overrides"].append('procedure.move="shrunk"')
     (run / "manifest.json").write_text(json.dumps(manifest))
-    for use in (resume, status):
+    for use in (resume, read_status):
         with pytest.raises(SceneError, match="is the last to have it; use 'smoothed'"):
             use(run)
 
@@ -151,7 +151,7 @@ def test_smoothing_is_its_defining_sum() -> None:
             if weight > 0:
                 weights, total = weights + weight, total + weight * move[other]
         expected[grain] = total / weights
-    np.testing.assert_allclose(smoothed(position[-1], move, reach), expected, rtol=1e-10)
+    np.testing.assert_allclose(smooth_moves(position[-1], move, reach), expected, rtol=1e-10)
     assert (np.abs(expected - move).max(axis=1) > 0.1).mean() > 0.5  # it does smooth
 
 
@@ -160,12 +160,12 @@ def test_smoothing_is_its_defining_sum() -> None:
 def test_clip_shortens_without_turning(seed: int, quantile: float) -> None:
     """Clipped moves keep their direction; the share below the bound is untouched; 1 keeps all."""
     move = np.random.default_rng(seed).standard_cauchy((40, 3))
-    short = clipped(move, quantile)
+    short = clip_moves(move, quantile)
     length, before = np.linalg.norm(short, axis=1), np.linalg.norm(move, axis=1)
     assert (length <= before * (1 + 1e-12)).all()
     assert (short == move).all(axis=1).sum() >= int(quantile * 39)
     np.testing.assert_allclose(np.cross(short, move) / before.max() ** 2, 0, atol=1e-12)
-    np.testing.assert_array_equal(clipped(move, 1.0), move)
+    np.testing.assert_array_equal(clip_moves(move, 1.0), move)
 
 
 @pytest.mark.long

@@ -28,7 +28,7 @@ from adapters.procedure.stages import Run, Variant
 from adapters.scene.file import load_scene
 from adapters.scene.tables import Scene
 from tests.small_bed import read_rows
-from trackbed.scenes import scene_path
+from trackbed.scenes import find_scene_file
 
 QUIET = Progress(quiet=True)
 
@@ -36,7 +36,7 @@ QUIET = Progress(quiet=True)
 def settle(folder: Path, *overrides: str, control: bool = False) -> list[dict[str, str]]:
     """Run the coarse scene on the fake engine; the rows of settlement.csv."""
     procedure.run_scene(
-        scene_path("karrech-coarse"),
+        find_scene_file("karrech-coarse"),
         folder,
         control=control,
         overrides=['engine.name="fake"', "procedure.h=20", *overrides],
@@ -132,7 +132,7 @@ def no_room(
     monkeypatch: pytest.MonkeyPatch, where: Callable[[State, FloatArray, float], bool]
 ) -> None:
     """No relaxation finds room ``where`` bed before, target and piston's height say so."""
-    real = jump_room.relaxed
+    real = jump_room.relax_target
 
     def relaxed(
         scene: Scene, before: State, target: FloatArray, piston_height: float
@@ -141,7 +141,7 @@ def no_room(
             raise NotConverged("made to fail")
         return real(scene, before, target, piston_height)
 
-    monkeypatch.setattr(jump_room, "relaxed", relaxed)
+    monkeypatch.setattr(jump_room, "relax_target", relaxed)
 
 
 def drop(before: State, target: FloatArray) -> float:
@@ -303,7 +303,7 @@ def test_rolling_spheres_have_two_fifths_of_their_motion_in_their_spin(
     assert np.ptp(window.radius) > 0
     spin = np.random.default_rng(0).standard_normal(window.spin.shape)
     rolling = replace(window, spin=spin, velocity=spin * window.radius[:, None])
-    rows = stages.settlement_rows(run, rolling, 0)
+    rows = stages.make_settlement_rows(run, rolling, 0)
     for row in rows:
         assert row["kinetic_rotational"] / row["kinetic_translational"] == pytest.approx(0.4)
     linear = 0.5 * np.einsum("n,ni->", window.mass * window.radius**2, spin[1] ** 2)

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 import qdem_fem as q
 from qdem_fem.files.errors import ConditionError, QdemError
 from qdem_fem.mesh.generation import make_box_mesh
-from validation.bench.qdem.meshes import delaunay_mesh
+from validation.bench.qdem.meshes import make_delaunay
 
 pytestmark = pytest.mark.lowest
 
@@ -173,7 +173,7 @@ def test_pressure_resultant(precision: Any) -> None:
     expected = np.array([-40.0 * 0.3 / (0.3 * DENSITY), 0, 0])
     assert abs(found - expected).max() < (1e-12 if precision == "float64" else 1e-5)
 
-    nodes, elements = delaunay_mesh(60, 7)
+    nodes, elements = make_delaunay(60, 7)
     stone = q.Body((nodes, elements), STEEL)
     run = free(stone)
     load = run.pressure(stone, np.arange(len(nodes)), 40.0)
@@ -187,7 +187,7 @@ def test_series_and_functions_drive_loads_alike() -> None:
     """A table, a function and a ramp of the same values give the same bits."""
     displacements = []
     table = (np.array([0.0, 0.02]), np.array([[0.0, 0, 0], [20.0, 0, 5]]))
-    ramp = q.ramp(0.02, [20.0, 0, 5])
+    ramp = q.make_ramp(0.02, [20.0, 0, 5])
     for value in (table, ramp, q.Series(*table), lambda t: ramp(t)):
         body = block()
         run = free(body)
@@ -345,7 +345,10 @@ BAD_CALLS: dict[str, tuple[str, Callable[[], object]]] = {
     "step 0": ("0", lambda: free(OTHER, step=0)),
     "text step": ("'1'", lambda: free(OTHER, step="1")),
     "safety": ("-1", lambda: free(OTHER, safety=-1)),
-    "changing gravity": ("change with time", lambda: free(OTHER, gravity=q.ramp(1.0, [0, 0, 1]))),
+    "changing gravity": (
+        "change with time",
+        lambda: free(OTHER, gravity=q.make_ramp(1.0, [0, 0, 1])),
+    ),
     "mass scaling": ("nan", lambda: free(OTHER, mass_scaling=nan)),
     "gravity": ("1 component", lambda: free(OTHER, gravity=9.81)),
     "no bodies": ("at least one", lambda: q.Simulation([])),

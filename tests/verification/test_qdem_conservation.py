@@ -20,14 +20,14 @@ from numpy.typing import ArrayLike
 
 from qdem_fem import Body, Material, Series, Simulation
 from qdem_fem.element.kinematics import compute_displacement_gradient
-from qdem_fem.mesh.generation import jitter, make_box_mesh
+from qdem_fem.mesh.generation import jitter_nodes, make_box_mesh
 from qdem_fem.mesh.tetrahedra import TetMesh
 from qdem_fem.report.spectra import find_peak_frequencies
 from validation.bench.qdem import judge
-from validation.bench.qdem.checks import orders
-from validation.bench.qdem.closed_forms import dilatational_speed
+from validation.bench.qdem.checks import fit_order
+from validation.bench.qdem.closed_forms import find_dilatational_speed
 from validation.bench.qdem.judge import FloatArray
-from validation.bench.qdem.problem import Problem, clamped, smooth_step
+from validation.bench.qdem.problem import Problem, clamp_mesh, make_smooth_step
 
 # --- energy -----------------------------------------------------------------------------------
 
@@ -39,8 +39,8 @@ LONG_SAMPLES, TENTH = 400, 40
 
 def block() -> Problem:
     """A soft irregular block of 96 elements, clamped on one side."""
-    mesh = jitter(make_box_mesh((2.0, 1.0, 1.0), (4, 2, 2)), 0.2, seed=1)
-    return clamped(mesh, Material(young=1e6, poisson=0.25, density=1000.0))
+    mesh = jitter_nodes(make_box_mesh((2.0, 1.0, 1.0), (4, 2, 2)), 0.2, seed=1)
+    return clamp_mesh(mesh, Material(young=1e6, poisson=0.25, density=1000.0))
 
 
 def rough_start(problem: Problem, strain: float, seed: int = 0) -> FloatArray:
@@ -103,7 +103,7 @@ def test_energy_of_a_law_with_potential_wavers_with_the_square_of_the_step() -> 
         value = energies(block(), "svk", safety, 200, max(1, round(0.25 / 200 / step)))
         wavering.append(float(np.std(value) / value[0]))
         drift.append(abs(float(value[100:].mean() / value[:100].mean() - 1)))
-    assert 1.7 < orders(SAFETIES, wavering) < 2.3
+    assert 1.7 < fit_order(SAFETIES, wavering) < 2.3
     assert drift[0] < 0.5 * wavering[0]
 
 
@@ -130,8 +130,8 @@ def block_on_its_axes() -> tuple[TetMesh, FloatArray]:
 
     About any other axis it would tumble.
     """
-    block = jitter(make_box_mesh((1.2, 1.0, 0.6), (2, 2, 2)), 0.2, seed=3)
-    mass = judge.lumped_mass(block.nodes, block.elements, SOFT.density)
+    block = jitter_nodes(make_box_mesh((1.2, 1.0, 0.6), (2, 2, 2)), 0.2, seed=3)
+    mass = judge.lump_mass(block.nodes, block.elements, SOFT.density)
     place = block.nodes - mass @ block.nodes / mass.sum()
     _, axes = np.linalg.eigh(place.T @ (mass[:, None] * place))  # largest spread last
     axes = axes[:, ::-1]
@@ -159,7 +159,7 @@ def angular_momentum(body: Body, mass: FloatArray) -> FloatArray:
 
 def shape_at_rest(mesh: TetMesh, mass: FloatArray, omega: float, strain: Any) -> FloatArray:
     """Displacement [m], (n, 3), in balance with the forces of a spin ``omega`` about z [rad/s]."""
-    stiffness = judge.stiffness(mesh.nodes, mesh.elements, SOFT.young, SOFT.poisson)
+    stiffness = judge.build_stiffness(mesh.nodes, mesh.elements, SOFT.young, SOFT.poisson)
     outward = np.diag([1.0, 1.0, 0.0]) * omega**2
     # a free body: the pseudo-inverse leaves rigid motions out
     inverse = np.linalg.pinv(stiffness.toarray(), rcond=1e-10, hermitian=True)
@@ -270,7 +270,7 @@ def thickness_decay(
 
 def thickness_frequency(height: float, young: float, density: float, poisson: float = 0.0) -> float:
     """Frequency c_P / 4H [Hz] of the same mode without damping."""
-    return dilatational_speed(young, poisson, density) / (4 * height)
+    return find_dilatational_speed(young, poisson, density) / (4 * height)
 
 
 def thickness_run(viscosity: float, layers: int) -> tuple[float, float]:
@@ -299,7 +299,7 @@ def hold_uniaxial(run: Simulation, body: Body) -> None:
 
 def load_history() -> Series:
     """Share of the load in time: smoothly on, and off again."""
-    return smooth_step(RISE, back=UNLOADED)
+    return make_smooth_step(RISE, back=UNLOADED)
 
 
 def convolved(creep: Callable[..., FloatArray], time: FloatArray) -> FloatArray:

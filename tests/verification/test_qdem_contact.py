@@ -27,7 +27,7 @@ from qdem_fem.contact.spheres.law import (
     Spheres,
     advance_one,
     advance_threads,
-    slider,
+    slide_spring,
 )
 from qdem_fem.contact.spheres.options import compute_pair_stiffness, compute_tangential_stiffness
 
@@ -332,12 +332,12 @@ def test_slider_keeps_length_in_a_turn_and_its_losses_are_the_trapezoids(seed: i
     n /= np.linalg.norm(n)
     stiffness = random.uniform(0.5, 2)
     length = np.linalg.norm(s)
-    turned, loss = slider.py_func(tuple(s), tuple(n), (0.0, 0.0, 0.0), stiffness, 1e9)
+    turned, loss = slide_spring.py_func(tuple(s), tuple(n), (0.0, 0.0, 0.0), stiffness, 1e9)
     assert np.linalg.norm(turned) == pytest.approx(length, rel=1e-12)
     assert abs(np.dot(turned, n)) < 1e-12 * length
     assert loss == 0.0
     limit = stiffness * length * random.uniform(1, 2)
-    after, loss = slider.py_func(turned, tuple(n), tuple(way), stiffness, limit)
+    after, loss = slide_spring.py_func(turned, tuple(n), tuple(way), stiffness, limit)
     assert stiffness * np.linalg.norm(after) <= limit * (1 + 4 * EPS)
     across = way - (way @ n) * n
     work = 0.5 * stiffness * float(np.add(turned, after) @ across)

@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from tests.qdem_slopes import tetrahedron
-from validation.bench.qdem.contact import CASES, MODELS, account, momenta, near_critical, spinning
+from validation.bench.qdem.contact import (
+    CASES,
+    MODELS,
+    audit_energy,
+    collide_cubes,
+    spin_grain,
+    sum_momenta,
+)
 
 CLOSES = 1e-3
 """Share of the greatest energy that the account may lack."""
@@ -25,7 +32,7 @@ SHORT = [words for words in CASES if words != "spinning grain"]
 @pytest.mark.long
 def test_energies_close(words: str, model: str) -> None:
     """Within a thousandth of the greatest there was; and the bodies did touch."""
-    lacks, stored, _ = account(*CASES[words](model))
+    lacks, stored, _ = audit_energy(*CASES[words](model))
     assert lacks < CLOSES
     assert stored > 0.01
 
@@ -34,13 +41,13 @@ def test_energies_close(words: str, model: str) -> None:
 @BY_MODEL
 def test_spinning_grain_keeps_its_angular_momentum(model: str) -> None:
     """Without friction: to rounding of some thousand steps; and friction took nothing."""
-    run, duration = spinning(model)
-    before = momenta(run)
-    lacks, stored, lost = account(run, duration)
+    run, duration = spin_grain(model)
+    before = sum_momenta(run)
+    lacks, stored, lost = audit_energy(run, duration)
     assert lacks < CLOSES
     assert stored > 1e-3
     assert lost == 0.0
-    change = np.abs(momenta(run) - before)[3:].max()
+    change = np.abs(sum_momenta(run) - before)[3:].max()
     assert change < 1e-11 * np.linalg.norm(before[3:])
 
 
@@ -50,7 +57,7 @@ def test_critical_step_with_contact(model: str) -> None:
 
     at a share s of its critical step that of a mode wavers by up to s^2/(1 - s^2) of itself.
     """
-    below, above = near_critical(model, 0.999), near_critical(model, 1.001)
+    below, above = collide_cubes(model, 0.999), collide_cubes(model, 1.001)
     assert not below[1]
     assert below[0] < 0.1
     assert above[1]

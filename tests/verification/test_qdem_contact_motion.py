@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 import qdem_fem as q
 from qdem_fem.contact import window as contact_window
 from qdem_fem.contact.search.pairs import SEARCH, choose_skin
-from qdem_fem.contact.search.periodic import extents
+from qdem_fem.contact.search.periodic import find_extents
 from qdem_fem.contact.spheres.options import SKIN_OF_SPHERES
 from qdem_fem.files.errors import (
     CheckpointError,
@@ -305,7 +305,7 @@ def test_extents_are_those_of_each_body(bodies: list[list[float]]) -> None:
     """Against one body at a time; nothing of its own is no extent."""
     first = np.concatenate([[0], np.cumsum([len(body) for body in bodies])])
     expected = [max(body) - min(body) if body else 0.0 for body in bodies]
-    assert extents(np.concatenate(bodies), first).tolist() == expected
+    assert find_extents(np.concatenate(bodies), first).tolist() == expected
 
 
 @pytest.mark.long
@@ -482,7 +482,7 @@ def test_a_scene_names_its_contact(tmp_path: Path) -> None:
     """The table becomes the simulation's contact, and what is left out says so."""
     prepared = scene_of(tmp_path)
     run, _ = make_simulation(prepared)
-    assert run.contact.of_body("above", "radius") == 0.005
+    assert run.contact.find_value("above", "radius") == 0.005
     assert run.contact.planes[0].friction == 0.2
     assert not [text for text in prepared.scene.list_left_out() if "contact" in text]
     surface = scene_of(
@@ -492,7 +492,7 @@ def test_a_scene_names_its_contact(tmp_path: Path) -> None:
         ),
     )
     contact = make_simulation(surface)[0].contact
-    assert (contact.of_body("above", "modulus"), contact.points) == (2e12, 3)
+    assert (contact.find_value("above", "modulus"), contact.points) == (2e12, 3)
     without = scene_of(tmp_path, lambda text: text[: text.index("[contact]")])
     assert make_simulation(without)[0].contact is None
     assert [text for text in without.scene.list_left_out() if "contact" in text]

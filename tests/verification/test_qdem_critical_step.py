@@ -15,8 +15,8 @@ from qdem_fem.contact.critical_step import find_lagged_viscous_step
 from qdem_fem.element.strain_measures import Strain
 from qdem_fem.files.errors import StepWarning, Unstable
 from qdem_fem.mesh.generation import make_box_mesh
-from validation.bench.qdem.judge import lumped_mass, stiffness, stiffness_lame
-from validation.bench.qdem.meshes import SLIVER_STEP, box_with_sliver, delaunay_mesh
+from validation.bench.qdem.judge import build_from_lame, build_stiffness, lump_mass
+from validation.bench.qdem.meshes import SLIVER_STEP, make_delaunay, make_sliver_box
 
 LAW = pytest.mark.parametrize("law", get_args(Strain))
 YOUNG, POISSON, DENSITY = 1e6, 0.3, 1000.0
@@ -26,7 +26,7 @@ BELOW, ABOVE = 2e-3, 1e-7
 
 
 def body(seed: int = 1, count: int = 60, **material: Any) -> q.Body:
-    nodes, elements = delaunay_mesh(count, seed)
+    nodes, elements = make_delaunay(count, seed)
     values: dict[str, Any] = {"young": YOUNG, "poisson": POISSON, "density": DENSITY} | material
     return q.Body((nodes, elements), q.Material(**values))
 
@@ -38,12 +38,12 @@ def dense(
     m, n = body.material, len(body.nodes)
     follow = np.arange(n) if master is None else master
     join = np.kron(np.eye(n)[follow], np.eye(3))
-    mass = np.bincount(follow, lumped_mass(body.nodes, body.elements, m.density), n)
+    mass = np.bincount(follow, lump_mass(body.nodes, body.elements, m.density), n)
     chosen = np.repeat(mass > 0, 3) & (True if free is None else free)
     shear, bulk = m.shear_viscosity, m.bulk_viscosity
     both = (
-        stiffness(body.nodes, body.elements, m.young, m.poisson),
-        stiffness_lame(body.nodes, body.elements, bulk - 2 / 3 * shear, shear),
+        build_stiffness(body.nodes, body.elements, m.young, m.poisson),
+        build_from_lame(body.nodes, body.elements, bulk - 2 / 3 * shear, shear),
     )
     K, C = ((join.T @ matrix @ join)[np.ix_(chosen, chosen)] for matrix in both)
     return K, C, np.repeat(mass, 3)[chosen]
@@ -137,7 +137,7 @@ def test_one_element() -> None:
 @pytest.mark.parametrize("name", ["young", "density"])
 def test_jumps_of_a_thousand(name: str) -> None:
     """A stiff or a light half governs; the other is a thousand times slower in omega^2."""
-    nodes, elements = delaunay_mesh(60, 2)
+    nodes, elements = make_delaunay(60, 2)
     right = nodes[elements].mean(axis=1)[:, 0] > 0.5
     value = {"young": YOUNG, "density": DENSITY}[name]
     values = np.where(right, value, value / 1000)
@@ -211,7 +211,7 @@ def test_slivers_cost_what_they_did_in_the_first_study() -> None:
     """Step over that of the even mesh, by the altitude that is left (8^3 and 4^3 cells agree)."""
 
     def critical(altitude: float) -> Any:
-        nodes, elements = box_with_sliver(altitude)
+        nodes, elements = make_sliver_box(altitude)
         stone = q.Body((nodes, elements), q.Material(45e9, 0.167, 2350.0))
         found = q.Simulation([stone], threads=1).critical_step
         return found, stone.gradients[1]
@@ -226,7 +226,7 @@ def test_slivers_cost_what_they_did_in_the_first_study() -> None:
 @pytest.mark.parametrize("place", [0, 40, -1])
 def test_a_planted_sliver_is_named(place: int) -> None:
     """A flat element on a face of the surface governs, and the report names it."""
-    nodes, elements = delaunay_mesh(60, 4)
+    nodes, elements = make_delaunay(60, 4)
     face = q.Body((nodes, elements), q.Material(YOUNG, POISSON, DENSITY)).surface[7]
     corner = nodes[face]
     normal = np.cross(corner[1] - corner[0], corner[2] - corner[0])
@@ -266,8 +266,8 @@ def test_mass_scaling_of_a_sliver(
     d omega/omega = -phi dM phi/(2 phi M phi), at most half of the added share times the
     square of the mode there.
     """
-    nodes, elements = box_with_sliver(altitude)
-    even_nodes, _ = box_with_sliver(1.0)
+    nodes, elements = make_sliver_box(altitude)
+    even_nodes, _ = make_sliver_box(1.0)
     material = q.Material(YOUNG, POISSON, DENSITY)
     target = share * float(find_element_step(q.Body((even_nodes, elements), material)).min())
 

@@ -15,7 +15,7 @@ from qdem_fem.kernel.cpu import step as kernel
 from qdem_fem.kernel.cpu.arrays import Constraints, Loads, Probes
 from validation.bench.qdem_gpu.contact import MARCHES
 from validation.bench.qdem_gpu.search import CLOUDS
-from validation.cases.qdem_gpu import STRAINS, twins_in_simulator
+from validation.cases.qdem_gpu import STRAINS, compare_in_simulator
 
 pytestmark = pytest.mark.peer("numba.cuda")
 
@@ -32,7 +32,7 @@ CONCRETE = q.Material(young=45e9, poisson=0.167, density=2350.0)
 @pytest.fixture(scope="module")
 def apart() -> dict[str, float]:
     """Differences between the kernels over their bars, from a process of its own."""
-    return twins_in_simulator()
+    return compare_in_simulator()
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
@@ -92,7 +92,7 @@ def test_no_float_literal_in_single_precision_code() -> None:
     from qdem_fem.kernel.cuda import step as cuda_step
 
     assert literals(inspect.getsource(stress)) == []
-    for function in (cuda_step.edges, cuda_step.add_forces):
+    for function in (cuda_step.find_edges, cuda_step.add_forces):
         assert literals(inspect.getsource(function.py_func)) == []
     assert literals(inspect.getsource(cuda_step.build_element_forces.__wrapped__)) == []
     assert literals(inspect.getsource(cuda_step.build_pulls_function)) == []
@@ -136,7 +136,7 @@ def test_samples_are_those_of_the_cpu_kernel(stride: int, first: int, rows: int)
     numbers = number_samples(8, probes)
     for done in range(1, 9):
         probes.record[:] = np.nan
-        kernel.take_probes.py_func(probes, done, np.ones(8))
+        kernel.record_probes.py_func(probes, done, np.ones(8))
         taken = np.flatnonzero(np.isfinite(probes.record[:, 0, 0]))
         assert numbers[done - 1] == (taken[0] if taken.size else -1)
 

@@ -24,10 +24,10 @@ from validation.bench.qdem_gpu.contact import STEPS
 from validation.bench.qdem_gpu.search import (
     CLOUDS,
     Cloud,
-    cloud,
-    differing,
-    lists_gpu,
-    lists_processor,
+    compare_lists,
+    draw_cloud,
+    find_pairs_cpu,
+    find_pairs_gpu,
 )
 
 pytestmark = pytest.mark.peer("numba.cuda")
@@ -68,28 +68,30 @@ def test_lists_are_the_processors(
 
     6 to 14 spheres in 16 to 64 buckets: of the 27 cells about a sphere several share a bucket.
     """
-    given = cloud(
+    given = draw_cloud(
         seed, count, room=room, ratio=ratio, bodies=bodies, walls=walls, skin=skin, axis=axis,
         same=same,
     )  # fmt: skip
-    found = simulator.submit(lists_gpu, given, seed).result()
-    assert differing(lists_processor(given, seed), found) == []
+    found = simulator.submit(find_pairs_gpu, given, seed).result()
+    assert compare_lists(find_pairs_cpu(given, seed), found) == []
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("axis", ["", "x"])
 def test_order_within_a_bucket_changes_nothing(simulator: Executor, axis: str) -> None:
     """Which is left to the atomics of the hardware; a dense cloud, some spheres in one place."""
-    dense = cloud(3, 40, room=1.0, same=0.3, axis=axis)
-    here = lists_processor(dense, 3)
+    dense = draw_cloud(3, 40, room=1.0, same=0.3, axis=axis)
+    here = find_pairs_cpu(dense, 3)
     assert np.diff(here.first).max() > 5
-    assert differing(here, simulator.submit(lists_gpu_shuffled, dense, 3).result()) == []
+    assert compare_lists(here, simulator.submit(lists_gpu_shuffled, dense, 3).result()) == []
 
 
 def test_a_list_differs_where_a_sphere_does() -> None:
     """What the other tests compare: pairs, walls and history of two clouds of a kind differ."""
-    one, other = (lists_processor(cloud(seed, **CLOUDS["a cloud"]), seed) for seed in (0, 1))
-    assert {"second", "back_pair", "touching", "spring", "pull", "wall"} <= {*differing(one, other)}
+    one, other = (find_pairs_cpu(draw_cloud(seed, **CLOUDS["a cloud"]), seed) for seed in (0, 1))
+    assert {"second", "back_pair", "touching", "spring", "pull", "wall"} <= {
+        *compare_lists(one, other)
+    }
     assert one.touching.any()
 
 
@@ -118,7 +120,7 @@ def test_sums_before_each(simulator: Executor, count: int) -> None:
 )
 def test_what_a_march_asks_is_the_processors(simulator: Executor, name: str) -> None:
     """Gap, bound and extents to the rounding of their sums, of some ten terms each."""
-    here = cloud(5, **CLOUDS[name])
+    here = draw_cloud(5, **CLOUDS[name])
     first = np.array([0, 7, 7, len(here.radius)])
     expected = sums_processor(here, 5, first)
     found = simulator.submit(sums_gpu, here, 5, first, False).result()
@@ -141,5 +143,5 @@ def test_steps_behind_the_end_of_a_window_are_not_launched(simulator: Executor) 
 
 
 def test_a_vertex_that_is_nowhere_is_seen(simulator: Executor) -> None:
-    here: Cloud = cloud(5, 20)
+    here: Cloud = draw_cloud(5, 20)
     assert not simulator.submit(sums_gpu, here, 5, np.array([0, 20]), True).result().finite

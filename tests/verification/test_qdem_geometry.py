@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from qdem_fem import Body, Material, Simulation
 from qdem_fem.files.errors import MeshError
 from qdem_fem.kernel.cpu.ordering import order_for_locality
-from qdem_fem.mesh.generation import jitter, make_box_mesh
+from qdem_fem.mesh.generation import jitter_nodes, make_box_mesh
 from qdem_fem.mesh.surface import (
     find_area_vectors,
     find_faces_within,
@@ -36,8 +36,8 @@ MESHES = {
     "kuhn": (KUHN, 0.03, 1),
     "five": (FIVE, 0.03, 1),
     "ring": (RING, POLYGON, 0),
-    "kuhn jittered": (jitter(KUHN, 0.24, 1), 0.03, 1),
-    "ring jittered": (jitter(RING, 0.24, 2), POLYGON, 0),
+    "kuhn jittered": (jitter_nodes(KUHN, 0.24, 1), 0.03, 1),
+    "ring jittered": (jitter_nodes(RING, 0.24, 2), POLYGON, 0),
 }
 """Mesh, volume [m^3], Euler characteristic of the solid (ring: a handle)."""
 
@@ -170,7 +170,7 @@ def test_gradients_of_slivers(seed: int, digits: float) -> None:
 @pytest.mark.parametrize("flatness", [1.0, 1e-3, 1e-6])
 def test_gradients_reproduce_linear_fields(flatness: float) -> None:
     """H = sum u_a x grad N_a of u = A x; error |A| L max|grad N| round-offs, slivers too."""
-    mesh = jitter(KUHN, 0.24, 3)
+    mesh = jitter_nodes(KUHN, 0.24, 3)
     nodes = mesh.nodes * [1, 1, flatness]
     slope = np.random.default_rng(4).standard_normal((3, 3))
     gradients, _ = find_gradients(nodes, mesh.elements)
@@ -264,7 +264,7 @@ def test_generated_meshes_are_sound(cells: tuple[int, int, int], around: int, se
     """Any number of cells: read without a change, conforming, and right after a jitter < 1/4."""
     ring = make_ring_mesh(1, 2, 0.7, (cells[0], around, cells[2]))
     for mesh in (make_box_mesh((1, 2, 3), cells), make_box_mesh((1, 2, 3), cells, "five"), ring):
-        moved = jitter(mesh, 0.249, seed)
+        moved = jitter_nodes(mesh, 0.249, seed)
         for each in (mesh, moved):
             read = read_mesh(each)
             assert len(read.flipped) == len(read.unused) == 0
@@ -277,13 +277,13 @@ def test_generated_meshes_are_sound(cells: tuple[int, int, int], around: int, se
 
 
 def test_jitter_moves_every_interior_node_and_repeats() -> None:
-    moved = jitter(KUHN, 0.2, 8)
+    moved = jitter_nodes(KUHN, 0.2, 8)
     inside = np.setdiff1d(np.arange(len(KUHN.nodes)), find_surface_faces(KUHN.elements))
     distance = np.linalg.norm(moved.nodes - KUHN.nodes, axis=1)
     assert distance[inside].min() > 0
     gradients, _ = find_gradients(KUHN.nodes, KUHN.elements)
     assert distance.max() <= 0.2 * find_altitudes(gradients).max()
-    np.testing.assert_array_equal(moved.nodes, jitter(KUHN, 0.2, 8).nodes)
+    np.testing.assert_array_equal(moved.nodes, jitter_nodes(KUHN, 0.2, 8).nodes)
     assert moved.node_sets is KUHN.node_sets
 
 

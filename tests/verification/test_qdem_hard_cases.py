@@ -12,12 +12,17 @@ from scipy.linalg import eigh
 import qdem_fem as q
 from qdem_fem.files import Floats, Integers
 from qdem_fem.files.errors import ElementInverted, StepWarning, Unstable
-from qdem_fem.mesh.generation import jitter, make_box_mesh
+from qdem_fem.mesh.generation import jitter_nodes, make_box_mesh
 from qdem_fem.mesh.tetrahedra import TetMesh
 from validation.bench.qdem import hard, judge
 from validation.bench.qdem.hard import CONCRETE
-from validation.bench.qdem.meshes import box_graded, box_with_sliver, delaunay_mesh, longest_edges
-from validation.bench.qdem.problem import cantilever
+from validation.bench.qdem.meshes import (
+    make_delaunay,
+    make_graded_box,
+    make_sliver_box,
+    measure_edges,
+)
+from validation.bench.qdem.problem import make_cantilever
 from validation.case import Check
 
 
@@ -32,15 +37,15 @@ def hold(checks: list[Check]) -> None:
 
 def test_a_sliver_changes_nothing_but_the_step() -> None:
     """Altitude 0.004 of the longest edge: K u = f, 2/omega, the motion; named and warned of."""
-    hold(hard.sliver_checks())
+    hold(hard.check_sliver())
 
 
 def test_graded_box_fills_the_cube_and_turns_no_element() -> None:
-    nodes, elements = box_graded(100.0, 6)
+    nodes, elements = make_graded_box(100.0, 6)
     volume = np.linalg.det(nodes[elements[:, 1:]] - nodes[elements[:, :1]]) / 6
     assert (volume > 0).all()
     assert volume.sum() == pytest.approx(1.0, rel=1e-12)
-    edges = longest_edges(nodes, elements)
+    edges = measure_edges(nodes, elements)
     assert edges.min() == pytest.approx(np.sqrt(3) / 100, rel=1e-12)
 
 
@@ -50,13 +55,13 @@ def test_graded_box_fills_the_cube_and_turns_no_element() -> None:
 @pytest.mark.long
 def test_locking_is_that_of_linear_tetrahedra() -> None:
     """Against K u = f on the same mesh, and against quadratic tetrahedra: Kuhn's cells lock."""
-    hold(hard.locking_checks(((12, 2, 2),), (12, 2, 2)))
+    hold(hard.check_locking(((12, 2, 2),), (12, 2, 2)))
 
 
 @pytest.mark.parametrize("where", ["tip half", "core"])
 def test_stiffness_jumps_of_a_thousand(where: str) -> None:
     """K u = f, 2/omega and the motion of scikit-fem, where stiff elements lie in soft ones."""
-    problem = cantilever((6, 2, 2))
+    problem = make_cantilever((6, 2, 2))
     mesh = problem.mesh
     middle, size = mesh.nodes[mesh.elements].mean(axis=1), mesh.nodes.max(axis=0)
     inside = (np.abs(middle / size - 0.5)[:, 1:] < 0.25).all(axis=1)
@@ -66,8 +71,8 @@ def test_stiffness_jumps_of_a_thousand(where: str) -> None:
     critical = jump.simulation()[1].critical_step
     assert stiff[critical.element]
     hold([
-        *hard.static_checks("jump", jump), hard.check_motion("jump", jump),
-        hard.critical_check("jump", critical.value, hard.critical_judge(jump)),
+        *hard.check_static("jump", jump), hard.check_motion("jump", jump),
+        hard.check_critical_step("jump", critical.value, hard.find_critical_step(jump)),
     ])  # fmt: skip
 
 
@@ -77,12 +82,12 @@ def test_stiffness_jumps_of_a_thousand(where: str) -> None:
 @pytest.mark.long
 def test_steps_near_the_critical_one() -> None:
     """H <= E <= H/(1 - s^2) at s = 0.99 and at the reported value."""
-    hold(hard.near_critical_checks(20_000))
+    hold(hard.check_near_critical(20_000))
 
 
 def test_a_step_above_the_critical_one_is_named_with_its_element() -> None:
     """Far above, under a load, from rest: the message gives ratio, steps, element and remedy."""
-    problem = cantilever((12, 2, 2))
+    problem = make_cantilever((12, 2, 2))
     critical = problem.simulation()[1].critical_step
     body, run = problem.simulation(amplitude=1.0, step=1.05 * critical.value)
     named = f"element {critical.element} of {body.name}"
@@ -98,10 +103,10 @@ def test_the_bound_on_the_energy_is_broken_above_the_critical_step(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """At 1.001 of the judge's step energy grows by 1.09 each step: the check fails, not the run."""
-    problem = hard.near_critical_problem()
-    share = 1.001 / hard.run_share(problem)
+    problem = hard.make_irregular_cube()
+    share = 1.001 / hard.compare_steps(problem)
     monkeypatch.setattr("qdem_fem.march.steps.UNSTABLE_GROWTH", 1e30)
-    energy = hard.energies(problem, share, 600, 100)
+    energy = hard.sample_energy(problem, share, 600, 100)
     assert energy.max() / energy[0] > 1 / (1 - 0.99**2)
 
 
@@ -133,8 +138,10 @@ def vibration_error(law: Any, strain: float) -> float:
     Velocity Verlet from rest is u(k) = phi cos(k theta) with sin(theta/2) = omega dt/2; omega and
     phi are of the judge's 12 x 12 matrices.
     """
-    stiffness = judge.stiffness(ONE_NODES, ONE_ELEMENT, CONCRETE.young, CONCRETE.poisson).toarray()
-    mass = np.repeat(judge.lumped_mass(ONE_NODES, ONE_ELEMENT, CONCRETE.density), 3)
+    stiffness = judge.build_stiffness(
+        ONE_NODES, ONE_ELEMENT, CONCRETE.young, CONCRETE.poisson
+    ).toarray()
+    mass = np.repeat(judge.lump_mass(ONE_NODES, ONE_ELEMENT, CONCRETE.density), 3)
     value, shape = eigh(stiffness, np.diag(mass))
     worst = 0.0
     for number in range(6, 12):
@@ -164,7 +171,7 @@ PUSH_STEPS = 2000
 
 def _push(seed: int) -> tuple[TetMesh, int, Floats]:
     """An irregular cube, an inner node of it, and the way it is to go, 1 m."""
-    mesh = jitter(make_box_mesh((1.0, 1.0, 1.0), (4, 4, 4)), 0.2, seed=seed)
+    mesh = jitter_nodes(make_box_mesh((1.0, 1.0, 1.0), (4, 4, 4)), 0.2, seed=seed)
     random = np.random.default_rng(seed)
     inner = np.flatnonzero(((mesh.nodes > 0.1) & (mesh.nodes < 0.9)).all(axis=1))
     direction = random.normal(size=3)
@@ -199,7 +206,7 @@ def pushed_until_inverted(seed: int) -> tuple[int, float]:
     around = mesh.elements[(mesh.elements == node).any(axis=1)]
     run.fix(body, np.setdiff1d(around, node))
     for axis, letter in enumerate("xyz"):
-        run.prescribe(body, node, letter, q.ramp(duration, way[axis]))
+        run.prescribe(body, node, letter, q.make_ramp(duration, way[axis]))
     try:
         run.advance(duration)
     except ElementInverted as error:
@@ -234,7 +241,7 @@ def test_an_element_inverted_by_an_impact_is_named() -> None:
 @pytest.mark.parametrize("share", [1.001, 1.3])
 def test_an_element_inverted_from_the_start_is_named(share: float) -> None:
     """A state set by the user: one node beyond the opposite face of element 7, and so of 6."""
-    nodes, elements = box_with_sliver(1.0)
+    nodes, elements = make_sliver_box(1.0)
     corner = nodes[elements[7]]
     normal = np.cross(corner[2] - corner[1], corner[3] - corner[1])
     height = (corner[0] - corner[1]) @ normal / (normal @ normal)
@@ -269,7 +276,7 @@ def step_of(nodes: Floats, elements: Integers) -> float:
 
 def test_parts_apart_move_as_each_alone() -> None:
     """Not to the bit: in another order of elements the forces of a node are summed otherwise."""
-    count, pair = 200, [delaunay_mesh(200, seed) for seed in (1, 2)]
+    count, pair = 200, [make_delaunay(200, seed) for seed in (1, 2)]
     step = min(step_of(*part) for part in pair)
     alone = np.vstack([fall(*part, step)[1] for part in pair])
     apart = pair[1][0] + [5.0, 0.0, 0.0]
@@ -281,7 +288,7 @@ def test_parts_apart_move_as_each_alone() -> None:
 
 def test_nodes_of_no_element() -> None:
     """Between the others: listed, at rest, and felt by nobody to the bit."""
-    nodes, elements = delaunay_mesh(200, 3)
+    nodes, elements = make_delaunay(200, 3)
     used = np.unique(elements)
     bare = np.searchsorted(used, elements)
     # a loose node after every tenth
@@ -303,7 +310,7 @@ def test_left_handed_elements() -> None:
 
     The last two swapped: to the bit; the first two: forces are summed in another order.
     """
-    nodes, elements = delaunay_mesh(200, 4)
+    nodes, elements = make_delaunay(200, 4)
     nodes, elements = nodes[np.unique(elements)], np.searchsorted(np.unique(elements), elements)
     left = np.random.default_rng(0).random(len(elements)) < 0.5
     turned, other = elements.copy(), elements.copy()

@@ -10,7 +10,7 @@ import skfem
 
 from validation.bench.qdem import closed_forms as closed
 from validation.bench.qdem import judge
-from validation.bench.qdem.modes import modes
+from validation.bench.qdem.modes import find_modes
 
 YOUNG, POISSON, DENSITY = 45e9, 0.167, 2350.0
 SIZE = (2.4, 0.25, 0.22)
@@ -53,8 +53,8 @@ def cantilever(cells: tuple[int, int, int]) -> tuple[Any, ...]:
     return (
         nodes,
         elements,
-        judge.stiffness(nodes, elements, YOUNG, POISSON),
-        judge.lumped_mass(nodes, elements, DENSITY),
+        judge.build_stiffness(nodes, elements, YOUNG, POISSON),
+        judge.lump_mass(nodes, elements, DENSITY),
         nodes[:, 0] > 1e-9,
         load,
         int(np.argmin(np.linalg.norm(nodes - middle, axis=1))),
@@ -67,10 +67,10 @@ def cantilever(cells: tuple[int, int, int]) -> tuple[Any, ...]:
 def test_stiffness_is_symmetric_and_kills_rigid_motions() -> None:
     """K = K^T and K r = 0 for six rigid motions, to rounding; six zero eigenvalues, no more."""
     nodes, elements = skewed()
-    matrix = judge.stiffness(nodes, elements, YOUNG, POISSON)
+    matrix = judge.build_stiffness(nodes, elements, YOUNG, POISSON)
     scale = abs(matrix).max()
     assert abs(matrix - matrix.T).max() < 1e-14 * scale
-    assert np.abs(matrix @ judge.rigid_motions(nodes)).max() < 1e-13 * scale
+    assert np.abs(matrix @ judge.make_rigid_motions(nodes)).max() < 1e-13 * scale
     value = np.linalg.eigvalsh(matrix.toarray())
     assert np.abs(value[:6]).max() < 1e-13 * value[-1]
     assert value[6] > 1e-5 * value[-1]
@@ -89,14 +89,14 @@ def test_stiffness_of_one_element_by_hand() -> None:
     volume = np.linalg.det(nodes[1:] - nodes[0]) / 6
     expected = volume * b.T @ d @ b
     for order in ([0, 1, 2, 3], [1, 0, 2, 3]):
-        found = judge.stiffness_lame(nodes, np.array([order]), lam, mu).toarray()
+        found = judge.build_from_lame(nodes, np.array([order]), lam, mu).toarray()
         np.testing.assert_allclose(found, expected, atol=1e-14)
 
 
 def test_lumped_mass_is_the_whole_mass_about_its_centre() -> None:
     """Eq. 11: the sum is rho V and its first moment that of the body, for any mesh of a box."""
     nodes, elements = kuhn((4, 3, 2))
-    mass = judge.lumped_mass(nodes, elements, DENSITY)
+    mass = judge.lump_mass(nodes, elements, DENSITY)
     assert mass.sum() == pytest.approx(DENSITY * np.prod(SIZE), rel=1e-14)
     assert mass @ nodes / mass.sum() == pytest.approx(np.array(SIZE) / 2, rel=1e-13)
 
@@ -109,15 +109,15 @@ def test_patch(method: Any) -> None:
     nodes[inner] += 0.01 * np.random.default_rng(2).standard_normal((inner.sum(), 3))
     slope = 1e-4 * np.random.default_rng(3).standard_normal((3, 3))
     exact = nodes @ slope.T
-    matrix = judge.stiffness(nodes, elements, YOUNG, POISSON)
+    matrix = judge.build_stiffness(nodes, elements, YOUNG, POISSON)
     held = np.where(inner[:, None], 0.0, exact)
-    answer = judge.static_solve(
+    answer = judge.solve_static(
         matrix, inner, -(matrix @ held.ravel()).reshape(-1, 3), nodes, method
     )
     np.testing.assert_allclose(answer.displacement + held, exact, atol=1e-13 * np.abs(exact).max())
     strain = (slope + slope.T) / 2
     deviator = YOUNG / (1 + POISSON) * (strain - np.eye(3) * np.trace(strain) / 3)
-    stress = judge.von_mises(nodes, elements, YOUNG, POISSON, exact)
+    stress = judge.find_von_mises(nodes, elements, YOUNG, POISSON, exact)
     assert stress == pytest.approx(np.sqrt(1.5 * np.sum(deviator**2)), rel=1e-11)
 
 
@@ -128,11 +128,11 @@ def test_patch(method: Any) -> None:
 @pytest.mark.peer("pyamg")
 def test_linear_elements_converge_at_order_two_to_quadratic_ones() -> None:
     """Linear elements are too stiff, by C h^2 against P2: a ratio near 4 as sides are halved."""
-    reference = judge.cantilever_p2((32, 4, 4))
+    reference = judge.find_tip_p2((32, 4, 4))
     excess = []
     for n in (1, 2, 4):
         nodes, _, matrix, _, free, load, tip = cantilever((12 * n, 2 * n, 2 * n))
-        answer = judge.static_solve(matrix, free, load, nodes)
+        answer = judge.solve_static(matrix, free, load, nodes)
         excess.append(reference / -answer.displacement[tip, 2] - 1)
     assert min(excess) > 0
     order = np.log2(np.array(excess[:-1]) / excess[1:])
@@ -146,10 +146,10 @@ def test_quadratic_elements_and_beams() -> None:
 
     Shear adds 3 E I / kappa G A L^2 = 0.58 % to eq. 12, so the bound tells the two apart.
     """
-    tip = judge.cantilever_p2((32, 4, 4))
-    assert tip == pytest.approx(closed.timoshenko_tip(200), rel=3e-3)
-    assert closed.euler_bernoulli_tip(200) == pytest.approx(92.32156e-6, rel=1e-7)
-    assert closed.timoshenko_tip(200) == pytest.approx(92.858e-6, rel=1e-5)
+    tip = judge.find_tip_p2((32, 4, 4))
+    assert tip == pytest.approx(closed.find_timoshenko_tip(200), rel=3e-3)
+    assert closed.find_euler_bernoulli_tip(200) == pytest.approx(92.32156e-6, rel=1e-7)
+    assert closed.find_timoshenko_tip(200) == pytest.approx(92.858e-6, rel=1e-5)
 
 
 def test_free_components() -> None:
@@ -158,8 +158,8 @@ def test_free_components() -> None:
     free = nodes > 1e-9
     load = np.zeros_like(nodes)
     load[:, 0] = 1e6 * end_area(nodes, elements, 0)
-    matrix = judge.stiffness(nodes, elements, YOUNG, POISSON)
-    answer = judge.static_solve(matrix, free, load, nodes, "direct")
+    matrix = judge.build_stiffness(nodes, elements, YOUNG, POISSON)
+    answer = judge.solve_static(matrix, free, load, nodes, "direct")
     expected = 1e6 / YOUNG * nodes * [1, -POISSON, -POISSON]
     np.testing.assert_allclose(answer.displacement, expected, atol=1e-12 * 1e6 / YOUNG)
 
@@ -171,8 +171,8 @@ def test_free_components() -> None:
 def test_modes_by_two_methods() -> None:
     """LOBPCG with multigrid and inversion about zero: the same five modes, M-orthonormal."""
     nodes, _, matrix, mass, free, _, _ = cantilever((24, 4, 4))
-    one = modes(matrix, mass, free, 5, "amg", nodes)
-    other = modes(matrix, mass, free, 5)
+    one = find_modes(matrix, mass, free, 5, "amg", nodes)
+    other = find_modes(matrix, mass, free, 5)
     assert one.frequency == pytest.approx(other.frequency, rel=1e-7)
     for found in (one, other):
         flat = found.shape.reshape(5, -1)
@@ -190,9 +190,9 @@ def test_modes_come_down_to_those_of_beams() -> None:
     found = []
     for n in (1, 2):
         _, _, matrix, mass, free, _, _ = cantilever((24 * n, 4 * n, 4 * n))
-        found.append(modes(matrix, mass, free, 5).frequency)
+        found.append(find_modes(matrix, mass, free, 5).frequency)
     limit = np.sqrt((4 * found[1] ** 2 - found[0] ** 2) / 3)
-    theory = closed.cantilever_frequencies()
+    theory = closed.list_beam_frequencies()
     names = ("bending z 1", "bending y 1", "bending z 2", "bending y 2", "torsion 1")
     expected = np.array([theory[name] for name in names])
     assert limit[:4] == pytest.approx(expected[:4], rel=0.01)
@@ -201,13 +201,11 @@ def test_modes_come_down_to_those_of_beams() -> None:
 
 def test_beam_frequencies() -> None:
     """Eq. 13 gives 27.00 Hz (the paper's text: 27.01); slender beams need no shear."""
-    assert closed.bending_frequency(1) == pytest.approx(27.01, rel=5e-4)
-    ratio = closed.bending_frequency(2) / closed.bending_frequency(1)
+    assert closed.find_bending(1) == pytest.approx(27.01, rel=5e-4)
+    ratio = closed.find_bending(2) / closed.find_bending(1)
     assert ratio == pytest.approx((4.694091 / 1.875104) ** 2, rel=1e-6)
     slender = closed.Beam(length=240.0)
     for order in (1, 2, 3, 5):
-        plain = closed.bending_frequency(order, slender)
-        assert closed.bending_frequency(order, slender, shear=True) == pytest.approx(
-            plain, rel=1e-4
-        )
+        plain = closed.find_bending(order, slender)
+        assert closed.find_bending(order, slender, shear=True) == pytest.approx(plain, rel=1e-4)
     assert closed.Beam(width=1.0, height=1.0).torsion_constant == pytest.approx(0.140577, rel=1e-5)

@@ -24,7 +24,7 @@ from qdem_fem.kernel.cpu import step as kernel
 from qdem_fem.kernel.cpu.layout import build_layout
 from tests import qdem_reference_forces as reference_forces
 from tests.qdem_reference_forces import Elements
-from validation.bench.qdem.meshes import delaunay_mesh
+from validation.bench.qdem.meshes import make_delaunay
 
 LAWS: tuple[Strain, ...] = get_args(Strain)
 PRECISION = pytest.mark.parametrize("precision", ["float64", "float32"])
@@ -45,15 +45,15 @@ def mesh(name: str) -> tuple[np.ndarray, np.ndarray]:
             [[0, 1, 2, 3]]
         )
     if name == "chunks":  # four chunks, and a number of elements that no register divides
-        nodes, elements = delaunay_mesh(700, 1)
+        nodes, elements = make_delaunay(700, 1)
         return nodes, elements[: 16 * (len(elements) // 16) - 3]
-    nodes, elements = delaunay_mesh(40, 0)
+    nodes, elements = make_delaunay(40, 0)
     if name == "unused":  # first, middle and last
         nodes = np.insert(nodes, [0, 20, 40], 0.5, axis=0)
         number = np.delete(np.arange(43), [0, 21, 42])
         return nodes, number[elements]
     if name == "parts":
-        other, more = delaunay_mesh(17, 2)
+        other, more = make_delaunay(17, 2)
         return np.concatenate([nodes, other + 5]), np.concatenate([elements, more + 40])
     return nodes, elements[: len(elements) // 16 * 16 + 1]
 
@@ -319,11 +319,11 @@ STARTING = """
 import time
 begun = time.process_time()
 import qdem_fem as q
-from qdem_fem.march.leapfrog import take_velocities_behind
+from qdem_fem.march.leapfrog import stagger_velocities
 imported = time.process_time()
 nodes = [[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
 run = q.Simulation([q.Body((nodes, [[0, 1, 2, 3]]), q.Material(1e6, 0.2, 1e3))], threads=1, step=1.)
-take_velocities_behind(run)
+stagger_velocities(run)
 print(imported - begun, time.process_time() - imported)
 """
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from qdem_fem import Body, Material, Simulation
-from qdem_fem.mesh.generation import jitter, make_box_mesh
+from qdem_fem.mesh.generation import jitter_nodes, make_box_mesh
 from tests.qdem_reference_forces import compute_cauchy_stress, stress_finger
 
 SOFT = Material(young=1e6, poisson=0.25, density=1000.0)
@@ -19,7 +19,7 @@ SOFT = Material(young=1e6, poisson=0.25, density=1000.0)
 def test_a_uniform_gradient_is_exact(seed: int) -> None:
     """Random gradients of 10 % with rotation on random meshes; one short step from rest."""
     generator = np.random.default_rng(seed)
-    mesh = jitter(make_box_mesh((1.0, 0.8, 0.7), (4, 3, 3)), 0.24, seed)
+    mesh = jitter_nodes(make_box_mesh((1.0, 0.8, 0.7), (4, 3, 3)), 0.24, seed)
     body = Body(mesh, SOFT)
     run = Simulation([body], threads=1, safety=1e-7)  # so short a step that v = a dt
     gradient = 0.1 * generator.standard_normal((3, 3))

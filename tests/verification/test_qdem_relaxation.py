@@ -29,9 +29,9 @@ def cantilever(cells: tuple[int, int, int], **options: Any) -> tuple[q.Simulatio
 
 def judged(body: q.Body, force: np.ndarray) -> tuple[np.ndarray, Any]:
     """scikit-fem's answer (n, 3) for the clamped beam under nodal forces, and its stiffness."""
-    matrix = qdem_judge.stiffness(body.nodes, body.elements, 45e9, 0.167)
+    matrix = qdem_judge.build_stiffness(body.nodes, body.elements, 45e9, 0.167)
     free = body.nodes[:, 0] > 0
-    return qdem_judge.static_solve(matrix, free, force, method="direct").displacement, matrix
+    return qdem_judge.solve_static(matrix, free, force, method="direct").displacement, matrix
 
 
 @pytest.mark.long

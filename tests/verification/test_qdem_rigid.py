@@ -68,7 +68,7 @@ def momenta(run: q.Simulation) -> tuple[Floats, Floats]:
     rigid = run.rigid
     assert rigid is not None
     now, centre = (
-        rigid.now(run.acting()),
+        rigid.find_motion(run.find_acting()),
         np.array([own.centre for own in rigid.own]) + rigid.kernel.shift,
     )
     carried = rigid.mass[:, None] * now.velocity
@@ -435,7 +435,7 @@ def test_held_and_driven_freedoms() -> None:
     spin = body.rigid_mass.inertia[0] * 3
     assert run.rigid is not None
     np.testing.assert_allclose(
-        run.rigid.now(run.acting()).spin, [[0, 0, spin]], rtol=1e-12, atol=1e-18
+        run.rigid.find_motion(run.find_acting()).spin, [[0, 0, spin]], rtol=1e-12, atol=1e-18
     )
     assert total(run) == pytest.approx(started, rel=1e-9)
     run.remove(held)
@@ -537,7 +537,7 @@ def test_resume_goes_on_to_the_same_bits(tmp_path: Path) -> None:
     def made(rigid: Sequence[Any] = (True, False)) -> q.Simulation:
         contact = q.SphereContact(RADIUS, 1e8, 0.5)
         run = collide(rigid, contact=contact, velocity=(1.0, 0.2, 0))
-        run.load(run.bodies[0], [3], q.ramp(1e-4, [5.0, 1, 2]))
+        run.load(run.bodies[0], [3], q.make_ramp(1e-4, [5.0, 1, 2]))
         return run
 
     whole, first, second = made(), made(), made()

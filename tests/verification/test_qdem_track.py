@@ -255,7 +255,7 @@ def shaken(folder: Path, text: str = "") -> tuple[object, ...]:
 
 def test_what_viscosity_takes_closes_the_account(tmp_path: Path) -> None:
     prepared, run, bodies, folder = shaken(tmp_path)
-    with folder.locked():  # type: ignore[attr-defined]
+    with folder.lock():  # type: ignore[attr-defined]
         run_dynamic(prepared, run, bodies, folder, resume=False, progress=Progress())  # type: ignore[arg-type]
     energy = run.energy()  # type: ignore[attr-defined]
     kept = energy.kinetic + energy.elastic + energy.viscous
@@ -269,7 +269,7 @@ def test_a_run_whose_account_does_not_close_stops(
     monkeypatch.setattr(energies, "find_viscous_half", lambda run: -float(run.motion.work[2]))
     prepared, run, bodies, folder = shaken(tmp_path)
     with (
-        folder.locked(),  # type: ignore[attr-defined]
+        folder.lock(),  # type: ignore[attr-defined]
         pytest.raises(EnergyLost, match="missing in the account"),
     ):
         run_dynamic(prepared, run, bodies, folder, resume=False, progress=Progress())  # type: ignore[arg-type]
@@ -282,7 +282,7 @@ def test_account_of_energies_is_the_same_row_by_row() -> None:
     rows = {name: np.cumsum(random.normal(size=20)) ** 2 for name in names}
     account = EnergyAccount()
     for cuts in ((0, 1), (1, 4), (4, 20)):
-        account.take({name: one[slice(*cuts)] for name, one in rows.items()})
+        account.add_rows({name: one[slice(*cuts)] for name, one in rows.items()})
     whole = list_energy_facts(rows)
     assert account.relative == whole["relative_imbalance"]
     assert account.missing == whole["greatest_imbalance"]

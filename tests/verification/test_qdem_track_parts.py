@@ -26,7 +26,7 @@ from qdem_fem.track.layout import TrackLayout
 from qdem_fem.track.recipe import make_bed_grains
 from qdem_fem.track.sleeper_mesh import SleeperShape
 from validation.bench.qdem import judge
-from validation.bench.track_trials import SCENE, scene_at
+from validation.bench.track_trials import SCENE, load_track
 
 CONCRETE = Material(45e9, 0.167, 2350.0)
 WHOLE = TrackLayout("whole", TrackBox(5.0, 0.6), SleeperShape(), (24, 4, 3), 0.012, (0.5, 1.3))
@@ -38,8 +38,8 @@ SCENES = Path(__file__).parents[2] / "trackbed" / "scenes"
 def bend_freely(mesh: TetMesh) -> tuple[judge.FloatArray, judge.FloatArray]:
     """Frequencies [Hz] and shapes (k, n, 3) of modes in which whole sections move up and down, of
     the seven lowest with strain."""
-    stiffness = judge.stiffness(mesh.nodes, mesh.elements, CONCRETE.young, CONCRETE.poisson)
-    mass = np.repeat(judge.lumped_mass(mesh.nodes, mesh.elements, CONCRETE.density), 3)
+    stiffness = judge.build_stiffness(mesh.nodes, mesh.elements, CONCRETE.young, CONCRETE.poisson)
+    mass = np.repeat(judge.lump_mass(mesh.nodes, mesh.elements, CONCRETE.density), 3)
     value, vector = eigh(stiffness.toarray(), np.diag(mass), subset_by_index=[6, 12])
     shapes = vector.T.reshape(7, -1, 3)
     _, section = np.unique(mesh.nodes[:, 0].round(9), return_inverse=True)
@@ -102,7 +102,7 @@ def test_loose_ballast_keeps_to_its_shoulder_and_off_the_sleeper(
 ) -> None:
     grains = 40 * place_grain_nodes(make_bed_grains(scene_of(tmp_path, "half").recipe))
     below = np.concatenate(layout.place_grains_below(grains, 1))
-    out = layout.beyond(below[:, 0])
+    out = layout.measure_beyond(below[:, 0])
     assert out.max() + layout.radius <= 1.3 + 1e-9
     top, near, foot = (
         below[(out >= a) & (out < b), 2].max() for a, b in ((0.0, 0.4), (0.7, 0.9), (1.1, 1.3))
@@ -110,7 +110,7 @@ def test_loose_ballast_keeps_to_its_shoulder_and_off_the_sleeper(
     assert top > near > foot  # half and a quarter of it, in whole grains
     sleeper = layout.sleeper(0.5).nodes
     beside = np.concatenate(layout.place_grains_beside(grains, 0.5, 2))
-    out = layout.beyond(beside[:, 0])
+    out = layout.measure_beyond(beside[:, 0])
     assert 0.4 < out.max() <= 0.5 - layout.radius + 1e-9
     low, high = sleeper.min(axis=0), sleeper.max(axis=0)
     outside = np.maximum(low - beside, beside - high)[:, :2].max(axis=1)
@@ -208,12 +208,12 @@ def test_hard_stages_of_a_periodic_bed_are_stopped_together(
         return Rest(0.0, 0.0, 0.0, 0, 0, 0, 0.0)
 
     monkeypatch.setattr(track_bed, "find_rest", find)
-    recipe = scene_at(tmp_path, *(WIDTH,) * periodic).recipe
+    recipe = load_track(tmp_path, *(WIDTH,) * periodic).recipe
     track_bed.prepare_bed(recipe, tmp_path / "bed.npz", 1)
     assert asked == [True] * (len(track_bed.STAGES) - 2) + [not periodic] * 2
 
 
 def test_a_grain_that_left_a_periodic_box_counts_where_its_image_is() -> None:
     places = np.array([[2.5, y, 0.3] for y in (0.3, 0.3 + 0.6, 0.3 - 1.2, 0.6, 0.9 + 0.2)])
-    assert WHOLE.across(places) == pytest.approx([0.0, 0.0, 0.0, 0.3, 0.2], abs=1e-12)
-    assert WHOLE.under(places).tolist() == [True, True, True, False, False]
+    assert WHOLE.measure_across(places) == pytest.approx([0.0, 0.0, 0.0, 0.3, 0.2], abs=1e-12)
+    assert WHOLE.is_under(places).tolist() == [True, True, True, False, False]

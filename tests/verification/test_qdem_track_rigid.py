@@ -14,7 +14,7 @@ from qdem_fem.scene.checks import load_scene
 from qdem_fem.track.bed import prepare_bed, read_bed
 from qdem_fem.track.enter import TrackPrepared, choose_contact
 from qdem_fem.track.stand import begin_bed
-from validation.bench.track_trials import SCENE, scene_at
+from validation.bench.track_trials import SCENE, load_track
 
 FEW = ("track.below=8", "track.beside=3", "track.unbalanced=0.5")
 
@@ -23,7 +23,7 @@ FEW = ("track.below=8", "track.beside=3", "track.unbalanced=0.5")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The scene of eleven grains beside its prepared bed."""
     made = tmp_path_factory.mktemp("rigid")
-    prepared = scene_at(made, *FEW)
+    prepared = load_track(made, *FEW)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StepWarning)  # of stages whose contacts are few
         prepare_bed(prepared.recipe, prepared.bed_file, 1)
@@ -31,7 +31,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def prepared_in(folder: Path, *overrides: str) -> TrackPrepared:
-    return scene_at(folder, *FEW, *overrides)
+    return load_track(folder, *FEW, *overrides)
 
 
 @pytest.mark.long

@@ -19,14 +19,14 @@ from qdem_fem.track import bed as track_bed
 from qdem_fem.track.bed import (
     STAGES,
     Bed,
-    place_stage_part,
+    name_stage_file,
     prepare_bed,
     read_bed,
     run_stage,
     write_bed,
 )
 from qdem_fem.track.recipe import BedRecipe, make_bed_grains
-from validation.bench.track_trials import scene_at
+from validation.bench.track_trials import load_track
 
 JUDGEMENTS = 3
 """After so many the process is killed; the stage of 20 grains takes more."""
@@ -38,7 +38,7 @@ class Killed(Exception):
 
 def recipe_at(folder: Path) -> BedRecipe:
     """A bed of 20 grains that rests within a third of a second, whatever a processor rounds."""
-    return scene_at(folder, "track.seed=2").recipe
+    return load_track(folder, "track.seed=2").recipe
 
 
 def fallen(recipe: BedRecipe, part: Path | None, killed_after: int | None = None) -> Bed:
@@ -118,13 +118,13 @@ def test_what_a_kill_left_of_a_stage_that_is_done_is_not_read(
     """Between the bed's file and the removal of the part: the next stages begin all the same."""
     recipe, path = recipe_at(tmp_path), tmp_path / "bed.npz"
     write_bed(path, recipe, whole)
-    parts = {place_stage_part(path, stage) for stage in STAGES}
+    parts = {name_stage_file(path, stage) for stage in STAGES}
     assert len(parts) == len(STAGES)
-    place_stage_part(path, "bed").write_bytes(b"left by a kill")
+    name_stage_file(path, "bed").write_bytes(b"left by a kill")
     nothing = Rest(0.0, 0.0, 0.0, 0, 0, 0, 0.0)
     monkeypatch.setattr(track_bed, "find_rest", lambda *given, **more: nothing)
     assert prepare_bed(recipe, path, 1).stage == "rest"
-    assert not [part for part in parts - {place_stage_part(path, "bed")} if part.exists()]
+    assert not [part for part in parts - {name_stage_file(path, "bed")} if part.exists()]
 
 
 @pytest.mark.long

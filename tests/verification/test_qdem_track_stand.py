@@ -63,7 +63,7 @@ def bed(monkeypatch: pytest.MonkeyPatch) -> Bed:
     find_rest(run, 1e-3, 1e-4, 0.0, 2.0, look=5)
     assert isinstance(run.contacts, SphereContacts)
     moved = np.concatenate([body.displacement for body in run.bodies])
-    return Bed("rest", nodes, moved, run.contacts.stored(), {"rest": {}})
+    return Bed("rest", nodes, moved, run.contacts.pack_state(), {"rest": {}})
 
 
 def test_a_bed_with_friction_to_spare_stands(bed: Bed, tmp_path: Path) -> None:

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 from scipy.spatial.distance import pdist
 
-from adapters.bed.contact_law import normal_force, overlap_under_force
+from adapters.bed.contact_law import find_normal_force, find_overlap_under_force
 from adapters.bed.container import Container, Walls
-from adapters.bed.overlaps import find_behind_discs, measure_rows, neighbours
+from adapters.bed.overlaps import find_behind_discs, find_pairs, measure_rows
 from adapters.bed.state import FloatArray, State
 from adapters.errors import NotConverged, UsageError
 from adapters.relaxation.kernel import (
@@ -50,7 +50,7 @@ def settled() -> Bed:
     state = state_at_rest(start, radius)
     free = np.zeros(14, bool)
     found = relax(start, state, walls, STIFFNESS, method="karrech2007", frontier=free)
-    return state.moved(found.position), walls
+    return state.move_to(found.position), walls
 
 
 def column(count: int, overlap: FloatArray) -> Bed:
@@ -66,9 +66,11 @@ def test_hertz_potential_is_that_of_eq_5(settled: Bed) -> None:
     """psi and its gradient, the force of eq. 5, against a NumPy twin."""
     state, walls = settled
     behind = find_behind_discs(state.position, walls)
-    rows = neighbours(state.position, state.radius, walls)
+    rows = find_pairs(state.position, state.radius, walls)
     other = np.where(rows.second >= 0, state.radius[np.maximum(rows.second, 0)], np.inf)
-    lambda_n = normal_force(1.0, STIFFNESS.grain, 1 / (1 / state.radius[rows.first] + 1 / other))
+    lambda_n = find_normal_force(
+        1.0, STIFFNESS.grain, 1 / (1 / state.radius[rows.first] + 1 / other)
+    )
 
     def energy(position: FloatArray) -> tuple[float, FloatArray]:
         near = measure_rows(position, state.radius, rows.first, rows.second, walls, behind)
@@ -189,7 +191,7 @@ def test_move_is_the_smallest(bed: Bed) -> None:
     state, walls = bed
     estimate = jump(state)
     found = relax(estimate, state, walls, STIFFNESS)
-    rows = neighbours(found.position, state.radius, walls, 1e-5)
+    rows = find_pairs(found.position, state.radius, walls, 1e-5)
     n, m = len(state.radius), len(rows)
     j = np.zeros((m + 1, n, 3))
     j[np.arange(m), rows.first] = -rows.normal
@@ -261,10 +263,10 @@ def test_jump_under_a_piston_that_sinks(bed: Bed) -> None:
     top = float((state.position[:, 2] + state.radius).max())
     container = Container("box", size_x=1.0, size_y=1.0)
     before, after = container.walls(top - 1e-7), container.walls(top - 1e-7 - 2e-4)
-    middle = state.moved(state.position + np.array([0.3, 0.3, 0]))
+    middle = state.move_to(state.position + np.array([0.3, 0.3, 0]))
     found = relax(jump(middle), middle, before, STIFFNESS, walls_after=after)
     kept(found)
-    rows = neighbours(found.position, middle.radius, after)
+    rows = find_pairs(found.position, middle.radius, after)
     assert rows.overlap[rows.second == -6] == pytest.approx([1e-7], rel=0.01)
 
 
@@ -423,7 +425,7 @@ def test_numbers_that_are_not_finite(bed: Bed, bad: float, where: str) -> None:
     elif where == "before":
         position = state.position.copy()
         position[5, 1] = bad
-        state = state.moved(position)
+        state = state.move_to(position)
     else:
         radius = state.radius.copy()
         radius[5] = bad
@@ -450,7 +452,7 @@ def test_arguments_that_do_not_fit(bed: Bed) -> None:
 def test_pressed_bed_without_a_past(bed: Bed) -> None:
     """Overlaps of a bed pressed by 2 % come down to what a bed at rest can carry."""
     state, walls = bed
-    pressed = state.moved(state.position * [1, 1, 0.98])
+    pressed = state.move_to(state.position * [1, 1, 0.98])
     found = relax_bare(pressed, walls, STIFFNESS)
     limit = 1.01 * bound_equilibrium_overlap(pressed, STIFFNESS)
     assert found.estimated.max_penetration > 5e-5
@@ -461,7 +463,7 @@ def test_bound_of_overlaps_is_above_the_heaviest_contact_of_a_column() -> None:
     """There each contact carries all weight above it; Hertz: overlap grows as force^(2/3)."""
     state, _ = column(6, np.zeros(6))
     weight = GRAVITY * state.mass
-    carried = overlap_under_force(weight[1:].sum(), STIFFNESS.grain, 1.5e-3)
+    carried = find_overlap_under_force(weight[1:].sum(), STIFFNESS.grain, 1.5e-3)
     bound = bound_equilibrium_overlap(state, STIFFNESS)
     assert carried < bound < 1.2 * carried
     loaded = bound_equilibrium_overlap(state, STIFFNESS, 7 * weight.sum())

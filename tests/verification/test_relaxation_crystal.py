@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from adapters.bed.container import Container
-from adapters.bed.overlaps import neighbours
+from adapters.bed.overlaps import find_pairs
 from adapters.bed.state import FloatArray, State
 from adapters.relaxation.methods import relax
 from tests.made_beds import STIFFNESS, state_at_rest
@@ -29,7 +29,7 @@ def crystal(layers: int, side: int) -> State:
 
 def contacts_inside(position: FloatArray) -> int:
     """Greatest number of contacts of a grain."""
-    rows = neighbours(position, np.full(len(position), RADIUS), WALLS)
+    rows = find_pairs(position, np.full(len(position), RADIUS), WALLS)
     ends = np.concatenate([rows.first, rows.second[rows.second >= 0]])
     return int(np.bincount(ends).max())
 

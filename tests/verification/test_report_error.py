@@ -19,9 +19,9 @@ from adapters.laws import get_law
 from adapters.procedure.history import (
     AVERAGED,
     History,
-    failed_jumps,
-    history_of,
+    list_failed_jumps,
     list_jumped_spans,
+    make_history,
     sum_cost,
 )
 from adapters.procedure.record import find_comparable_cycle
@@ -29,13 +29,13 @@ from adapters.procedure.status import compare_with_full
 from adapters.report.error import (
     COORDINATION_BAR,
     HEIGHT_BAR,
-    comparison,
+    compare_runs,
     extrapolate_curve,
+    find_relative_error,
+    find_speed_up,
     measure_jump,
-    relative_error,
-    speed_up,
 )
-from adapters.report.jumps import show_judged
+from adapters.report.jumps import show_with_verdict
 
 A = 3e-5
 """Settlement a ln(1 + N) of the hand-made full run [m]."""
@@ -91,7 +91,7 @@ def jump(first: int, last: int, cost_s: float, settlement: float | None = None) 
 
 def full_run(cycles: int = 100) -> History:
     """A full run in windows of 25 cycles."""
-    return history_of([window(first, first + 25) for first in range(0, cycles, 25)])
+    return make_history([window(first, first + 25) for first in range(0, cycles, 25)])
 
 
 PROCEDURE = (
@@ -106,23 +106,23 @@ PROCEDURE = (
 def test_definitions() -> None:
     """S = T_full / T_procedure; the error is signed, positive for too much; start-up counts once,
     as a part of the engine's time."""
-    assert speed_up(28.0, 10.0) == pytest.approx(2.8)
-    assert isnan(speed_up(1.0, 0.0))
+    assert find_speed_up(28.0, 10.0) == pytest.approx(2.8)
+    assert isnan(find_speed_up(1.0, 0.0))
     for value, reference, error in ((110, 100, 0.1), (-90, -100, 0.1), (90, 100, -0.1)):
-        assert relative_error(value, reference) == pytest.approx(error)
-    assert isnan(relative_error(1.0, 0.0))
+        assert find_relative_error(value, reference) == pytest.approx(error)
+    assert isnan(find_relative_error(1.0, 0.0))
     cost = {"engine": 5.0, "start_up": 2.0, "parse": 0.5, "fit": 0.25, "relax": 1.0, "other": 0.125}
     assert sum_cost(cost) == 6.875
 
 
 def test_history_spreads_a_windows_cost_over_its_cycles() -> None:
     """CPU time at cycle N of a run of equal cycles is N times a cycle's; the rain is left out."""
-    history = history_of(PROCEDURE)
+    history = make_history(PROCEDURE)
     assert history.cycle.tolist() == [*range(1, 51), *range(70, 101)]
     assert np.allclose(history.cpu_s[:50], CYCLE_S * np.arange(1, 51))
     assert history.cpu_s[history.row(70)] == pytest.approx(50 * CYCLE_S + 3.0)
     assert history.cpu_s[-1] == pytest.approx(80 * CYCLE_S + 3.0)
-    assert history.computed(100) == 80
+    assert history.count_computed(100) == 80
     assert list_jumped_spans(PROCEDURE) == [(50, 70)]
     with pytest.raises(UsageError, match="60"):
         history.row(60)
@@ -138,7 +138,7 @@ def test_no_cost_is_lost(costs: list[float], lost: list[tuple[int, float]]) -> N
         Outcome("window", n, n + 1, [row(n + 1)], {"engine": cost, "start_up": cost / 2})
         for n, cost in enumerate(costs)
     ]
-    history = history_of(stages, lost)
+    history = make_history(stages, lost)
     borne = sum(seconds for cycle, seconds in lost if cycle < len(costs))
     assert history.cpu_s[-1] == pytest.approx(sum(costs) + borne)
     round_off = 1e-15 * len(history.cpu_s) * history.cpu_s[-1]  # of the running sum
@@ -148,21 +148,21 @@ def test_no_cost_is_lost(costs: list[float], lost: list[tuple[int, float]]) -> N
 def test_a_jump_of_no_cycles_costs_too() -> None:
     """h = 0 leaves no row, but its relaxation is paid by the cycles after it."""
     still = Outcome("jump", 10, 10, [], {"relax": 7.0}, notes={"relaxation": {"method": "none"}})
-    history = history_of([window(0, 10), still, window(10, 20)])
+    history = make_history([window(0, 10), still, window(10, 20)])
     assert history.cpu_s[9] == pytest.approx(10 * CYCLE_S)
     assert history.cpu_s[10] == pytest.approx(11 * CYCLE_S + 7)
 
 
 def test_comparison_in_closed_form() -> None:
     """A run 2 % too deep, cut short or not: every error and the speed-up as by hand."""
-    own = history_of(
+    own = make_history(
         [
             *PROCEDURE[:-1],
             window(70, 100, 5, settlement=1.02 * settled(100), coordination_number=3.8,
                    elastic_deflection=1.5e-5),
         ]
     )  # fmt: skip
-    row_ = comparison("x", own, 100, full_run(), 100, preparation_s=1000.0)
+    row_ = compare_runs("x", own, 100, full_run(), 100, preparation_s=1000.0)
     assert row_.computed == 80
     assert row_.settlement_error == pytest.approx(0.02)
     assert row_.coordination_number_error == pytest.approx(-0.05)
@@ -175,7 +175,7 @@ def test_comparison_in_closed_form() -> None:
 def test_averages_leave_jumped_rows_out() -> None:
     """Coordination number and deflection are means of the last computed cycles alone."""
     stages = [window(0, 50), jump(50, 70, 1.0), window(70, 74, coordination_number=2.0)]
-    history = history_of(stages)
+    history = make_history(stages)
     assert AVERAGED == 10
     assert history.late_mean("coordination_number", 74) == 2.0
     assert history.late_mean("coordination_number", 50) == 4.0
@@ -192,8 +192,8 @@ def test_displacement_error_of_a_share(share: float, shift: float, unit: float) 
     before = unit * (random.uniform(0, 0.06, (40, 3)) + shift)
     full = before + unit * random.normal(0, 1e-4, (40, 3))
     beds = (before, full, before + share * (full - before))
-    own, truth = history_of(PROCEDURE), full_run()
-    row_ = comparison("x", own, 100, truth, 100, 0.0, beds)
+    own, truth = make_history(PROCEDURE), full_run()
+    row_ = compare_runs("x", own, 100, truth, 100, 0.0, beds)
     # Differences of coordinates of size |shift| + 0.06 carry round-off of that size over 1e-4.
     exact = abs(1 - share)
     tolerance = 1e-15 * (abs(shift) + 1) / 1e-5
@@ -206,14 +206,14 @@ def test_a_run_that_did_not_move_has_no_displacement_error() -> None:
     """Without a denominator E_r is not known, rather than an exception or zero."""
     still = np.ones((5, 3))
     for before in (still, None):
-        row_ = comparison("x", full_run(), 100, full_run(), 100, 0.0, (before, still, still))
+        row_ = compare_runs("x", full_run(), 100, full_run(), 100, 0.0, (before, still, still))
         assert isnan(row_.jump_displacement_error)
         assert row_.coordinates_error == 0
 
 
 def test_moving_nothing_is_the_full_run_cut_short() -> None:
     """The null hypothesis at m computed cycles: error ln(1+m)/ln(1+N) - 1 at a speed-up N/m."""
-    row_ = comparison("x", full_run(), 80, full_run(), 100, 0.0)
+    row_ = compare_runs("x", full_run(), 80, full_run(), 100, 0.0)
     assert row_.settlement_error == pytest.approx(log(81) / log(101) - 1)
     assert row_.speed_up == pytest.approx(100 / 80)
 
@@ -221,7 +221,7 @@ def test_moving_nothing_is_the_full_run_cut_short() -> None:
 def test_a_law_that_holds_is_extrapolated_without_error() -> None:
     """Fitting c + a ln N to a settlement of that form gives the full run at any cost."""
     rows = [row(n, settlement=1e-4 + A * log(n)) for n in range(1, 101)]
-    full = history_of([Outcome("window", 0, 100, rows, {"engine": 400.0})])
+    full = make_history([Outcome("window", 0, 100, rows, {"engine": 400.0})])
     law = get_law("log")
     assert isnan(extrapolate_curve(full, law, 10, 11, 100))  # two cycles: no error of their own
     for last in (12, 20, 50, 99):
@@ -231,7 +231,7 @@ def test_a_law_that_holds_is_extrapolated_without_error() -> None:
 
 def test_the_steps_of_a_jump_add_up() -> None:
     """law + relaxation + healing = the run's settlement less the control's, same cycles."""
-    own = history_of(
+    own = make_history(
         [window(0, 50), jump(50, 70, 1.0, 1.1 * settled(70)), window(70, 100, 5, settlement=2e-4)]
     )
     full = full_run()
@@ -263,11 +263,11 @@ def test_a_jump_is_judged(share: float, verdict: str) -> None:
     }  # fmt: skip
     if isnan(share):
         outcome.notes["relaxation"] = {"method": "none"}
-    figures = measure_jump("x", outcome, history_of(PROCEDURE), None)
+    figures = measure_jump("x", outcome, make_history(PROCEDURE), None)
     for found, bar in (
         (figures.coordination_change, COORDINATION_BAR), (figures.height_change, HEIGHT_BAR),
     ):  # fmt: skip
-        assert verdict in show_judged(found, ".2f", bar)
+        assert verdict in show_with_verdict(found, ".2f", bar)
     assert (COORDINATION_BAR, HEIGHT_BAR) == (0.03, 0.05)
 
 
@@ -275,7 +275,7 @@ def test_common_cycle() -> None:
     """Run and control are compared at the last cycle both have, behind the first jump."""
     cases = ((PROCEDURE, 75, 75), (PROCEDURE[:4], 75, 70), (PROCEDURE, 50, 0))
     for outcomes, last, expected in cases:
-        run = SimpleNamespace(outcomes=outcomes, history=history_of(outcomes))
+        run = SimpleNamespace(outcomes=outcomes, history=make_history(outcomes))
         record = SimpleNamespace(run=run, control=SimpleNamespace(history=full_run(last)))
         assert find_comparable_cycle(record) == expected  # type: ignore[arg-type]
 
@@ -283,7 +283,7 @@ def test_common_cycle() -> None:
 def test_a_sentence_compares_run_and_control() -> None:
     """13 % less than the closed form, for 323 s instead of 400, as computed by hand."""
     full = full_run()
-    short = history_of([*PROCEDURE[:4], window(70, 100, settlement=0.87 * settled(100))])
+    short = make_history([*PROCEDURE[:4], window(70, 100, settlement=0.87 * settled(100))])
     for own, of_full, cycle, said in (
         (short, full, 100, "0.138 mm: the jumps are 13 % short, at 1.2 times less computing."),
         (short, full, 50, "0.118 mm in 50 cycles, this one 0.118 mm: the jumps are within 0.5 %, "
@@ -317,11 +317,12 @@ def test_a_failed_jump_is_charged(tmp_path: Path) -> None:
     folder.give_up("jump_000050_1", "nan")
     folder.give_up("jump_000050_2", "the relaxation did not converge")
     (tmp_path / "run" / "events.jsonl").write_text("".join(events))
-    lost = [(one.stage, one.why, one.lost_s) for one in failed_jumps(folder)]
+    lost = [(one.stage, one.why, one.lost_s) for one in list_failed_jumps(folder)]
     assert lost == [
         ("jump_000050_1", "nan", pytest.approx(3.0 + 150.0)),
         ("jump_000050_2", "the relaxation did not converge", 0.0),
     ]
     assert all(
-        before.first_cycle <= after.first_cycle for before, after in pairwise(failed_jumps(folder))
+        before.first_cycle <= after.first_cycle
+        for before, after in pairwise(list_failed_jumps(folder))
     )

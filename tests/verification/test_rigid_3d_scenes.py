@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigid_lcp import HalfSpace, Polyhedron, Scene, Simulation, Sphere, box
+from rigid_lcp import HalfSpace, Polyhedron, Scene, Simulation, Sphere, make_box
 from rigid_lcp.arrays import Floats
-from rigid_lcp.shapes.rotations import quaternion_of_rotation, rotate, unit_quaternion
+from rigid_lcp.shapes.rotations import make_quaternion, normalise_quaternion, rotate
 from tests.rigid_solids import angular_momentum, ballast_stone
 
 G = 9.81
@@ -36,7 +36,7 @@ def test_a_leaning_prism_stands_on_all_of_its_face(corners: int, below: str) -> 
         if below == "floor":
             scene.add(FLOOR, friction=0.8)
         else:
-            scene.add(box(6, 6, 1), fixed=True, position=[0, 0, -0.5], friction=0.8)
+            scene.add(make_box(6, 6, 1), fixed=True, position=[0, 0, -0.5], friction=0.8)
         scene.add(prism, density=1000, friction=0.8)
         run = Simulation(scene)
         start = run.positions.copy()
@@ -90,7 +90,7 @@ def precessing_top(step: float, seconds: float) -> float:
     length = float(top.centroid[2])
     tip = inertia[0, 0] + mass * length**2
     spin = (tip * precession**2 * np.cos(theta) + mass * G * length) / inertia[2, 2] / precession
-    turn = quaternion_of_rotation([0.0, theta, 0.0])
+    turn = make_quaternion([0.0, theta, 0.0])
     axis = rotate(turn, [0.0, 0.0, 1.0])
     vertical = np.array([0.0, 0.0, 1.0])
     omega = precession * vertical + (spin - precession * np.cos(theta)) * axis
@@ -124,7 +124,7 @@ def test_a_tower_of_ten_boxes_stands(top: float) -> None:
     start = np.array([[0.0, 0.0, 0.5 + k] for k in range(10)])
     for k, place in enumerate(start):
         density = 1e3 * (top if k == 9 else 1.0)
-        scene.add(box(1.0, 1.0, 1.0), density=density, position=place, friction=0.5)
+        scene.add(make_box(1.0, 1.0, 1.0), density=density, position=place, friction=0.5)
     scene.add(FLOOR)
     run = Simulation(scene, step=5e-3)
     run.advance(0.5)
@@ -140,8 +140,8 @@ def test_a_twisted_tower_stands_on_crossing_edges() -> None:
     scene = Scene(dim=3)
     start = np.array([[0.0, 0.0, 0.5 + k] for k in range(5)])
     for k, place in enumerate(start):
-        turn = quaternion_of_rotation([0.0, 0.0, k * np.pi / 6])
-        scene.add(box(1.0, 1.0, 1.0), density=1e3, position=place, angle=turn, friction=0.5)
+        turn = make_quaternion([0.0, 0.0, k * np.pi / 6])
+        scene.add(make_box(1.0, 1.0, 1.0), density=1e3, position=place, angle=turn, friction=0.5)
     scene.add(FLOOR)
     run = Simulation(scene, step=5e-3)
     run.advance(0.25)
@@ -158,7 +158,7 @@ def poured(count: int, size: float, seed: int) -> Scene:
         scene.add(
             ballast_stone(generator, size), density=2700.0, friction=0.6,
             position=[*across, size * (0.8 + 1.4 * layer)],
-            angle=unit_quaternion(generator.normal(size=4)),
+            angle=normalise_quaternion(generator.normal(size=4)),
         )  # fmt: skip
     scene.add(FLOOR)
     return scene

@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 
 from rigid_lcp.arrays import Floats
 from rigid_lcp.friction.methods.gauss_seidel import begin_sweeps, lay_out_sweeps
-from rigid_lcp.friction.problem.definition import FrictionProblem, friction_problem
+from rigid_lcp.friction.problem.definition import FrictionProblem, make_problem
 from rigid_lcp.friction.sweeps.blocks import find_relative_velocities
-from rigid_lcp.friction.sweeps.body_kernel import inverses
+from rigid_lcp.friction.sweeps.body_kernel import invert_blocks
 from rigid_lcp.friction.sweeps.contact_kernel import visit_all
 from tests.rigid_local import solve_contact
 from tests.rigid_networks import random_bodies, random_pairs
@@ -27,7 +27,7 @@ def some_problem(seed: int, dim: int, contacts: int, mu: float) -> FrictionProbl
     """Random pairs of few bodies, some of them the ground: redundant and strongly coupled."""
     random, bodies = np.random.default_rng(seed), max(2, contacts // 2)
     space = random_bodies(random_pairs(contacts, bodies, random), bodies, dim, random)
-    return friction_problem(space, random.normal(size=contacts * dim), mu, dim)
+    return make_problem(space, random.normal(size=contacts * dim), mu, dim)
 
 
 def twin_sweep(
@@ -82,7 +82,7 @@ def test_blocks_of_the_bodies_make_w(dim: int, full: bool) -> None:
     """``B B^T`` is W, for masses alone and for bodies whose inertia couples its axes."""
     random = np.random.default_rng(7)
     space = random_bodies([(0, -1), (0, 1), (1, 2), (2, 0)], 3, dim, random, full)
-    problem = friction_problem(space, random.normal(size=4 * dim), 0.4, dim)
+    problem = make_problem(space, random.normal(size=4 * dim), 0.4, dim)
     blocks = lay_out_sweeps(problem)
     assert blocks.bodies > 0
     r = random.normal(size=(4, dim))
@@ -100,7 +100,7 @@ def test_inverses_invert_or_are_zero(dim: int) -> None:
     factor = random.normal(size=(200, dim, dim))
     factor[:20, 0] = 2.0 * factor[:20, 1]  # of lower rank
     local = np.einsum("cij,ckj->cik", factor, factor)
-    found = inverses(local, np.full(200, 0.3))
+    found = invert_blocks(local, np.full(200, 0.3))
     known = found[:, 0, 0] != 0.0
     assert not known[:20].any()
     assert known.sum() > 100

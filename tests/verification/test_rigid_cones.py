@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigid_lcp.arrays import Floats
-from rigid_lcp.friction.problem.cones import natural_map, natural_residual
-from rigid_lcp.friction.problem.definition import friction_problem
+from rigid_lcp.friction.problem.cones import find_natural_map, find_natural_residual
+from rigid_lcp.friction.problem.definition import make_problem
 
 ROUND_OFF = 1e-12
 """Ten times 2e-16 (mu + 1) (push + rho speed) / push at the ends of the ranges below."""
@@ -19,7 +19,7 @@ FRICTION = st.one_of(st.sampled_from([0.0, 1.0, 1e6]), st.floats(0, 2))
 
 def projected(points: Floats, mu: Floats) -> Floats:
     """``P_K(r) = r - F(r)``: at rest the natural map F takes the nearest point of K away."""
-    return points - natural_map(points, np.zeros_like(points), mu, 1.0)
+    return points - find_natural_map(points, np.zeros_like(points), mu, 1.0)
 
 
 @settings(deadline=None)
@@ -40,7 +40,7 @@ def test_projection_is_the_nearest_point(n: float, s: float, t: float, mu: float
 def test_a_contact_that_parts_needs_no_force(mu: float) -> None:
     """``u_N >= 0``, r = 0: the natural map is zero, with mu = 0 as well."""
     force, velocity = np.zeros((1, 2)), np.array([[0.09, 0.0]])
-    assert natural_residual(force, velocity, np.array([mu]), 1.0) == 0.0
+    assert find_natural_residual(force, velocity, np.array([mu]), 1.0) == 0.0
 
 
 @settings(deadline=None)
@@ -51,7 +51,7 @@ def test_coulombs_three_cases_have_no_residual(push, mu, speed, angle, share):
     share = abs(share) / 1e3
 
     def residual(force: list[float], velocity: list[float]) -> float:
-        return natural_residual(np.array([force]), np.array([velocity]), np.array([mu]), 1.0)
+        return find_natural_residual(np.array([force]), np.array([velocity]), np.array([mu]), 1.0)
 
     assert residual([0, 0, 0], [speed, *(speed * along)]) == 0.0
     assert residual([push, *(share * mu * push * along)], [0, 0, 0]) <= ROUND_OFF
@@ -67,8 +67,8 @@ def test_the_residual_has_no_units(mass: float, length: float) -> None:
     rng = np.random.default_rng(1)
     force, velocity = rng.normal(size=(2, 5, 3))
     mu = rng.uniform(0, 1, 5)
-    once = natural_residual(force, velocity, mu, 0.7)
-    scaled = natural_residual(force * mass, velocity * length, mu, 0.7 * mass / length)
+    once = find_natural_residual(force, velocity, mu, 0.7)
+    scaled = find_natural_residual(force * mass, velocity * length, mu, 0.7 * mass / length)
     assert scaled == pytest.approx(once, rel=1e-12)
 
 
@@ -93,7 +93,7 @@ def test_the_natural_map_is_its_definition(greatest: float, dim: int) -> None:
     mu = greatest * rng.uniform(0.0, 1.0, 500)
     dual = velocity.copy()
     dual[:, 0] += mu * np.linalg.norm(velocity[:, 1:], axis=1)
-    found = natural_map(force, velocity, mu, 0.7)
+    found = find_natural_map(force, velocity, mu, 0.7)
     definition = force - twin(force - 0.7 * dual, mu)
     np.testing.assert_allclose(found, definition, atol=1e-14 * (1 + greatest))
 
@@ -106,10 +106,10 @@ def test_the_scale_of_a_contact_is_the_force_that_stops_it_alone(unit: float) ->
     approach = np.array([-1.0, -2.0, -0.3])
     q = np.zeros(6)
     q[::2] = approach
-    problem = friction_problem(np.diag(np.repeat(inverse_mass, 2)), q, 0.5, 2)
+    problem = make_problem(np.diag(np.repeat(inverse_mass, 2)), q, 0.5, 2)
     stopping = -problem.contact_rho * approach
     np.testing.assert_allclose(stopping, -approach / inverse_mass, rtol=1e-15)
     force = np.zeros(6)
     force[::2] = stopping
     assert problem.residual(force) <= 1e-15
-    assert problem.mended(force, 0.0)
+    assert problem.reduces_error(force, 0.0)

@@ -8,14 +8,14 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rigid_lcp import Polyhedron, Scene, Simulation
-from rigid_lcp.motion.equations import inertial_acceleration, relative_velocity
+from rigid_lcp.motion.equations import find_inertial_acceleration, find_relative_velocity
 from rigid_lcp.motion.state import Motion, displace_motion
 from rigid_lcp.shapes.rotations import (
     Floats,
-    quaternion_of_rotation,
-    quaternion_product,
+    make_quaternion,
+    multiply_quaternions,
+    normalise_quaternion,
     rotate,
-    unit_quaternion,
 )
 from tests.rigid_solids import CUBE, coal_distance, contacts
 from tests.verification.test_rigid_hard_geometry_3d import (
@@ -37,7 +37,7 @@ def nearest_corners(name: str, seed: int, form: str, gap: float) -> tuple[Pair, 
     """
     generator = np.random.default_rng(seed)
     shapes = family(name, generator)
-    turns = unit_quaternion(generator.normal(size=(2, 4)))
+    turns = normalise_quaternion(generator.normal(size=(2, 4)))
     if form == "edge under corner":
         (pair, normal) = nearest_corners(name, seed, "corner on edge", gap)
         shapes, position, turns, axes = pair
@@ -114,10 +114,10 @@ def test_rates_are_the_derivatives_of_the_gap(seed: int, form: str) -> None:
     found = contacts(shapes, position, turns, margin=0.05)
     least = int(np.argmin(found.gap))
     # truncation h^2 times g''' = v^3 / g^2 = 1e4 here, and h^2 g'''' = v^4 / g^3 = 1e6
-    rate = relative_velocity(found, motion)[least, 0]
+    rate = find_relative_velocity(found, motion)[least, 0]
     assert (gaps[2] - gaps[0]) / (2 * h) == pytest.approx(rate, abs=1e-3)
     second = (gaps[0] - 2 * gaps[1] + gaps[2]) / h**2
-    exact = inertial_acceleration(found, motion)[least, 0]
+    exact = find_inertial_acceleration(found, motion)[least, 0]
     assert second == pytest.approx(exact, abs=2e-2, rel=1e-3)
 
 
@@ -154,7 +154,7 @@ def test_the_least_gap_is_continuous(name: str, seed: int) -> None:
 @pytest.mark.parametrize("shift", [0.0, 0.3])
 def test_parallel_ridges_have_a_contact_at_either_end(gap: float, shift: float) -> None:
     """Roofs ridge along ridge, apart: contacts at the ends of what the ridges share."""
-    turn = quaternion_of_rotation([np.pi / 4, 0.0, 0.0])
+    turn = make_quaternion([np.pi / 4, 0.0, 0.0])
     found = contacts([CUBE, CUBE], [[0, 0, 0], [shift, 0, 2**0.5 + gap]], [turn, turn])
     assert len(found) == 2
     assert np.ptp(found.point[:, 0]) == pytest.approx(1 - shift)
@@ -166,9 +166,9 @@ def test_parallel_ridges_have_a_contact_at_either_end(gap: float, shift: float) 
 @pytest.mark.parametrize("margins", [[2e-2, 0.0], [0.0, 2e-2], [1e-2, 1e-2]])
 def test_edges_are_found_whoever_has_the_margin(margins: list[float]) -> None:
     """A body that falls has all of the margin, one that stands none: crossing edges 1e-2 apart."""
-    lower = quaternion_of_rotation([np.pi / 4, 0.0, 0.0])
-    turned = quaternion_of_rotation([0.0, 0.0, 1.5])
-    upper = quaternion_product(turned[None], lower[None])[0]
+    lower = make_quaternion([np.pi / 4, 0.0, 0.0])
+    turned = make_quaternion([0.0, 0.0, 1.5])
+    upper = multiply_quaternions(turned[None], lower[None])[0]
     place = [[0, 0, 0], [0.1, 0.05, 2**0.5 + 1e-2]]
     found = contacts([CUBE, CUBE], place, [lower, upper], np.array(margins))
     assert found.gap == pytest.approx([1e-2])
@@ -247,7 +247,7 @@ def test_a_cube_on_its_corner_upon_another_s_comes_down() -> None:
     up = np.array([1.0, 1.0, 1.0]) / 3**0.5
     axis = np.cross(up, [0.0, 0.0, 1.0])
     sine = np.linalg.norm(axis)
-    tip = quaternion_of_rotation(axis / sine * np.arctan2(sine, up[2]))
+    tip = make_quaternion(axis / sine * np.arctan2(sine, up[2]))
     scene = Scene(dim=3)
     cube = Polyhedron(0.1 * CUBE.vertices)
     high = 0.1 * 3**0.5

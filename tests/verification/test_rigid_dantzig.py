@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import ProblemError
 from rigid_lcp.friction.auto.islands import cut_out_island
-from rigid_lcp.friction.methods.dantzig import dantzig
+from rigid_lcp.friction.methods.dantzig import solve_dantzig
 from rigid_lcp.friction.pivots.drive import move_contact
 from rigid_lcp.friction.pivots.shift import change_shift
 from rigid_lcp.friction.pivots.state import Pivots, start_pivots
@@ -19,15 +19,15 @@ from rigid_lcp.friction.pivots.updates import (
     SLIDING_DOWN,
     SLIDING_UP,
     STATIC,
-    border_inverse,
+    extend_inverse,
+    find_slide_sign,
     refresh_reduced,
     shrink_inverse,
-    slide_sign,
 )
 from rigid_lcp.friction.problem.definition import (
     FrictionProblem,
     FrictionSolution,
-    friction_problem,
+    make_problem,
 )
 from tests.rigid_networks import network, stored
 
@@ -37,7 +37,7 @@ TOLERANCE = 1e-12
 def in_orders(problem: FrictionProblem, count: int) -> list[FrictionSolution]:
     """What comes out where the contacts are numbered, and so considered, in random orders."""
     orders = [np.random.default_rng(k).permutation(problem.contacts) for k in range(count)]
-    return [dantzig(cut_out_island(problem, order)) for order in orders]
+    return [solve_dantzig(cut_out_island(problem, order)) for order in orders]
 
 
 def matrix_of_lists(state: Pivots) -> Floats:
@@ -54,7 +54,9 @@ def matrix_of_lists(state: Pivots) -> Floats:
         c = geometry.contact[row]
         column = full[:, row].copy()
         if row == geometry.normal[c]:
-            column += slide_sign(reduced.kind[c]) * geometry.mu[c] * full[:, geometry.tangent[c]]
+            column += (
+                find_slide_sign(reduced.kind[c]) * geometry.mu[c] * full[:, geometry.tangent[c]]
+            )
         columns.append(column[members])
     return np.array(columns).T
 
@@ -67,7 +69,7 @@ def test_bordering_and_dropping_give_the_inverse(size: int, seed: int) -> None:
     b = g.normal(size=(size + 1, size + 1)) + 4.0 * np.eye(size + 1)
     room = np.zeros((size + 1, size + 1))
     room[:size, :size] = np.linalg.inv(b[:size, :size])
-    complement = border_inverse(room, size, b[:size, size].copy(), b[size, :size].copy(), b[-1, -1])
+    complement = extend_inverse(room, size, b[:size, size].copy(), b[size, :size].copy(), b[-1, -1])
     expected = b[-1, -1] - b[size, :size] @ np.linalg.solve(b[:size, :size], b[:size, size])
     allowed = 1e-13 * np.linalg.cond(b) ** 2
     assert complement == pytest.approx(expected, abs=allowed * abs(b).max())
@@ -83,7 +85,7 @@ def test_bordering_and_dropping_give_the_inverse(size: int, seed: int) -> None:
 def test_a_singular_border_changes_nothing() -> None:
     """``[[1, 1], [1, 1]]`` has no inverse."""
     room = np.eye(2)
-    assert border_inverse(room, 1, np.ones(1), np.ones(1), 1.0) == 0.0
+    assert extend_inverse(room, 1, np.ones(1), np.ones(1), 1.0) == 0.0
     assert (room == np.eye(2)).all()
 
 
@@ -120,7 +122,7 @@ def test_block_at_its_threshold(ratio: float, slides: bool) -> None:
     """A point mass on a slope of angle alpha: it stays from mu = tan(alpha) on."""
     slope = np.radians(20.0)
     offset = 9.81 * np.array([-np.cos(slope), np.sin(slope)])
-    found = dantzig(friction_problem(np.eye(2), offset, ratio * np.tan(slope), 2))
+    found = solve_dantzig(make_problem(np.eye(2), offset, ratio * np.tan(slope), 2))
     assert found.solved
     excess = 9.81 * np.sin(slope) * max(1.0 - ratio, 0.0)
     assert found.u[1] == pytest.approx(excess, abs=1e-13 * 9.81)
@@ -137,7 +139,7 @@ def test_painleve_rod(mu: float, pushed: float) -> None:
     sine, cosine = np.sin(np.arctan(2.0)), np.cos(np.arctan(2.0))
     w = [[1 + 3 * cosine**2, 3 * sine * cosine], [3 * sine * cosine, 1 + 3 * sine**2]]
     effective = 1.6 - 1.2 * mu
-    found = dantzig(friction_problem(w, [pushed, 0.3], mu, 2), tangential_velocity=[1.0])
+    found = solve_dantzig(make_problem(w, [pushed, 0.3], mu, 2), tangential_velocity=[1.0])
     if pushed > 0:
         assert found.solved
         assert (found.r == 0.0).all()
@@ -154,7 +156,7 @@ def test_sliding_contacts_stay_sliding() -> None:
     problem = network(60, 0.1, 3)
     g = np.random.default_rng(0)
     velocity = np.where(g.random(problem.contacts) < 0.5, g.choice([-1.0, 1.0]), 0.0)
-    found = dantzig(problem, tangential_velocity=velocity)
+    found = solve_dantzig(problem, tangential_velocity=velocity)
     force, slides = found.r.reshape(-1, 2), velocity != 0
     assert found.solved
     assert force[slides, 1] == pytest.approx(-np.sign(velocity[slides]) * 0.1 * force[slides, 0])
@@ -191,10 +193,10 @@ def test_success_falls_with_friction() -> None:
 
 def test_what_can_not_be_posed_is_refused() -> None:
     """Velocities that are none."""
-    plane = friction_problem(np.eye(4), -np.ones(4), 0.3, 2)
+    plane = make_problem(np.eye(4), -np.ones(4), 0.3, 2)
     for wrong in ([1.0], [1.0, np.nan]):
         with pytest.raises(ProblemError, match="tangential_velocity"):
-            dantzig(plane, tangential_velocity=wrong)
+            solve_dantzig(plane, tangential_velocity=wrong)
 
 
 def test_a_settled_packing() -> None:

@@ -11,20 +11,20 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_lcp import BodySpace, HalfSpace, Scene, Simulation, box
-from rigid_lcp.friction.problem.definition import friction_problem
-from rigid_lcp.unique.elastic_limit import elastic_limit
+from rigid_lcp import BodySpace, HalfSpace, Scene, Simulation, make_box
+from rigid_lcp.friction.problem.definition import make_problem
+from rigid_lcp.unique.elastic_limit import find_elastic_limit
 from tests.rigid_elastic import find_least_forces
 from tests.rigid_static_problems import GRAVITY, beam, difference, pyramid, table, tower
-from validation.bench.rigid.packings import packing
-from validation.bench.rigid.static_grains import pyramid as pile
-from validation.bench.rigid.static_grains import renumbered
+from validation.bench.rigid.packings import build_packing
+from validation.bench.rigid.static_grains import build_pyramid as pile
+from validation.bench.rigid.static_grains import renumber
 
 
 @pytest.mark.parametrize("top", [1.0, 1e4])
 def test_sticking_tower_has_the_minimum_norm(top):
     problem = tower(10, top)
-    answer = elastic_limit(problem)
+    answer = find_elastic_limit(problem)
     assert answer.solved
     assert difference(answer.r, find_least_forces(problem)) < 1e-11
     # a heavier top: every box carries all above it, half at each corner
@@ -38,7 +38,7 @@ def test_frictionless_limit_obeys_the_conditions_of_least_energy(across):
     with contacts that part left out; across the pile accelerates, and they hold all the same."""
     problem = pyramid(6, 0.0, across=across)
     k = np.random.default_rng(3).uniform(0.5, 2.0, problem.contacts)
-    answer = elastic_limit(problem, k)
+    answer = find_elastic_limit(problem, k)
     assert answer.solved
     normal = answer.r[0::2]
     deformation = -(problem.bodies.jacobian @ answer.displacement)[0::2]
@@ -56,11 +56,11 @@ def test_frictionless_limit_obeys_the_conditions_of_least_energy(across):
 @pytest.mark.parametrize("across", [0.0, 2.0])
 def test_forces_do_not_depend_on_order_or_numbering(friction, across):
     problem = pyramid(4, friction, across=across)
-    answer = elastic_limit(problem)
+    answer = find_elastic_limit(problem)
     rng = np.random.default_rng(7)
     order = rng.permutation(problem.contacts)
     other = pyramid(4, friction, order, rng.permutation(10), across=across)
-    again = elastic_limit(other)
+    again = find_elastic_limit(other)
     assert answer.solved
     assert again.solved
     sorted_back = np.empty((problem.contacts, 2))
@@ -75,7 +75,7 @@ def test_any_stiffness_frictionless_or_sticking(masses, spread):
     problem = pyramid(3, 5.0, masses=masses)
     rng = np.random.default_rng(masses)
     k = np.repeat(10 ** rng.uniform(-spread / 2, spread / 2, (problem.contacts, 1)), 2, axis=1)
-    answer = elastic_limit(problem, k)
+    answer = find_elastic_limit(problem, k)
     assert answer.solved
     least = find_least_forces(problem, k)
     if (np.abs(least[1::2]) < 5.0 * least[0::2]).all():
@@ -90,8 +90,8 @@ def test_units_do_not_matter():
     jacobian = sp.csr_array(1e3 * space.jacobian @ sp.diags_array(1 / freedom))
     # energy, so mass by both freedoms, is 1e9 times as many g mm^2 / s^2
     inverse = sp.csr_array(sp.diags_array(1e-9 * freedom**2) @ space.inverse_mass)
-    small = friction_problem(BodySpace(jacobian, inverse, 3), 1e3 * problem.offset, 0.4, 2)
-    a, b = elastic_limit(problem), elastic_limit(small)
+    small = make_problem(BodySpace(jacobian, inverse, 3), 1e3 * problem.offset, 0.4, 2)
+    a, b = find_elastic_limit(problem), find_elastic_limit(small)
     assert difference(b.r, a.r * 1e6) < 1e-10
 
 
@@ -101,9 +101,9 @@ def test_friction_can_be_mobilised_in_more_ways_than_one():
     Both are solutions, to the last digit.  Without friction, and where all hold, there is one.
     """
     for problem, unique in ((pyramid(4, 0.9), False), (pyramid(4, 0.0), True)):
-        near = elastic_limit(problem)
+        near = find_elastic_limit(problem)
         start = np.random.default_rng(0).normal(size=30) * np.abs(near.r).max()
-        far = elastic_limit(problem, begin=start)
+        far = find_elastic_limit(problem, begin=start)
         assert near.solved
         assert far.solved
         assert max(near.residual, far.residual) < 1e-12
@@ -116,8 +116,8 @@ def test_grains_that_go_on_sliding_in_space(seed):
     """Friction along the velocity: springs alone turn into it as 1 over the way, and ended with a
     residual of 3e-9.  The same forces with the contacts the other way round, on these beds: of 16
     (seeds 90 to 105) 11 are found both ways round, and 2 of those have two answers."""
-    problem = packing(60, 3, seed=seed, friction=1.0)
-    answer = elastic_limit(problem)
+    problem = build_packing(60, 3, seed=seed, friction=1.0)
+    answer = find_elastic_limit(problem)
     assert answer.solved
     assert problem.residual(answer.r) < 1e-12
     velocity = problem.velocity(answer.r).reshape(-1, 3)
@@ -130,11 +130,11 @@ def test_grains_that_go_on_sliding_in_space(seed):
     np.testing.assert_allclose(grip, along, atol=1e-8)
     bodies = problem.bodies
     backwards = np.arange(len(answer.r)).reshape(-1, 3)[::-1].ravel()
-    other = friction_problem(
+    other = make_problem(
         BodySpace(bodies.jacobian[backwards], bodies.inverse_mass, bodies.body_size),
         problem.offset[backwards], problem.friction[::-1].copy(), 3,
     )  # fmt: skip
-    assert difference(elastic_limit(other).r, answer.r[backwards]) < 1e-10
+    assert difference(find_elastic_limit(other).r, answer.r[backwards]) < 1e-10
 
 
 @pytest.mark.parametrize(
@@ -145,13 +145,13 @@ def test_round_off_does_not_choose_between_states(rows, friction, walls, orders)
     """55 discs at friction 0.3, 465 at 5: random orders ended in another of two states, 6.5 and
     6.9 % apart, before the way there was made with rounded numbers in an order of their own."""
     grains = pile(rows, walls=walls, seed=1 if walls else rows)
-    first = elastic_limit(grains.problem(friction))
+    first = find_elastic_limit(grains.problem(friction))
     assert first.solved
     rng = np.random.default_rng(1)
     for _ in range(orders):
         contact = rng.permutation(len(grains.body_a))
         body = rng.permutation(len(grains.mass))
-        again = elastic_limit(renumbered(grains, contact, body).problem(friction))
+        again = find_elastic_limit(renumber(grains, contact, body).problem(friction))
         assert again.solved
         back = again.r.reshape(-1, 2)[np.argsort(contact)]
         assert difference(back.ravel(), first.r) < 1e-10
@@ -160,10 +160,10 @@ def test_round_off_does_not_choose_between_states(rows, friction, walls, orders)
 def test_steps_that_run_out_leave_the_forces_of_the_last():
     """Also where they run out between the rounded load, 1e-9 off, and the load itself."""
     problem = pile(4, walls=True, seed=0).problem(0.3)
-    whole = elastic_limit(problem)
+    whole = find_elastic_limit(problem)
     assert whole.solved
     errors = [
-        difference(elastic_limit(problem, iterations_max=most).r, whole.r)
+        difference(find_elastic_limit(problem, iterations_max=most).r, whole.r)
         for most in range(whole.iterations - 5, whole.iterations + 1)
     ]
     assert max(errors) < 1e-7
@@ -173,7 +173,7 @@ def test_steps_that_run_out_leave_the_forces_of_the_last():
 def test_contacts_that_hold_need_one_step(make):
     """All stick: least norm of all forces in balance, from one factorisation."""
     problem = make()
-    answer = elastic_limit(problem)
+    answer = find_elastic_limit(problem)
     assert answer.solved
     if problem.friction.any():
         assert difference(answer.r, find_least_forces(problem)) < 1e-11
@@ -183,6 +183,6 @@ def test_contacts_that_hold_need_one_step(make):
 def test_forces_of_a_run_are_those_of_equal_springs():
     """A box of 1 kg on its four corners: a quarter of its weight on each."""
     scene = Scene(3)
-    scene.add(box(1, 1, 1), density=1.0, position=(0, 0, 0.5), friction=0.5)
+    scene.add(make_box(1, 1, 1), density=1.0, position=(0, 0, 0.5), friction=0.5)
     scene.add(HalfSpace((0, 0, 1)))
     assert Simulation(scene).unique_forces().normal_force == pytest.approx([GRAVITY / 4] * 4)

@@ -8,13 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigid_lcp import Disc, HalfSpace, Polygon, Scene
-from rigid_lcp.contact.arrays import Contacts, contact_rows
+from rigid_lcp.contact.arrays import Contacts, match_keys
 from rigid_lcp.motion.equations import (
-    body_space,
+    build_jacobian,
     find_contact_offset,
-    inertial_acceleration,
-    jacobian,
-    relative_velocity,
+    find_inertial_acceleration,
+    find_relative_velocity,
+    make_body_space,
 )
 from rigid_lcp.motion.state import Motion, displace_motion, replace_rates
 from rigid_lcp.motion.world import World, make_world
@@ -59,14 +59,14 @@ def touching(name: str, seed: int) -> tuple[World, Motion, Contacts]:
         rates[1] = 0.0
     motion = replace_rates(motion, rates)
     contacts = again(world, motion, contacts)
-    rates[0, :2] -= relative_velocity(contacts, motion)[0, 0] * contacts.normal[0]
+    rates[0, :2] -= find_relative_velocity(contacts, motion)[0, 0] * contacts.normal[0]
     return world, replace_rates(motion, rates), contacts
 
 
 def again(world: World, motion: Motion, contacts: Contacts) -> Contacts:
     """The same contact at another state."""
     found = world.contacts(motion, 1.0)
-    rows, there = contact_rows(found.key, contacts.key)
+    rows, there = match_keys(found.key, contacts.key)
     assert there.all()
     return found[rows]
 
@@ -77,7 +77,7 @@ def test_gap_rate(name: str, seed: int) -> None:
     """``dg/dq`` (eq. 13) by central differences: error h^2 = 1e-10, round-off 1e-16 / h = 1e-11."""
     world, motion, contacts = touching(name, seed)
     lower_moves = not isinstance(PAIRS[name][1], HalfSpace)
-    rows = jacobian(contacts, motion.position, np.arange(2), 2).toarray()[0]
+    rows = build_jacobian(contacts, motion.position, np.arange(2), 2).toarray()[0]
     h = 1e-5
     for freedom in range(6 if lower_moves else 3):
         move = np.zeros((2, 3))
@@ -100,13 +100,13 @@ def test_normal_inertial_terms(name: str, seed: int) -> None:
            for k in (-1, 0, 1)]  # fmt: skip
     assert abs(gap[2] - gap[0]) < 1e-5  # the gap rate is zero
     expected = (gap[0] - 2 * gap[1] + gap[2]) / h**2
-    assert inertial_acceleration(contacts, motion)[0, 0] == pytest.approx(expected, abs=1e-4)
+    assert find_inertial_acceleration(contacts, motion)[0, 0] == pytest.approx(expected, abs=1e-4)
     # Richardson: a quarter of the error at half the step
     half = [again(world, displace_motion(motion, k * h / 2 * motion.rates), contacts).gap[0]
             for k in (-1, 0, 1)]  # fmt: skip
     finer = (half[0] - 2 * half[1] + half[2]) / (h / 2) ** 2
     best = (4 * finer - expected) / 3
-    assert inertial_acceleration(contacts, motion)[0, 0] == pytest.approx(best, abs=2e-8)
+    assert find_inertial_acceleration(contacts, motion)[0, 0] == pytest.approx(best, abs=2e-8)
 
 
 @pytest.mark.parametrize("name", PAIRS)
@@ -118,9 +118,9 @@ def test_tangential_inertial_terms(name: str, seed: int) -> None:
     slip = []
     for k in (-1, 1):
         there = displace_motion(motion, k * h * motion.rates)
-        slip.append(relative_velocity(again(world, there, contacts), there)[0, 1])
+        slip.append(find_relative_velocity(again(world, there, contacts), there)[0, 1])
     expected = (slip[1] - slip[0]) / (2 * h)
-    assert inertial_acceleration(contacts, motion)[0, 1] == pytest.approx(expected, abs=1e-8)
+    assert find_inertial_acceleration(contacts, motion)[0, 1] == pytest.approx(expected, abs=1e-8)
 
 
 @given(st.integers(0, 2**32 - 1))
@@ -128,9 +128,9 @@ def test_tangential_inertial_terms(name: str, seed: int) -> None:
 def test_relative_velocity_is_j_v(seed: int) -> None:
     """``u = J v``, and J^T f has no resultant on a pair: momentum and angular momentum are kept."""
     world, motion, contacts = touching("vertex on face", seed)
-    rows = jacobian(contacts, motion.position, world.columns, 2)
+    rows = build_jacobian(contacts, motion.position, world.columns, 2)
     np.testing.assert_allclose(
-        rows @ motion.rates.ravel(), relative_velocity(contacts, motion).ravel(), atol=1e-12
+        rows @ motion.rates.ravel(), find_relative_velocity(contacts, motion).ravel(), atol=1e-12
     )
     force = rows.T @ np.array([1.3, -0.4])
     pushes = force.reshape(2, 3)
@@ -147,7 +147,7 @@ def test_matrix_of_a_box_at_rest() -> None:
     scene.add(HalfSpace((0, 1)))
     world, motion = make_world(scene)
     contacts = world.contacts(motion, 1e-9)
-    bodies = body_space(contacts, motion.position, world.columns, world.inverse_mass(motion))
+    bodies = make_body_space(contacts, motion.position, world.columns, world.inverse_mass(motion))
     mass, inertia = 6.0, 6.0 * (4 + 1) / 12
     assert bodies.jacobian.shape == (4, 3)  # the floor has no columns
     normal = bodies.matrix.toarray()[::2, ::2]
@@ -163,5 +163,5 @@ def test_driven_body_has_velocity_but_no_columns() -> None:
     scene.add(Polygon.rectangle(4, 1), fixed=True, velocity=(0.5, 0))
     world, motion = make_world(scene)
     contacts = world.contacts(motion, 1e-9)
-    assert jacobian(contacts, motion.position, world.columns, 1).shape == (4, 3)
-    np.testing.assert_allclose(np.abs(relative_velocity(contacts, motion)[:, 1]), 0.5)
+    assert build_jacobian(contacts, motion.position, world.columns, 1).shape == (4, 3)
+    np.testing.assert_allclose(np.abs(find_relative_velocity(contacts, motion)[:, 1]), 0.5)

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_lcp import Disc, HalfSpace, Polygon, Polyhedron, Scene, Simulation, box
-from rigid_lcp.contact import shapes_3d
+from rigid_lcp import Disc, HalfSpace, Polygon, Polyhedron, Scene, Simulation, make_box
+from rigid_lcp.contact import pack_shapes_3d
 from rigid_lcp.errors import ShapeError
 from rigid_lcp.motion import make_world
 from rigid_lcp.shapes import rotate, rotate_back
@@ -104,7 +104,7 @@ def test_a_line_through_vertices():
 def test_a_plane_through_corners_makes_no_slivers():
     """Through two edges of a cube: two prisms."""
     scene = Scene(3)
-    scene.add(box(1.0, 1.0, 1.0), density=1.0)
+    scene.add(make_box(1.0, 1.0, 1.0), density=1.0)
     _, motion = make_world(scene)
     for offset in (0.0, 1e-9, -1e-8, 1e-7):
         broken = split_body(scene, motion, 0, (offset, 0, 0), (1.0, 1.0, 0.0))
@@ -143,7 +143,7 @@ def test_a_stone_can_be_cut_again_and_again():
 )
 def test_what_can_not_be_split(dim, point, direction, words):
     scene = Scene(dim)
-    scene.add(SQUARE if dim == 2 else box(1, 1, 1), density=1.0, name="a")
+    scene.add(SQUARE if dim == 2 else make_box(1, 1, 1), density=1.0, name="a")
     _, motion = make_world(scene)
     with pytest.raises(ShapeError, match=f"^a: .*{words}"):
         split_body(scene, motion, 0, point, direction)
@@ -191,7 +191,7 @@ def test_a_plane_that_leaves_no_sound_parts_is_refused():
     with pytest.raises(ShapeError, match=r"kept apart\n.*move the plane"):
         split_body(scene, motion, 0, (1 - 2e-6) * flat.vertices[1], flat.vertices[1])
     made = split_body(scene, motion, 0, 0.99 * flat.vertices[1], flat.vertices[1])
-    shapes_3d([each.shape for each in made.bodies], np.ones(2, dtype=bool))
+    pack_shapes_3d([each.shape for each in made.bodies], np.ones(2, dtype=bool))
 
 
 def test_bodies_that_can_not_break():

@@ -17,12 +17,12 @@ from rigid_lcp.errors import ProblemError
 from rigid_lcp.friction.attempts.frictionless import (
     build_face_solver,
     build_normal_matrix,
-    frictionless,
+    solve_frictionless,
 )
-from rigid_lcp.friction.problem.definition import BodySpace, FrictionSolution, friction_problem
-from rigid_lcp.friction.sweeps.normal_matrices import normal_sweeps
+from rigid_lcp.friction.problem.definition import BodySpace, FrictionSolution, make_problem
+from rigid_lcp.friction.sweeps.normal_matrices import sweep_normals
 from tests.rigid_networks import network, network_bodies, stored, tower
-from validation.bench.rigid.packings import packing
+from validation.bench.rigid.packings import build_packing
 
 
 def enumerated(a: Floats, b: Floats) -> Floats:
@@ -41,7 +41,7 @@ def enumerated(a: Floats, b: Floats) -> Floats:
 def normals_alone(a: Floats, b: Floats) -> tuple[FrictionSolution, Floats, Floats]:
     """Eq. 19 with tangents on which nothing acts: the solution, its f and its a."""
     wide, offset = np.kron(a, np.diag([1.0, 0.0])), np.kron(b, [1.0, 0.0])
-    found = frictionless(friction_problem(wide, offset, 0.0, 2))
+    found = solve_frictionless(make_problem(wide, offset, 0.0, 2))
     return found, found.r[::2], found.u[::2]
 
 
@@ -62,7 +62,7 @@ def test_against_enumeration(contacts: int, rank: int, seed: int) -> None:
 def test_networks(grains: int) -> None:
     """Hyperstatic networks of up to 1,300 contacts, to 1e-12, in a few factorisations."""
     problem = network(grains, 0.0)
-    found = frictionless(problem)
+    found = solve_frictionless(problem)
     assert found.solved, found.message
     assert found.work["exchanges"] <= 15
     assert (found.r[1::2] == 0).all()
@@ -84,7 +84,7 @@ def test_as_good_as_osqp(grains: int) -> None:
     )  # fmt: skip
     force = np.zeros(2 * n)
     force[::2] = np.maximum(peer.solve(raise_error=False).x, 0.0) * size / unit
-    found = frictionless(problem)
+    found = solve_frictionless(problem)
     assert found.residual <= max(problem.residual(force), 1e-14)
     assert found.u[::2] == pytest.approx(problem.velocity(force)[::2], abs=1e-6 * size)
 
@@ -92,7 +92,7 @@ def test_as_good_as_osqp(grains: int) -> None:
 @pytest.mark.parametrize("top", [1.0, 1e4])
 def test_towers(top: float) -> None:
     """Two contacts a face share what is above by any part; the sum is the weight."""
-    found = frictionless(tower(10, 0.0, top))
+    found = solve_frictionless(tower(10, 0.0, top))
     assert found.solved
     weight = 9.81e-3 * (top + np.arange(9, -1, -1.0))
     assert found.r[::2].reshape(10, 2).sum(axis=1) == pytest.approx(weight, rel=1e-9)
@@ -123,10 +123,10 @@ def test_inconsistent_is_said() -> None:
 
 def test_exchanges_do_not_go_round() -> None:
     """A bed on which exchanges alone came back to the same sides: 36 of them, with sweeps three."""
-    made = packing(90, 2, seed=11)
+    made = build_packing(90, 2, seed=11)
     assert made.bodies is not None
-    problem = friction_problem(made.bodies, made.offset, 0.0, 2)
-    found = frictionless(problem)
+    problem = make_problem(made.bodies, made.offset, 0.0, 2)
+    found = solve_frictionless(problem)
     assert found.solved
     assert found.work["exchanges"] <= 6
 
@@ -134,8 +134,8 @@ def test_exchanges_do_not_go_round() -> None:
 def test_a_start_is_used() -> None:
     """From the solution the sides are right at once."""
     problem = network(200, 0.0)
-    first = frictionless(problem)
-    again = frictionless(problem, first.r)
+    first = solve_frictionless(problem)
+    again = solve_frictionless(problem, first.r)
     assert again.solved
     assert again.work["exchanges"] <= first.work["exchanges"]
 
@@ -145,7 +145,7 @@ def test_three_dimensions() -> None:
     corners = np.array([[x, y] for x in (-1.0, 1.0) for y in (-1.0, 1.0)])
     h = np.zeros((12, 3))  # vertical, and two tilts, of inertia 1/2
     h[::3] = np.column_stack([np.ones(4), np.sqrt(2) * corners])
-    found = frictionless(friction_problem(h @ h.T, h @ [-1.0, 0.0, 0.0], 0.0, 3))
+    found = solve_frictionless(make_problem(h @ h.T, h @ [-1.0, 0.0, 0.0], 0.0, 3))
     assert found.solved
     assert found.r[::3].sum() == pytest.approx(1.0, rel=1e-12)
 
@@ -156,7 +156,7 @@ def test_sweeps_against_numpy(grains: int, sweeps: int) -> None:
     problem = network(grains, 0.0)
     a, b = problem.delassus[::2][:, ::2].tocsr(), problem.offset[::2]
     f, dense = np.zeros(len(b)), a.toarray()
-    assert normal_sweeps(a.indptr, a.indices, a.data, b, f, sweeps, sweeps, -1) == sweeps
+    assert sweep_normals(a.indptr, a.indices, a.data, b, f, sweeps, sweeps, -1) == sweeps
     weight = dense.diagonal()
     x, last, time, least = np.zeros(len(b)), np.zeros(len(b)), 1.0, np.inf
     for _ in range(sweeps):
@@ -175,7 +175,7 @@ def test_sweeps_end_when_sides_settle() -> None:
     """Contacts apart from each other are solved by one sweep: two rounds show it."""
     a = sp.eye_array(4, format="csr")
     f = np.zeros(4)
-    done = normal_sweeps(a.indptr, a.indices, a.data, np.array([1.0, -1, -2, 3]), f, 100, 5, 0)
+    done = sweep_normals(a.indptr, a.indices, a.data, np.array([1.0, -1, -2, 3]), f, 100, 5, 0)
     assert done == 10
     assert f == pytest.approx([0, 1, 2, 0])
 
@@ -188,7 +188,7 @@ def test_normal_part_of_w() -> None:
         offset = space.jacobian @ velocity
         expected = space.matrix.toarray()[::2, ::2]
         for w in (space, space.matrix):
-            found = build_normal_matrix(friction_problem(w, offset, 0.0, 2))
+            found = build_normal_matrix(make_problem(w, offset, 0.0, 2))
             assert found.toarray() == pytest.approx(expected, rel=1e-12, abs=1e-12)
 
 
@@ -196,7 +196,7 @@ def test_normal_part_of_w() -> None:
 @pytest.mark.parametrize("skew", [0.0, 1e-3])
 def test_faces(most: float, skew: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """``A + shift`` of some contacts in any order, by a band and by sparse LU, against numpy."""
-    module = sys.modules[frictionless.__module__]
+    module = sys.modules[solve_frictionless.__module__]
     monkeypatch.setattr(module, "NUMBERS", replace(module.NUMBERS, band_most=most))
     g = np.random.default_rng(5)
     a = network(40, 0.0).delassus[::2][:, ::2].tocsr()
@@ -211,8 +211,8 @@ def test_faces(most: float, skew: float, monkeypatch: pytest.MonkeyPatch) -> Non
 def test_what_can_not_be_posed_is_refused() -> None:
     """Friction; no contacts are none to refuse."""
     with pytest.raises(ProblemError, match="friction"):
-        frictionless(network(10, 0.3))
-    assert frictionless(friction_problem(np.zeros((0, 0)), [], 0.0, 2)).solved
+        solve_frictionless(network(10, 0.3))
+    assert solve_frictionless(make_problem(np.zeros((0, 0)), [], 0.0, 2)).solved
 
 
 @pytest.mark.parametrize(
@@ -220,5 +220,5 @@ def test_what_can_not_be_posed_is_refused() -> None:
 )
 def test_real_problems(name: str) -> None:
     """Stored problems with their friction taken away, to 1e-12."""
-    found = frictionless(stored(name, 0.0))
+    found = solve_frictionless(stored(name, 0.0))
     assert found.solved, found.message

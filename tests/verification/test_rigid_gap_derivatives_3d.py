@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from rigid_lcp import HalfSpace, Sphere
 from rigid_lcp.arrays import Floats
-from rigid_lcp.contact import detect_3d, shapes_3d
-from rigid_lcp.contact.arrays import Contacts, contact_frames
-from rigid_lcp.motion.equations import inertial_acceleration, relative_velocity
+from rigid_lcp.contact import detect_3d, pack_shapes_3d
+from rigid_lcp.contact.arrays import Contacts, build_frames
+from rigid_lcp.motion.equations import find_inertial_acceleration, find_relative_velocity
 from rigid_lcp.motion.state import Motion, displace_motion
-from rigid_lcp.shapes.rotations import quaternion_of_rotation, quaternion_product, rotate
+from rigid_lcp.shapes.rotations import make_quaternion, multiply_quaternions, rotate
 from tests.rigid_solids import CUBE, UPRIGHT, contacts, near_pair
 
 
@@ -29,7 +29,7 @@ def test_gap_rate_is_the_derivative_of_the_gap(seed: int) -> None:
     turns = np.vstack([quaternion, UPRIGHT, UPRIGHT])
     rates = np.vstack([generator.normal(size=(3, 6)), np.zeros(6)])
     motion = Motion(place, turns, rates[:, :3], rates[:, 3:])
-    arrays = shapes_3d(shapes, np.array([True, True, True, False]))
+    arrays = pack_shapes_3d(shapes, np.array([True, True, True, False]))
     h = 1e-7
 
     def gaps(t: float) -> dict[int, float]:
@@ -39,7 +39,7 @@ def test_gap_rate_is_the_derivative_of_the_gap(seed: int) -> None:
 
     found = detect_3d(arrays, place, turns, 0.05)
     assert len(found) > 0
-    speed = relative_velocity(found, motion)[:, 0]
+    speed = find_relative_velocity(found, motion)[:, 0]
     ahead, behind = gaps(h), gaps(-h)
     checked = 0
     for key, rate in zip(found.key.tolist(), speed, strict=True):
@@ -69,7 +69,7 @@ def test_inertial_terms_are_the_second_derivative_of_the_gap(seed: int) -> None:
     turns = np.vstack([quaternion, np.tile(UPRIGHT, (3, 1))])
     rates = np.vstack([generator.normal(size=(4, 6)), np.zeros(6)])
     motion = Motion(place, turns, rates[:, :3], rates[:, 3:])
-    arrays = shapes_3d(shapes, np.array([True, True, True, True, False]))
+    arrays = pack_shapes_3d(shapes, np.array([True, True, True, True, False]))
     h = 1e-4
 
     def gaps(t: float) -> dict[int, float]:
@@ -78,7 +78,7 @@ def test_inertial_terms_are_the_second_derivative_of_the_gap(seed: int) -> None:
         return dict(zip(found.key.tolist(), found.gap.tolist(), strict=True))
 
     found = detect_3d(arrays, place, turns, 0.05)
-    exact = inertial_acceleration(found, motion)[:, 0]
+    exact = find_inertial_acceleration(found, motion)[:, 0]
     moved = [gaps(t) for t in (-h, -h / 2, h / 2, h)]
     checked = 0
     for k, key in enumerate(found.key.tolist()):
@@ -104,11 +104,11 @@ def test_inertial_terms_at_edges(seed: int, form: str) -> None:
     with v^2 / R.
     """
     generator = np.random.default_rng(seed)
-    lower = quaternion_of_rotation([np.pi / 4, 0.0, 0.0])
+    lower = make_quaternion([np.pi / 4, 0.0, 0.0])
     if form == "crossing":
         shapes: list[object] = [CUBE, CUBE]
-        upper = quaternion_product(
-            quaternion_of_rotation([0.0, 0.0, generator.uniform(0.5, 2.5)])[None], lower[None]
+        upper = multiply_quaternions(
+            make_quaternion([0.0, 0.0, generator.uniform(0.5, 2.5)])[None], lower[None]
         )[0]
         place = np.array([[0.0, 0, 0], [*generator.uniform(-0.2, 0.2, 2), 2**0.5 + 1e-3]])
     else:
@@ -126,13 +126,13 @@ def test_inertial_terms_at_edges(seed: int, form: str) -> None:
         there = displace_motion(motion, t * rates)
         gaps.append(contacts(shapes, there.position, there.angle, margin=0.1).gap[0])
     second = (gaps[0] - 2 * gaps[1] + gaps[2]) / h**2
-    exact = inertial_acceleration(found, motion)[0, 0]
+    exact = find_inertial_acceleration(found, motion)[0, 0]
     assert second == pytest.approx(exact, abs=1e-5, rel=1e-5)
-    rate = relative_velocity(found, motion)[0, 0]
+    rate = find_relative_velocity(found, motion)[0, 0]
     assert (gaps[2] - gaps[0]) / (2 * h) == pytest.approx(rate, abs=1e-5)
 
 
-ON_EDGE = quaternion_of_rotation([np.pi / 4, 0.0, 0.0])
+ON_EDGE = make_quaternion([np.pi / 4, 0.0, 0.0])
 TOUCHING = {  # shapes of a and b, how they are turned, where a is; b is at the origin
     "ball on face": (Sphere(0.4), CUBE, UPRIGHT, UPRIGHT, [0.1, -0.2, 0.9]),
     "ball on ball": (Sphere(0.4), Sphere(0.7), UPRIGHT, UPRIGHT, [0.3, -0.4, 1.0]),
@@ -140,10 +140,10 @@ TOUCHING = {  # shapes of a and b, how they are turned, where a is; b is at the 
     "ball on corner": (Sphere(0.4), CUBE, UPRIGHT, UPRIGHT, [0.7, 0.8, 0.75]),
     "ball on plane": (Sphere(0.4), HalfSpace([0.1, 0.2, 1.0]), UPRIGHT, UPRIGHT, [0.0, 0, 0.42]),
     "corner on face": (
-        CUBE, CUBE, quaternion_of_rotation([0.7, 0.4, 0.0]), UPRIGHT, [0.1, -0.2, 1.32],
+        CUBE, CUBE, make_quaternion([0.7, 0.4, 0.0]), UPRIGHT, [0.1, -0.2, 1.32],
     ),
     "edge on edge": (
-        CUBE, CUBE, quaternion_product(quaternion_of_rotation([0, 0, 1.1])[None], ON_EDGE[None])[0],
+        CUBE, CUBE, multiply_quaternions(make_quaternion([0, 0, 1.1])[None], ON_EDGE[None])[0],
         ON_EDGE, [0.1, -0.2, 2**0.5],
     ),
 }  # fmt: skip
@@ -172,14 +172,14 @@ def test_tangential_inertial_terms(form: str, seed: int) -> None:
         there = displace_motion(Motion(place, turns, rates[:, :3], rates[:, 3:]), t * rates)
         found = contacts(shapes, there.position, there.angle, margin=1.0)
         found = found[found.key == key]
-        along = relative_velocity(found, there)
-        return found, np.einsum("ci,cij->j", along, contact_frames(found.normal))
+        along = find_relative_velocity(found, there)
+        return found, np.einsum("ci,cij->j", along, build_frames(found.normal))
 
     rates[0, :3] += (2 * side - 1) * velocity(0.0)[1]  # no slip
     touch, slip = velocity(0.0)
     np.testing.assert_allclose(slip, 0, atol=1e-14)
     h = 1e-5
     change = (velocity(h)[1] - velocity(-h)[1]) / (2 * h)
-    exact = inertial_acceleration(touch, Motion(place, turns, rates[:, :3], rates[:, 3:]))[0]
+    exact = find_inertial_acceleration(touch, Motion(place, turns, rates[:, :3], rates[:, 3:]))[0]
     # truncation h^2 / 6 times third derivatives of up to 1e3; round-off 1e-16 / h
-    np.testing.assert_allclose(exact[1:], contact_frames(touch.normal)[0, 1:] @ change, atol=1e-6)
+    np.testing.assert_allclose(exact[1:], build_frames(touch.normal)[0, 1:] @ change, atol=1e-6)

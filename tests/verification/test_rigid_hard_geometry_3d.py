@@ -7,15 +7,15 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from rigid_lcp import Polyhedron, box
+from rigid_lcp import Polyhedron, make_box
 from rigid_lcp.contact.manifold import MOST_KEPT
 from rigid_lcp.contact.separation import PARALLEL_EDGES
 from rigid_lcp.shapes.rotations import (
     Floats,
-    quaternion_of_rotation,
-    quaternion_product,
+    make_quaternion,
+    multiply_quaternions,
+    normalise_quaternion,
     rotate,
-    unit_quaternion,
 )
 from tests.rigid_solids import CUBE, FLOOR, UPRIGHT, ballast_stone, coal_distance, contacts
 
@@ -60,7 +60,10 @@ def family(name: str, generator: np.random.Generator) -> list[Polyhedron]:
     return {
         "stones": lambda: [stone(), stone(0.7)],
         "tetrahedra": lambda: [tetrahedron(), tetrahedron()],
-        "boxes": lambda: [box(*generator.uniform(0.2, 1, 3)), box(*generator.uniform(0.2, 1, 3))],
+        "boxes": lambda: [
+            make_box(*generator.uniform(0.2, 1, 3)),
+            make_box(*generator.uniform(0.2, 1, 3)),
+        ],
         "sliver": lambda: [sliver, stone(0.6)],
         "needle": lambda: [stone(1.0, (1, 1e-3, 1e-3)), stone(0.5)],
         "needles": lambda: [stone(1.0, (1, 1e-3, 1e-3)), stone(1.0, (1, 1e-3, 1e-3))],
@@ -81,7 +84,7 @@ def touching(name: str, seed: int, share: float) -> Pair:
     turns, axes."""
     generator = np.random.default_rng(seed)
     shapes = family(name, generator)
-    turns = unit_quaternion(generator.normal(size=(2, 4)))
+    turns = normalise_quaternion(generator.normal(size=(2, 4)))
     axes = separating_axes(shapes, turns)
     direction = generator.normal(size=3)
     direction /= np.linalg.norm(direction)
@@ -145,7 +148,7 @@ def on_corner(shape: Polyhedron, way: Floats) -> tuple[Floats, Floats]:
     high = float(np.linalg.norm(corner))
     axis = np.cross(corner / high, [0.0, 0.0, 1.0])
     sine = np.linalg.norm(axis)
-    return quaternion_of_rotation(axis / sine * np.arctan2(sine, corner[2] / high)), high
+    return make_quaternion(axis / sine * np.arctan2(sine, corner[2] / high)), high
 
 
 @pytest.mark.parametrize("overlap", [1e-9, 1e-6, 1e-3])
@@ -155,7 +158,7 @@ def test_corner_on_corner(overlap: float, offset: float) -> None:
     up = np.array([1.0, 1.0, 1.0])
     turn, high = on_corner(CUBE, up)
     below, low = on_corner(CUBE, -up)
-    upside = quaternion_product(quaternion_of_rotation([np.pi, 0.0, 0.0]), below)
+    upside = multiply_quaternions(make_quaternion([np.pi, 0.0, 0.0]), below)
     assert high == low
     apart = contacts([CUBE, CUBE], [[0, 0, 0], [offset, 0, 2 * high + 1e-6]], [turn, upside])
     assert apart.gap == pytest.approx([np.hypot(offset, 1e-6)], abs=1e-14)
@@ -185,9 +188,9 @@ def test_a_shared_face_gives_its_own_corners(corners: int) -> None:
 
 def test_needles_touch_where_they_cross() -> None:
     """Bars a thousand times longer than thick, at any angle to each other."""
-    needle = box(1.0, 1e-3, 1e-3)
+    needle = make_box(1.0, 1e-3, 1e-3)
     for angle in (1e-3, 0.1, 1.0, np.pi / 2):
-        turned = quaternion_of_rotation([0.0, 0.0, angle])
+        turned = make_quaternion([0.0, 0.0, angle])
         found = contacts([needle, needle], [[0, 0, 0], [0, 0, 1e-3]], [UPRIGHT, turned], 1e-6)
         assert 2 <= len(found) <= 4
         assert np.allclose(found.gap, 0.0, atol=1e-16)
@@ -202,7 +205,7 @@ def test_needles_touch_where_they_cross() -> None:
 def test_coincident_edges(overlap: float) -> None:
     """Cubes edge upon edge: contacts at the ends of the edge, with finite normals; once they
     overlap, at the corners of the sliver that their faces share."""
-    tilted = quaternion_of_rotation([np.pi / 4, 0, 0])
+    tilted = make_quaternion([np.pi / 4, 0, 0])
     found = contacts([CUBE, CUBE], [[0, 0, 0], [0, 0, 2**0.5 - overlap]], [tilted, tilted])
     assert len(found) == (4 if overlap else 2)
     assert np.allclose(np.abs(found.point[:, 0]), 0.5)
@@ -226,10 +229,10 @@ def test_many_sided_grains_keep_the_outer_contacts_and_the_deepest() -> None:
     angle = 2 * np.pi * np.arange(30) / 30
     ring = np.column_stack([np.cos(angle), np.sin(angle)])
     drum = Polyhedron(np.vstack([np.column_stack([ring, np.full(30, z)]) for z in (-0.5, 0.5)]))
-    tilt = quaternion_of_rotation([1e-3, 0.0, 0.0])
+    tilt = make_quaternion([1e-3, 0.0, 0.0])
     for shapes, places in (
         ([drum, FLOOR], [[0, 0, 0.5], [0, 0, 0]]),
-        ([drum, box(4.0, 4.0, 1.0)], [[0, 0, 0.5], [0, 0, -0.5]]),
+        ([drum, make_box(4.0, 4.0, 1.0)], [[0, 0, 0.5], [0, 0, -0.5]]),
     ):
         found = contacts(shapes, places, [tilt, UPRIGHT], margin=0.1)
         assert len(found) == MOST_KEPT

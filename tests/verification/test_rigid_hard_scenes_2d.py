@@ -10,31 +10,31 @@ import pytest
 from rigid_lcp import Disc, HalfSpace, Polygon, Scene, Simulation
 from tests.rigid_motions import stack_drop
 from validation.bench.rigid.hard_scenes import (
-    card_storeys,
-    card_storeys_friction,
-    jittered_grid,
-    kicked_tower,
-    turned,
+    find_storeys_friction,
+    jitter_grid,
+    kick_tower,
+    stack_cards,
+    turn_scene,
 )
 from validation.bench.rigid.rest_limit import (
     BALANCED,
-    arch_limit,
-    arch_unbalance,
-    least_that_rests,
-    unbalance,
+    balance_arch,
+    bisect_rest,
+    find_arch_limit,
+    find_unbalance,
 )
 from validation.bench.rigid.scenes import (
     DENSITY,
     G,
-    arch,
-    block_on_incline,
-    block_on_incline_way,
-    card_house,
-    card_house_friction,
-    light_on_heavy,
+    build_arch,
+    build_wedge,
+    find_card_friction,
+    find_slide_distance,
+    find_wedge_acceleration,
+    incline_block,
+    lean_cards,
     stack,
-    wedge,
-    wedge_acceleration,
+    stack_unequal,
 )
 
 SLOPE = radians(20)
@@ -47,9 +47,9 @@ MILANKOVITCH = 0.10748
 def test_block_at_its_threshold(share: float) -> None:
     """It slides iff ``mu < tan(slope)``: ``g (sin - mu cos) t^2 / 2``, 1.7e-9 t^2 m at 1 - 1e-9."""
     mu, seconds = tan(SLOPE) * share, 0.2
-    run = block_on_incline(SLOPE, mu, step=2e-3)
+    run = incline_block(SLOPE, mu, step=2e-3)
     run.advance(seconds)
-    way = block_on_incline_way(SLOPE, mu, seconds)
+    way = find_slide_distance(SLOPE, mu, seconds)
     # A residual of 1e-12 is an acceleration of 1e-11 m/s^2.
     assert run.positions[0, 0] == pytest.approx(way, rel=1e-9, abs=1e-12)
     assert abs(run.angles[0]) < 1e-12
@@ -58,7 +58,7 @@ def test_block_at_its_threshold(share: float) -> None:
 @pytest.mark.long
 def test_block_does_not_creep() -> None:
     """At rest on 20 degrees with mu = 1: 1e-12 m in 1e5 steps is 1e-17 m a step; 2,000 of them."""
-    run = block_on_incline(SLOPE, 1.0)
+    run = incline_block(SLOPE, 1.0)
     assert stack_drop(run, 2.0) < 2e-14
 
 
@@ -76,7 +76,7 @@ def test_stack(top: float) -> None:
 
 @pytest.mark.long
 def test_light_on_heavy_on_light() -> None:
-    assert stack_drop(light_on_heavy(1e6), 2.0) < 1e-9
+    assert stack_drop(stack_unequal(1e6), 2.0) < 1e-9
 
 
 def test_tower_of_200_boxes() -> None:
@@ -87,11 +87,11 @@ def test_tower_of_200_boxes() -> None:
 @pytest.mark.parametrize("phi", [0.2, 0.5])
 def test_card_house(phi: float) -> None:
     """It stands iff ``mu >= tan(phi)/2``."""
-    limit = card_house_friction(phi)
-    assert stack_drop(card_house(phi, limit * (1 + 1e-6)), 0.05) < 1e-10
-    fallen = stack_drop(card_house(phi, limit * 0.98), 0.05)
+    limit = find_card_friction(phi)
+    assert stack_drop(lean_cards(phi, limit * (1 + 1e-6)), 0.05) < 1e-10
+    fallen = stack_drop(lean_cards(phi, limit * 0.98), 0.05)
     assert fallen > 1e-5
-    slow = stack_drop(card_house(phi, limit * (1 - 1e-6)), 0.05)
+    slow = stack_drop(lean_cards(phi, limit * (1 - 1e-6)), 0.05)
     assert 1e-10 < slow < 1e-8
 
 
@@ -115,7 +115,7 @@ def test_uneven_card_house_stays_at_rest_where_a_motion_solves_its_steps_as_well
     is missing, 1e-3, and so the way g 1e-3 t^2 / 2 = 4e-4 m; a thousandth of it is a fall.
     """
     run = uneven_house(0.75)
-    limit = least_that_rests(lambda mu: unbalance(run, mu) <= BALANCED, 0.7, 0.8, 1e-8)
+    limit = bisect_rest(lambda mu: find_unbalance(run, mu) <= BALANCED, 0.7, 0.8, 1e-8)
     assert limit == pytest.approx(0.749045, abs=1e-6)
     for above in (7e-5, 1e-3, 1e-2):
         house = uneven_house(limit * (1 + above))
@@ -129,8 +129,8 @@ def test_wedge(share: float) -> None:
     """It jams iff ``mu >= tan(half angle)``; else it is squeezed out as fast as on paper."""
     angle = radians(15)
     mu = tan(angle) * share
-    run = wedge(angle, mu, 1e4)
-    expected = wedge_acceleration(run, angle, mu, 1e4)
+    run = build_wedge(angle, mu, 1e4)
+    expected = find_wedge_acceleration(run, angle, mu, 1e4)
     assert (expected > 0) == (share < 1)
     run.advance(0.02)
     scale = 1e4 / run.world.mass[0]
@@ -139,58 +139,58 @@ def test_wedge(share: float) -> None:
 
 def test_arch() -> None:
     """A semicircular arch stands iff it is thicker than 0.1075 of its radius (Heyman)."""
-    assert stack_drop(arch(16, 0.115), 0.02) < 1e-9
-    assert stack_drop(arch(16, 0.10), 0.02) > 1e-6
+    assert stack_drop(build_arch(16, 0.115), 0.02) < 1e-9
+    assert stack_drop(build_arch(16, 0.10), 0.02) > 1e-6
 
 
 @pytest.mark.long
 def test_many_stones_reach_the_known_limit() -> None:
     """The difference is that of straight stones, of the order of the square of their angle."""
-    few, many = (abs(arch_limit(stones) - MILANKOVITCH) for stones in (21, 61))
+    few, many = (abs(find_arch_limit(stones) - MILANKOVITCH) for stones in (21, 61))
     assert many < 1.5e-4
     assert few / many == pytest.approx((61 / 21) ** 2, rel=0.3)
 
 
 def test_balance_turns_at_the_limit() -> None:
-    limit = arch_limit(9, tolerance=1e-6)
-    assert arch_unbalance(9, limit + 1e-5) <= BALANCED
-    assert arch_unbalance(9, limit - 1e-4) > 1e3 * BALANCED
+    limit = find_arch_limit(9, tolerance=1e-6)
+    assert balance_arch(9, limit + 1e-5) <= BALANCED
+    assert balance_arch(9, limit - 1e-4) > 1e3 * BALANCED
 
 
 def test_an_arch_without_friction_needs_help() -> None:
     """Its lowest stones would slide outwards on their joints: no thickness stands."""
-    assert arch_unbalance(9, 0.2, mu=0.0) > 1e3 * BALANCED
+    assert balance_arch(9, 0.2, mu=0.0) > 1e3 * BALANCED
 
 
 def test_forces_at_rest_exist_iff_the_block_holds() -> None:
     """The linear programme on a block on a slope: balance turns at ``mu = tan(slope)``."""
-    run = block_on_incline(SLOPE, 1.0)
-    limit = least_that_rests(lambda mu: unbalance(run, mu) <= BALANCED, 0.0, 2.0, 1e-9)
+    run = incline_block(SLOPE, 1.0)
+    limit = bisect_rest(lambda mu: find_unbalance(run, mu) <= BALANCED, 0.0, 2.0, 1e-9)
     assert limit == pytest.approx(tan(SLOPE), abs=2e-9)
 
 
 @pytest.mark.parametrize("off", [-1e-2, 1e-2])
 def test_card_house_of_storeys(off: float) -> None:
     """Two storeys fall where no forces at rest exist, and stand just above."""
-    limit = card_storeys_friction(2, radians(20))
-    move = stack_drop(card_storeys(2, radians(20), (1 + off) * limit), 0.05)
+    limit = find_storeys_friction(2, radians(20))
+    move = stack_drop(stack_cards(2, radians(20), (1 + off) * limit), 0.05)
     assert move > 1e-5 if off < 0 else move < 1e-10
 
 
 @pytest.mark.parametrize("angle", [radians(45), 2.0])
 def test_a_turned_scene_rests_as_well(angle: float) -> None:
     """Gravity, floor and boxes turned together: the frame is no part of the answer."""
-    assert stack_drop(turned(stack(5, 1e4), angle), 0.02) < 1e-10
+    assert stack_drop(turn_scene(stack(5, 1e4), angle), 0.02) < 1e-10
 
 
 def test_offsets_of_round_off_do_not_matter() -> None:
     """Edges that coincide but for 1e-12 m: the boxes settle within their gaps."""
-    assert stack_drop(jittered_grid(3, 3, 1e-12), 0.03) < 1e-11
+    assert stack_drop(jitter_grid(3, 3, 1e-12), 0.03) < 1e-11
 
 
 def test_a_kicked_tower_gains_nothing() -> None:
     """The lowest of 200 boxes is kicked: friction takes the energy, the others hardly move."""
-    run = kicked_tower(200, 1.0)
+    run = kick_tower(200, 1.0)
     energy, mass = run.energy, run.world.mass[0]
     run.advance(0.02)
     assert run.energy < energy
@@ -200,10 +200,10 @@ def test_a_kicked_tower_gains_nothing() -> None:
 
 def test_no_friction_no_grip() -> None:
     """mu = 0 on a slope: free sliding; a huge mu: none, and the box tips over its corner."""
-    run = block_on_incline(SLOPE, 0.0)
+    run = incline_block(SLOPE, 0.0)
     run.advance(0.05)
-    assert run.positions[0, 0] == pytest.approx(block_on_incline_way(SLOPE, 0.0, 0.05), rel=1e-9)
-    steep = block_on_incline(radians(50), 1e4)
+    assert run.positions[0, 0] == pytest.approx(find_slide_distance(SLOPE, 0.0, 0.05), rel=1e-9)
+    steep = incline_block(radians(50), 1e4)
     steep.advance(0.05)
     # J_A phi'' = m g (a/2) (sin - cos), J_A = 2/3 m a^2, to the first order in the angle
     tip = 0.75 * G * (np.sin(radians(50)) - np.cos(radians(50)))

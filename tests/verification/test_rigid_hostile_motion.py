@@ -13,8 +13,8 @@ from rigid_lcp import HalfSpace, Polygon, Scene, Simulation
 from rigid_lcp.errors import NotConverged
 from rigid_lcp.motion.acceleration_forces import find_forces, try_lasting_forces
 from tests.rigid_motions import rocking_block, rocking_block_answer
-from validation.bench.rigid.packings import tower
-from validation.bench.rigid.scenes import FLOOR, G, gravity_on
+from validation.bench.rigid.packings import build_tower
+from validation.bench.rigid.scenes import FLOOR, G, turn_gravity
 
 
 @pytest.mark.long
@@ -61,7 +61,7 @@ def test_a_box_clatters_to_rest(restitution: float) -> None:
 def test_sliding_reverses_or_ends(mu: float) -> None:
     """A block thrown uphill stops, and slides down again iff ``mu < tan(slope)``: parabolas."""
     slope, seconds = 0.3, 0.4
-    scene = Scene(2, gravity_on(slope))
+    scene = Scene(2, turn_gravity(slope))
     scene.add(Polygon.rectangle(1, 1), density=1.0, position=(0, 0.5), velocity=(-1, 0))
     scene.add(FLOOR, friction=mu)
     run = Simulation(scene, "acceleration", step=0.01)
@@ -119,7 +119,7 @@ def test_lasting_contacts_are_solved_at_once(boxes: int, speed: float, mu: float
     """A redundant tower, at rest or its lowest box sliding: every contact presses, none moves but
     along its slip, where friction is -mu r_N (eqs 26, 27).  None where one would have to pull, or
     to grip by more than its friction."""
-    problem = tower(boxes, 2)
+    problem = build_tower(boxes, 2)
     slip, friction, lifted = np.zeros((2 * boxes, 1)), problem.friction.copy(), problem.offset + 0
     slip[:2], friction[:2] = speed, mu
     found = try_lasting_forces(problem.bodies, problem.offset, friction, slip)

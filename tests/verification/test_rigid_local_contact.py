@@ -8,7 +8,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rigid_lcp.arrays import Floats
-from rigid_lcp.friction.problem.cones import natural_map
+from rigid_lcp.friction.problem.cones import find_natural_map
 from rigid_lcp.friction.sweeps.local_contact import (
     find_all_directions,
     find_direction_near,
@@ -21,7 +21,7 @@ def law_error(block: Floats, offset: Floats, friction: float, force: Floats) -> 
     """Norm of the natural map over the greatest force the data can make."""
     rho = len(offset) / max(np.trace(block), 1e-300)
     velocity = block @ force + offset
-    error = natural_map(force[None], velocity[None], np.array([friction]), rho)
+    error = find_natural_map(force[None], velocity[None], np.array([friction]), rho)
     scale = max(float(np.linalg.norm(force)), rho * float(np.linalg.norm(offset)))
     return float(np.linalg.norm(error)) / scale if scale else 0.0
 

@@ -13,8 +13,8 @@ import scipy.linalg
 
 from rigid_lcp.friction.linear.factorisation import BlockSystem, SingularSystem
 from rigid_lcp.sparse.dense_tiles import TERMS_AT_ONCE
-from rigid_lcp.sparse.elimination_order import ELIMINATION, minimum_degree, symmetric_pattern
-from rigid_lcp.sparse.elimination_tree import EliminationTree, elimination_tree
+from rigid_lcp.sparse.elimination_order import ELIMINATION, list_neighbours, order_by_degree
+from rigid_lcp.sparse.elimination_tree import EliminationTree, build_tree
 from rigid_lcp.sparse.multifrontal import factor_fronts, solve_fronts
 
 ROUND_OFF = np.finfo(float).eps
@@ -60,7 +60,7 @@ def test_fronts_wider_than_a_panel_and_split_ones():
     blocks, size = 80, 6
     rows, columns = (k.ravel() for k in np.indices((blocks, blocks)))
     values = dominant(g, blocks, size, rows, columns)
-    tree = elimination_tree(blocks, size, rows, columns)
+    tree = build_tree(blocks, size, rows, columns)
     widths = np.diff(tree.first) * size
     assert len(widths) > 1
     assert widths.max() > TERMS_AT_ONCE
@@ -85,7 +85,7 @@ def test_memory_of_any_content_is_filled_and_no_other_is_touched(seed):
     blocks, size, guard = int(g.integers(1, 90)), int(g.choice([1, 2, 3, 6])), 64
     rows, columns = random_pattern(g, blocks, int(g.integers(0, 400)))
     values = dominant(g, blocks, size, rows, columns)
-    tree = elimination_tree(blocks, size, rows, columns)
+    tree = build_tree(blocks, size, rows, columns)
     wanted = (tree.factor_start[-1], tree.rest_most, tree.stack_most)
     memory = [np.full(numbers + 2 * guard, 7.5) for numbers in wanted]
     factors, rest, stack = (each[guard:-guard] for each in memory)
@@ -128,7 +128,7 @@ def test_the_tree_holds_the_rows_that_elimination_fills(seed):
     g = np.random.default_rng(seed)
     blocks = 40
     rows, columns = random_pattern(g, blocks, 80)
-    tree = elimination_tree(blocks, 3, rows, columns)
+    tree = build_tree(blocks, 3, rows, columns)
     assert sorted(tree.order) == list(range(blocks))
     rank = np.argsort(tree.order)
     below: list[set[int]] = [set() for _ in range(blocks)]
@@ -150,7 +150,7 @@ def test_fill_grows_as_n_log_n_on_grids_and_not_faster(side):
     stay below it."""
     rows, columns = grid(side)
     count = side * side
-    numbers = elimination_tree(count, 3, rows, columns).factor_start[-1] / 9
+    numbers = build_tree(count, 3, rows, columns).factor_start[-1] / 9
     assert numbers < 2 * 31 / 4 * count * np.log2(count)
 
 
@@ -160,7 +160,7 @@ def test_the_order_does_not_eliminate_a_hub_first(arms):
     hub = np.zeros(arms, dtype=int)
     tips = np.arange(1, arms + 1)
     rows, columns = np.concatenate([hub, tips]), np.concatenate([tips, hub])
-    order = minimum_degree(*symmetric_pattern(arms + 1, rows, columns))
+    order = order_by_degree(*list_neighbours(arms + 1, rows, columns))
     assert 0 in order[-2:]
 
 

@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rigid_lcp as r
-from rigid_lcp.motion.overlap_removal import pay_lift, remove_overlap
+from rigid_lcp.motion.overlap_removal import remove_lift, remove_overlap
 from rigid_lcp.motion.state import Motion
 from rigid_lcp.motion.world import World, make_world
-from validation.bench.rigid.scenes import poured
+from validation.bench.rigid.scenes import fill_trough
 
 G = 9.81
 
@@ -58,8 +58,8 @@ def test_bodies_in_flight(depth: float, speed: float) -> None:
 def test_spinning_boxes_in_space_keep_their_energy() -> None:
     """A box that is turned out of another spins on about the same axes of its own."""
     scene = r.Scene(3, (0, 0, 0))
-    scene.add(r.box(1, 0.5, 0.2), density=2.0, spin=(1, 2, 3))
-    scene.add(r.box(1, 0.5, 0.2), density=1.0, position=(0.9, 0.1, 0.19), spin=(-3, 1, 2))
+    scene.add(r.make_box(1, 0.5, 0.2), density=2.0, spin=(1, 2, 3))
+    scene.add(r.make_box(1, 0.5, 0.2), density=1.0, position=(0.9, 0.1, 0.19), spin=(-3, 1, 2))
     world, motion = make_world(scene)
     apart = remove_overlap(world, motion)
     assert np.abs(apart.angle - motion.angle).max() > 1e-4
@@ -94,7 +94,7 @@ def test_the_lift_is_paid(dim: int, speed: float) -> None:
     """
     depth = 1e-4
     scene = r.Scene(dim)
-    shape = r.Polygon.rectangle(1, 1) if dim == 2 else r.box(1, 1, 1)
+    shape = r.Polygon.rectangle(1, 1) if dim == 2 else r.make_box(1, 1, 1)
     place, along = np.zeros(dim), np.zeros(dim)
     place[-1], along[0] = 0.5 - depth, speed
     scene.add(shape, density=2.0, position=place, velocity=along)
@@ -103,20 +103,20 @@ def test_the_lift_is_paid(dim: int, speed: float) -> None:
     parted = remove_overlap(world, end)
     assert parted.position[0, -1] == pytest.approx(0.5, abs=1e-12)
     energy = world.energy(end)
-    paid = pay_lift(world, end, parted, energy)
+    paid = remove_lift(world, end, parted, energy)
     squared = max(0.0, speed**2 - 2 * G * depth)
     assert paid.velocity[0, 0] == pytest.approx(squared**0.5, rel=1e-9, abs=1e-15)
     if squared > 0:
         assert world.energy(paid) == pytest.approx(energy, rel=1e-14)
     else:
         assert world.energy(paid) - energy <= world.mass[0] * G * depth * (1 + 1e-9)
-    lossy = pay_lift(world, end, parted, energy + 1.1 * world.mass[0] * G * depth)
+    lossy = remove_lift(world, end, parted, energy + 1.1 * world.mass[0] * G * depth)
     assert lossy is parted
     floor = scene.bodies[1]
     scene.bodies[1] = replace(floor, velocity=0.1 * np.eye(dim)[0])
     moving, _ = make_world(scene)
     moved = replace(parted, velocity=np.array([along, 0.1 * np.eye(dim)[0]]))
-    assert pay_lift(moving, moved, moved, energy - 1.0) is moved
+    assert remove_lift(moving, moved, moved, energy - 1.0) is moved
 
 
 @pytest.mark.parametrize(("seed", "step"), [(1, 1e-3), (5, 4e-3), (6, 8e-3)])
@@ -124,7 +124,7 @@ def test_the_lift_is_paid(dim: int, speed: float) -> None:
 def test_no_step_of_a_pour_gains_energy(seed: int, step: float) -> None:
     """Round-off of the sums alone, 1e-13 of the energy (seed 1 gained 8e-6 J of 117 J in a step
     before lifts were paid)."""
-    run = poured(40, seed=seed, step=step)
+    run = fill_trough(40, seed=seed, step=step)
     before = first = run.energy
     while run.time < 0.3:
         run.advance(step)

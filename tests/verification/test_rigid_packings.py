@@ -9,46 +9,46 @@ import numpy as np
 import pytest
 
 from rigid_lcp.friction.auto.solve import solve_auto
-from rigid_lcp.friction.methods.gauss_seidel import gauss_seidel
+from rigid_lcp.friction.methods.gauss_seidel import solve_gauss_seidel
 from validation.bench.rigid.packings import (
     DENSITY,
     GRAVITY,
     TOUCH,
     Bed,
-    bed,
-    bed_gaps,
-    bed_pairs,
-    bed_problem,
-    bed_start,
-    crystal,
-    free_fall,
-    tower,
+    build_crystal,
+    build_tower,
+    fall_freely,
+    find_gaps,
+    find_start,
+    pose_bed,
+    pour_bed,
+    update_pairs,
 )
 
 
 @pytest.fixture(scope="module", params=[2, 3])
 def made(request: pytest.FixtureRequest) -> Bed:
-    return bed(60, request.param, settle=60)
+    return pour_bed(60, request.param, settle=60)
 
 
 def test_gap_rate_is_the_derivative_of_the_gap(made: Bed) -> None:
     """u_N = J v is dg/dt (eq. 9): central difference of the gaps, error of second order."""
     generator = np.random.default_rng(0)
     axes = [0, 2] if made.dim == 2 else [0, 1, 2]
-    problem = bed_problem(made, 1e-3, gaps=True)
+    problem = pose_bed(made, 1e-3, gaps=True)
     assert problem.bodies is not None
     size = problem.bodies.body_size
     velocity = generator.normal(size=(len(made.radius), size))
     move = np.zeros_like(made.centre)
     move[:, axes] = 1e-6 * velocity[:, : made.dim]
-    ahead, behind = (bed_gaps(replace(made, centre=made.centre + s * move)) for s in (1, -1))
+    ahead, behind = (find_gaps(replace(made, centre=made.centre + s * move)) for s in (1, -1))
     rate = problem.bodies.jacobian @ velocity.ravel()
     np.testing.assert_allclose(rate[:: made.dim], (ahead - behind) / 2e-6, atol=1e-7)
 
 
 def test_a_bed_that_turns_as_one_does_not_slide(made: Bed) -> None:
     """A rigid motion of all grains, v = v_0 + w x r, has no relative velocity between grains."""
-    problem = bed_problem(made, 1e-3, gaps=True)
+    problem = pose_bed(made, 1e-3, gaps=True)
     assert problem.bodies is not None
     between = np.repeat(made.pairs[:, 1] >= 0, made.dim)
     if made.dim == 2:  # phi turns x to z
@@ -59,22 +59,24 @@ def test_a_bed_that_turns_as_one_does_not_slide(made: Bed) -> None:
         turn = np.cross(spin, made.centre)
         velocity = np.column_stack([turn, np.tile(spin, (len(turn), 1))])
     relative = (problem.bodies.jacobian @ velocity.ravel())[between]
-    gaps = np.repeat(np.abs(bed_gaps(made)), made.dim)[between]  # contact points a gap apart
+    gaps = np.repeat(np.abs(find_gaps(made)), made.dim)[between]  # contact points a gap apart
     assert (np.abs(relative) <= gaps + 1e-12).all()
 
 
 def test_settled_to_an_equilibrium(made: Bed) -> None:
     """Closed gaps, contacts as many as friction needs, the floor bears the weight, few move."""
-    apart = bed_gaps(made)
+    apart = find_gaps(made)
     closed = apart < TOUCH * made.radius.mean()
     assert apart.min() > -0.02 * made.radius.mean()
     assert 0.5 * (made.dim + 1) - 0.3 < closed.sum() / len(made.radius) < made.dim + 0.3
-    problem = bed_problem(made, 1e-3)
-    found = gauss_seidel(problem, tolerance=1e-9, sweeps=5000)
+    problem = pose_bed(made, 1e-3)
+    found = solve_gauss_seidel(problem, tolerance=1e-9, sweeps=5000)
     assert found.solved
     space = problem.bodies
     assert space is not None
-    velocity = free_fall(space, 1e-3, made.dim) + space.inverse_mass @ (space.jacobian.T @ found.r)
+    velocity = fall_freely(space, 1e-3, made.dim) + space.inverse_mass @ (
+        space.jacobian.T @ found.r
+    )
     speed = np.abs(velocity.reshape(-1, space.body_size)[:, : made.dim]).max(axis=1)
     assert np.mean(speed > 0.05 * GRAVITY * 1e-3) < 0.15
     pairs = made.pairs[closed]
@@ -90,8 +92,8 @@ def test_settled_to_an_equilibrium(made: Bed) -> None:
 
 def test_warm_start_has_the_impulses_of_the_step_before(made: Bed) -> None:
     """World impulses in new frames: the norm of each is kept, and the pairs keep theirs."""
-    again = bed_pairs(made, 1e-4)
-    start = bed_start(again, 1e-3).reshape(-1, made.dim)
+    again = update_pairs(made, 1e-4)
+    start = find_start(again, 1e-3).reshape(-1, made.dim)
     np.testing.assert_allclose(
         np.linalg.norm(start, axis=1), np.linalg.norm(again.impulse, axis=1) * 1e-3, atol=1e-15
     )
@@ -101,19 +103,19 @@ def test_warm_start_has_the_impulses_of_the_step_before(made: Bed) -> None:
 
 
 def test_reproduced_and_kept_in_a_folder(tmp_path: Path) -> None:
-    first = bed(20, 2, settle=10, folder=tmp_path)
-    read, again = bed(20, 2, settle=10, folder=tmp_path), bed(20, 2, settle=10)
+    first = pour_bed(20, 2, settle=10, folder=tmp_path)
+    read, again = pour_bed(20, 2, settle=10, folder=tmp_path), pour_bed(20, 2, settle=10)
     for other in (read, again):
         np.testing.assert_array_equal(first.centre, other.centre)
         np.testing.assert_array_equal(first.pairs, other.pairs)
         assert (first.width, first.dim) == (other.width, other.dim)
-    assert not np.array_equal(first.radius, bed(20, 2, seed=1, settle=1).radius)
+    assert not np.array_equal(first.radius, pour_bed(20, 2, seed=1, settle=1).radius)
 
 
 @pytest.mark.parametrize("dim", [2, 3])
 def test_towers_are_redundant(dim: int) -> None:
     """2 or 4 contacts a face; every W r has at most the freedoms of the boxes as its rank."""
-    problem = tower(4, dim, top_mass=1e4)
+    problem = build_tower(4, dim, top_mass=1e4)
     contacts = 4 * 2 ** (dim - 1)
     assert problem.contacts == contacts
     matrix = problem.delassus.toarray()
@@ -126,7 +128,7 @@ def test_a_crystal_has_all_its_contacts_and_stands_on_its_floor() -> None:
     each sphere of a small layer above and below, n^2 with the floor, 4 n with the sides in every
     large layer.  The floor bears the weight: its spheres are the first n^2."""
     n = 3
-    problem = crystal(n)
+    problem = build_crystal(n)
     large, small = (n + 1) // 2, n // 2
     inside = large * 2 * n * (n - 1) + small * 2 * (n - 1) * (n - 2)
     assert problem.contacts == inside + small * 8 * (n - 1) ** 2 + n * n + large * 4 * n
@@ -135,5 +137,5 @@ def test_a_crystal_has_all_its_contacts_and_stands_on_its_floor() -> None:
     space = problem.bodies
     assert space is not None
     impulse = space.jacobian.T @ found.r
-    weight = free_fall(space, 1e-3, 3) / space.inverse_mass.diagonal()
+    weight = fall_freely(space, 1e-3, 3) / space.inverse_mass.diagonal()
     np.testing.assert_allclose(impulse, -weight, atol=1e-10 * np.abs(weight).max())

@@ -21,8 +21,8 @@ import pytest
 import rigid_lcp as r
 from rigid_lcp.collision import passing as passed_collisions
 from rigid_lcp.report.page import write_report
-from rigid_lcp.scene.file import scene_read
-from rigid_lcp.scene.run import scene_run, simulation_of, summary_of
+from rigid_lcp.scene.file import load_scene
+from rigid_lcp.scene.run import make_simulation, run_scene, summarise_run
 from rigid_lcp.scene.run_folder import RunFolder
 
 
@@ -99,14 +99,14 @@ def test_a_run_tells_what_was_cut_off(tmp_path: Path, monkeypatch: pytest.Monkey
         '[[body]]\nname = "heavy"\nradius = 0.1\ndensity = 1e4\nposition = [0.4, 0.0]\n'
         "velocity = [-1.0, 0.0]\n"
     )
-    file = scene_read(path, [])
+    file = load_scene(path, [])
     folder = RunFolder(tmp_path / "run")
     for resume in (False, True):
-        scene, run = simulation_of(file)
-        with folder.locked():
-            folder.settle({"scene": {}}, file.text, resume=resume, force=False)
-            scene_run(file, run, folder, resume=resume, progress=lambda *_: None)
-            summary = summary_of(file, scene, run, folder)
+        scene, run = make_simulation(file)
+        with folder.lock():
+            folder.prepare({"scene": {}}, file.text, resume=resume, force=False)
+            run_scene(file, run, folder, resume=resume, progress=lambda *_: None)
+            summary = summarise_run(file, scene, run, folder)
             assert summary["steps_cut_off"] >= 1
             page = write_report(folder, scene, {"provenance": {}}, summary, draw=False)
         assert "collisions ran out of rounds" in page.read_text()
@@ -222,7 +222,7 @@ def test_boxes_that_tumble_in_a_closed_box_keep_their_energy() -> None:
         scene.add(r.HalfSpace(normal, -0.3), restitution=1.0)
     for corner in np.indices((2, 2, 2)).reshape(3, -1).T - 0.5:
         scene.add(
-            r.box(0.1, 0.06, 0.05), density=1000, position=0.25 * corner, restitution=1.0,
+            r.make_box(0.1, 0.06, 0.05), density=1000, position=0.25 * corner, restitution=1.0,
             velocity=generator.normal(size=3), spin=3.0 * generator.normal(size=3),
             angle=generator.normal(size=4),
         )  # fmt: skip

@@ -13,22 +13,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigid_lcp.errors import ProblemError
-from rigid_lcp.friction.methods.dantzig import dantzig
-from rigid_lcp.friction.methods.pivoting import pivoting
-from rigid_lcp.friction.problem.definition import FrictionSolution, friction_problem
+from rigid_lcp.friction.methods.dantzig import solve_dantzig
+from rigid_lcp.friction.methods.pivoting import solve_pivoting
+from rigid_lcp.friction.problem.definition import FrictionSolution, make_problem
 from rigid_lcp.friction.problem.proofs import prove_forces_insufficient
 from tests.rigid_networks import network, stored, tower
 
 TOLERANCE = 1e-12
 Method = Callable[..., FrictionSolution]
-both = pytest.mark.parametrize("method", [pivoting, dantzig])
+both = pytest.mark.parametrize("method", [solve_pivoting, solve_dantzig])
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.1, 0.3, 0.5, 0.8, 1.0])
 @pytest.mark.parametrize("seed", range(3))
 def test_networks_at_every_friction(mu: float, seed: int) -> None:
     """Where the paper's driving cycles (mu >= 0.3) the path ends in a solution, to 1e-12."""
-    found = pivoting(network(120, mu, seed))
+    found = solve_pivoting(network(120, mu, seed))
     assert found.solved, found.message
     assert found.residual <= TOLERANCE
 
@@ -36,7 +36,7 @@ def test_networks_at_every_friction(mu: float, seed: int) -> None:
 @pytest.mark.parametrize("mu", [0.1, 0.3, 0.5, 0.8])
 def test_lemkes_path_from_no_forces(mu: float) -> None:
     """d = n from far: it needs no start at all."""
-    found = pivoting(network(60, mu, 5), sweeps=0)
+    found = solve_pivoting(network(60, mu, 5), sweeps=0)
     assert found.solved, found.message
     assert found.work["sweeps"] == 0
     assert found.work["pivots"] > 0
@@ -45,13 +45,13 @@ def test_lemkes_path_from_no_forces(mu: float) -> None:
 def test_a_near_start_saves_pivots() -> None:
     """From the solution of a problem that is 1e-3 away: a tenth of the pivots of Lemke's path."""
     problem = network(120, 0.5)
-    first = pivoting(problem, sweeps=0)
-    moved = friction_problem(
+    first = solve_pivoting(problem, sweeps=0)
+    moved = make_problem(
         problem.delassus,
         problem.offset * (1 + 1e-3 * np.random.default_rng(0).normal(size=len(problem.offset))),
         0.5, 2,
     )  # fmt: skip
-    warm = pivoting(moved, first.r)
+    warm = solve_pivoting(moved, first.r)
     assert first.solved
     assert warm.solved, warm.message
     assert warm.work["pivots"] < 0.1 * first.work["pivots"]
@@ -60,8 +60,8 @@ def test_a_near_start_saves_pivots() -> None:
 def test_a_solution_is_returned_as_it_is() -> None:
     """A start at or below the tolerance needs no pivot."""
     problem = network(60, 0.5)
-    first = pivoting(problem)
-    again = pivoting(problem, first.r)
+    first = solve_pivoting(problem)
+    again = solve_pivoting(problem, first.r)
     assert (again.r == first.r).all()
     assert again.work["pivots"] == 0
 
@@ -72,7 +72,7 @@ def test_any_start_will_do(start: str) -> None:
     problem = network(60, 0.5, 2)
     g = np.random.default_rng(1)
     size = {"zero": 0.0, "random": 1e-2, "far": 1e4}[start]
-    found = pivoting(problem, size * g.normal(size=len(problem.offset)))
+    found = solve_pivoting(problem, size * g.normal(size=len(problem.offset)))
     assert found.solved, found.message
 
 
@@ -92,14 +92,14 @@ OFFSETS = st.floats(-2.0, 2.0).map(lambda x: x if abs(x) > 1e-9 else 0.0)
 
 
 @given(
-    st.sampled_from([partial(pivoting, sweeps=0), dantzig]), OFFSETS, OFFSETS,
+    st.sampled_from([partial(solve_pivoting, sweeps=0), solve_dantzig]), OFFSETS, OFFSETS,
     st.floats(0.0, 3.0), st.floats(-0.9, 0.9),
 )  # fmt: skip
 @settings(deadline=None, max_examples=100)
 def test_one_contact_by_cases(method, normal, tangential, mu, skew):
     """One contact with W = [[1, k], [k, 1]]: whatever is found obeys eq. 27."""
-    skew = skew if method is not dantzig else 0.0  # it may cycle where W couples strongly
-    problem = friction_problem([[1.0, skew], [skew, 1.0]], [normal, tangential], mu, 2)
+    skew = skew if method is not solve_dantzig else 0.0  # it may cycle where W couples strongly
+    problem = make_problem([[1.0, skew], [skew, 1.0]], [normal, tangential], mu, 2)
     found = method(problem)
     force, velocity = found.r, found.u
     small = 1e-9 * (1.0 + abs(force).max())
@@ -115,12 +115,12 @@ def test_one_contact_by_cases(method, normal, tangential, mu, skew):
 def test_no_solution_is_proved() -> None:
     """The sliding rod beyond Painleve's limit: a linear programme finds no forces at all."""
     w = [[1.6, 1.2], [1.2, 3.4]]
-    assert pivoting(
-        friction_problem(w, [-1.0, 0.0], 2.0, 2), tangential_velocity=np.array([1.0])
+    assert solve_pivoting(
+        make_problem(w, [-1.0, 0.0], 2.0, 2), tangential_velocity=np.array([1.0])
     ).status == "no solution"  # fmt: skip
-    immovable = friction_problem(np.zeros((3, 3)), [-1.0, 0.0, 0.0], 0.0, 3)
-    assert pivoting(immovable).status == "no solution"
-    at_rest = pivoting(friction_problem(w, [-1.0, 0.0], 2.0, 2))
+    immovable = make_problem(np.zeros((3, 3)), [-1.0, 0.0, 0.0], 0.0, 3)
+    assert solve_pivoting(immovable).status == "no solution"
+    at_rest = solve_pivoting(make_problem(w, [-1.0, 0.0], 2.0, 2))
     assert at_rest.solved
 
 
@@ -129,15 +129,15 @@ def test_a_matrix_not_quite_symmetric() -> None:
     problem = network(60, 0.5)
     w = problem.delassus.copy()
     w.data *= 1 + 1e-3 * np.random.default_rng(0).uniform(-1, 1, w.nnz)
-    assert pivoting(friction_problem(w, problem.offset, 0.5, 2)).solved
+    assert solve_pivoting(make_problem(w, problem.offset, 0.5, 2)).solved
 
 
 def test_a_few_pivots_only(monkeypatch: pytest.MonkeyPatch) -> None:
     """What is given up says so, with its best point."""
-    module = sys.modules[pivoting.__module__]
+    module = sys.modules[solve_pivoting.__module__]
     monkeypatch.setattr(module, "PIVOTING", replace(module.PIVOTING, pivots=-1))
     problem = network(60, 0.5)
-    found = pivoting(problem, sweeps=0)
+    found = solve_pivoting(problem, sweeps=0)
     assert found.status == "not converged"
     assert found.residual == problem.residual(found.r) > TOLERANCE
     assert found.message
@@ -146,13 +146,13 @@ def test_a_few_pivots_only(monkeypatch: pytest.MonkeyPatch) -> None:
 @both
 def test_nothing_to_do(method: Method) -> None:
     """No contacts; only parting ones; 3D with friction is refused."""
-    assert method(friction_problem(np.zeros((0, 0)), [], 0.3, 2)).solved
-    parting = method(friction_problem(np.eye(4), [1.0, 0.0, 0.0, 0.0], 0.3, 2))
+    assert method(make_problem(np.zeros((0, 0)), [], 0.3, 2)).solved
+    parting = method(make_problem(np.eye(4), [1.0, 0.0, 0.0, 0.0], 0.3, 2))
     assert parting.solved
     assert (parting.r == 0).all()
     assert parting.work["pivots"] == 0
     with pytest.raises(ProblemError, match="circle"):
-        method(friction_problem(np.eye(3), -np.ones(3), 0.3, 3))
+        method(make_problem(np.eye(3), -np.ones(3), 0.3, 3))
 
 
 @pytest.mark.parametrize(
@@ -161,7 +161,7 @@ def test_nothing_to_do(method: Method) -> None:
 def test_real_problems(name: str) -> None:
     """Stored problems, at the friction they came with and at 0.3 and 0.8."""
     for mu in (None, 0.3, 0.8):
-        assert pivoting(stored(name, mu)).solved
+        assert solve_pivoting(stored(name, mu)).solved
 
 
 @both
@@ -173,7 +173,7 @@ def test_either_side_of_painleves_limit(below: float, method: Method) -> None:
     nor its sign.  The pivot is known to round-off only.
     """
     mu = 4 / 3 * (1 - below)
-    problem = friction_problem([[1.0, 0.75], [0.75, 2.0]], [-1.0, 0.0], mu, 2)
+    problem = make_problem([[1.0, 0.75], [0.75, 2.0]], [-1.0, 0.0], mu, 2)
     found = method(problem, None, TOLERANCE, tangential_velocity=np.array([1.0]))
     if below > 0:
         assert found.solved, found.message
@@ -187,7 +187,7 @@ def test_either_side_of_painleves_limit(below: float, method: Method) -> None:
 def test_a_contact_that_bears_on_no_mass(mu: float, method: Method) -> None:
     """It approaches whatever its force is; as that grows the residual falls, and solves nothing."""
     w, q = np.diag([1.0, 1.0, 0.0, 0.0]), np.array([-1.0, 0.3, -1.0, 0.0])
-    found = method(friction_problem(w, q, mu, 2), None, 1e-6)
+    found = method(make_problem(w, q, mu, 2), None, 1e-6)
     assert found.residual <= 1e-6
     assert found.status == "no solution"
 
@@ -196,8 +196,8 @@ def test_a_contact_that_bears_on_no_mass(mu: float, method: Method) -> None:
 def test_a_contact_that_bears_on_much_mass(light: float) -> None:
     """W = 1e-12 of another contact's is small, not zero: the force is ``1 / light``."""
     w, q = np.diag([1.0, 1.0, light, light]), np.array([-1.0, 0.3, -1.0, 0.0])
-    problem = friction_problem(w, q, 0.5, 2)
-    found = pivoting(problem)
+    problem = make_problem(w, q, 0.5, 2)
+    found = solve_pivoting(problem)
     assert found.solved
     assert found.r[2] == pytest.approx(1 / light)
     assert not prove_forces_insufficient(problem, np.zeros(2, dtype=np.int64))

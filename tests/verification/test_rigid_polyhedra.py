@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull, Delaunay
 from scipy.spatial.transform import Rotation
 
-from rigid_lcp import Polyhedron, box
+from rigid_lcp import Polyhedron, make_box
 from rigid_lcp.shapes.polyhedron import Floats
 from tests.rigid_solids import ballast_stone
 
@@ -50,7 +50,7 @@ def test_integrals_agree_with_a_triangulation(seed: int) -> None:
 
 
 def test_box_and_tetrahedron_in_closed_form() -> None:
-    cuboid = box(1.0, 2.0, 3.0)
+    cuboid = make_box(1.0, 2.0, 3.0)
     assert cuboid.volume == pytest.approx(6.0, rel=1e-15)
     assert np.allclose(cuboid.inertia, 6.0 / 12 * np.diag([13.0, 10.0, 5.0]), rtol=1e-14)
     # Regular tetrahedron of edge a: V = a^3 / 6 sqrt(2), I = m a^2 / 20

@@ -7,19 +7,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigid_lcp import BodySpace, solve_friction
-from rigid_lcp.friction.problem.definition import friction_problem
+from rigid_lcp.friction.problem.definition import make_problem
 from rigid_lcp.friction.problem.proofs import (
     CERTAIN_ENERGY,
     find_least_energy,
     gives_energy,
     prove_forces_insufficient,
 )
-from validation.bench.rigid.packings import packing
+from validation.bench.rigid.packings import build_packing
 
 
 def one_contact(coupling: float, mu: float):
     """W = [1, -c; -c, 1]: on r = (1, s), |s| <= mu, ``r . W r = 1 - 2 c s + s^2``."""
-    return friction_problem([[1.0, -coupling], [-coupling, 1.0]], [1.0, 0.0], mu, 2)
+    return make_problem([[1.0, -coupling], [-coupling, 1.0]], [1.0, 0.0], mu, 2)
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.1, 0.3])
@@ -48,22 +48,22 @@ def test_a_w_of_bodies_never_gives_energy(seed, dim, mu):
     generator = np.random.default_rng(seed)
     contacts = int(generator.integers(1, 8))
     jacobian = generator.standard_normal((contacts * dim, 3)) * 10.0 ** generator.integers(-6, 6)
-    problem = friction_problem(jacobian @ jacobian.T, np.ones(contacts * dim), mu, dim)
+    problem = make_problem(jacobian @ jacobian.T, np.ones(contacts * dim), mu, dim)
     assert find_least_energy(problem)[0] >= -1e-12 > -CERTAIN_ENERGY
 
 
 def test_the_proof_is_not_asked_of_bodies():
     """Their W is exact: nothing to look for."""
     space = BodySpace(sp.csr_array(np.eye(2, 3)), sp.csr_array(np.eye(3)), 3)
-    assert not gives_energy(friction_problem(space, [-1.0, 0.0], 0.5, 2))
+    assert not gives_energy(make_problem(space, [-1.0, 0.0], 0.5, 2))
 
 
 def noisy(friction: float):
     """A settled bed of spheres, each entry of its W changed by 1e-3 of itself."""
-    problem = packing(40, 3, seed=5, friction=friction, settle=60)
+    problem = build_packing(40, 3, seed=5, friction=friction, settle=60)
     w = problem.delassus.copy()
     w.data *= 1.0 + 1e-3 * np.random.default_rng(1).standard_normal(len(w.data))
-    return friction_problem(w, problem.offset, friction, 3)
+    return make_problem(w, problem.offset, friction, 3)
 
 
 def test_a_wedged_packing_with_noise_on_w_says_that_no_solution_need_exist():
@@ -93,8 +93,8 @@ def test_noise_on_w_of_a_packing_that_can_not_wedge_is_accepted():
 def test_a_contact_on_no_mass_that_approaches(dim: int) -> None:
     q = np.zeros(dim)
     q[0] = -1.0
-    assert prove_forces_insufficient(friction_problem(np.zeros((dim, dim)), q, 0.5, dim))
-    assert not prove_forces_insufficient(friction_problem(np.zeros((dim, dim)), -q, 0.5, dim))
+    assert prove_forces_insufficient(make_problem(np.zeros((dim, dim)), q, 0.5, dim))
+    assert not prove_forces_insufficient(make_problem(np.zeros((dim, dim)), -q, 0.5, dim))
 
 
 @pytest.mark.parametrize("mu", [0.5, 2.4, 2.6, 5.0])
@@ -104,14 +104,14 @@ def test_only_enough_friction_reaches_a_contact(mu: float) -> None:
     w[0, 0], w[1, 1] = 1.0, 1.0
     w[2, 0], w[2, 1] = -2.5, 1.0
     q = np.array([-1.0, 0.0, -1.0, 0.0])
-    assert prove_forces_insufficient(friction_problem(w, q, mu, 2)) == (mu < 2.5)
+    assert prove_forces_insufficient(make_problem(w, q, mu, 2)) == (mu < 2.5)
 
 
 @pytest.mark.parametrize("scale", [1e-12, 1e-6, 1.0, 1e12])
 def test_small_entries_are_no_zeros(scale: float) -> None:
     """Two contacts that feel no other, one on a heavy body: r_N = 1 / W_NN stops each."""
     w = np.diag([1.0, 1.0, scale, scale])
-    assert not prove_forces_insufficient(friction_problem(w, np.array([-1, 0.3, -1, 0]), 0.3, 2))
+    assert not prove_forces_insufficient(make_problem(w, np.array([-1, 0.3, -1, 0]), 0.3, 2))
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.3])
@@ -122,7 +122,7 @@ def test_a_light_body_between_heavy_ones_has_a_mass(light: float, mu: float) -> 
     apart = np.array([[-1.0, 1.0, 0.0], [0.0, -1.0, 1.0]])
     normal = (apart / mass) @ apart.T
     w = np.kron(normal, np.eye(2))
-    problem = friction_problem(w, np.kron(apart @ [1.0, 0.3, -0.7], [1.0, 0.4]), mu, 2)
+    problem = make_problem(w, np.kron(apart @ [1.0, 0.3, -0.7], [1.0, 0.4]), mu, 2)
     assert not prove_forces_insufficient(problem)
 
 
@@ -136,4 +136,4 @@ def test_no_proof_where_all_can_be_stopped(seed: int, dim: int, contacts: int) -
     force = g.standard_normal((contacts, dim))
     force[:, 0] = np.linalg.norm(force[:, 1:], axis=1) + 0.1
     w = jacobian @ jacobian.T
-    assert not prove_forces_insufficient(friction_problem(w, -w @ force.ravel(), 1.0, dim))
+    assert not prove_forces_insufficient(make_problem(w, -w @ force.ravel(), 1.0, dim))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from rigid_lcp import BodySpace, Disc, HalfSpace, Polygon, Scene, Simulation, Sphere, box
+from rigid_lcp import BodySpace, Disc, HalfSpace, Polygon, Scene, Simulation, Sphere, make_box
 from rigid_lcp.collision.passing import Closing, Impulses
 from rigid_lcp.collision.restitution_scale import Share, gains_energy
 from rigid_lcp.errors import NotConverged
@@ -87,7 +87,10 @@ def gas(dim: int, seed: int) -> Scene:
     """Bodies of different masses, thrown about in a box, without gravity; restitution 1."""
     draw = np.random.default_rng(seed)
     scene = Scene(dim, np.zeros(dim))
-    shapes = {2: [Polygon.rectangle(0.6, 0.2), Disc(0.25)], 3: [box(0.6, 0.3, 0.2), Sphere(0.25)]}
+    shapes = {
+        2: [Polygon.rectangle(0.6, 0.2), Disc(0.25)],
+        3: [make_box(0.6, 0.3, 0.2), Sphere(0.25)],
+    }
     for k, place in enumerate(np.ndindex(*(2,) * dim)):
         scene.add(
             shapes[dim][k % 3 % 2], density=10.0 ** draw.uniform(-1, 1),
@@ -162,11 +165,11 @@ def test_each_contact_keeps_the_greatest_share_that_makes_no_energy() -> None:
     """Energy is made above a share of each: 1 + log2(64) trials find it to 1/64, from below, and
     one more stands at all of them.  What is left out is tried once, without any."""
     most, share, trials = np.array([0.0, 0.3, 0.999, 1.0]), Share(4), 1
-    while share.next(share.now > most):
+    while share.bisect(share.now > most):
         trials += 1
     assert trials <= 8
     assert (share.now <= most).all()
     assert (share.now >= np.where(most < 1, most - 1 / 64, 1)).all()
     share.leave_out()
     assert not share.now.any()
-    assert not share.next(np.zeros(4, bool))
+    assert not share.bisect(np.zeros(4, bool))

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from rigid_lcp import Simulation
-from rigid_lcp.scene.file import SceneFile, scene_read
-from rigid_lcp.scene.run import scene_run, simulation_of
+from rigid_lcp.scene.file import SceneFile, load_scene
+from rigid_lcp.scene.run import make_simulation, run_scene
 from rigid_lcp.scene.run_folder import FRAME, RunFolder
 from tests.rigid_runs import SLIDING_BLOCK, WORN_AND_BROKEN, WORN_IN_SPACE, frame_bits
 
@@ -66,8 +66,8 @@ SCENES = {
 
 
 def run_in(folder: RunFolder, file: SceneFile, *, resume: bool) -> Simulation:
-    _, run = simulation_of(file)
-    scene_run(file, run, folder, resume=resume, progress=lambda *_: None)
+    _, run = make_simulation(file)
+    run_scene(file, run, folder, resume=resume, progress=lambda *_: None)
     return run
 
 
@@ -77,7 +77,7 @@ def test_a_resumed_run_is_the_uninterrupted_one(tmp_path: Path, kind: str) -> No
     """From every frame on; whatever a step needs of the one before is in the frame."""
     path = tmp_path / "scene.toml"
     path.write_text(SCENES[kind], encoding="utf-8")
-    file = scene_read(path, FEW if kind == "poured" else ())
+    file = load_scene(path, FEW if kind == "poured" else ())
     folder = RunFolder(tmp_path / "run")
     folder.path.mkdir()
     whole = run_in(folder, file, resume=False)
@@ -99,13 +99,13 @@ def test_steps_above_the_tolerance_are_counted_over_a_stop(tmp_path: Path) -> No
     """No method reaches 1e-30: steps that are not exact are counted, before the stop and after."""
     path = tmp_path / "scene.toml"
     path.write_text(SLIDING_BLOCK, encoding="utf-8")
-    file, folder = scene_read(path), RunFolder(tmp_path / "run")
+    file, folder = load_scene(path), RunFolder(tmp_path / "run")
     folder.path.mkdir()
 
     def run(resume: bool) -> Simulation:
-        _, made = simulation_of(file)
+        _, made = make_simulation(file)
         made.tolerance = 1e-30
-        scene_run(file, made, folder, resume=resume, progress=lambda *_: None)
+        run_scene(file, made, folder, resume=resume, progress=lambda *_: None)
         return made
 
     counted = run(resume=False).steps_above

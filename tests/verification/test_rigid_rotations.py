@@ -12,22 +12,22 @@ from scipy.spatial.transform import Rotation
 from rigid_lcp.errors import SceneError
 from rigid_lcp.motion.gyroscopic import (
     Floats,
-    free_rotation,
-    gyroscopic_acceleration,
-    principal_inertia,
-    world_inertia,
+    find_principal_axes,
+    find_spin_acceleration,
+    rotate_freely,
+    turn_inertia,
 )
-from rigid_lcp.shapes.polyhedron import box
+from rigid_lcp.shapes.polyhedron import make_box
 from rigid_lcp.shapes.rotations import (
-    quaternion_of_matrix,
-    quaternion_of_rotation,
-    quaternion_product,
-    quaternion_rate,
+    extract_quaternion,
+    find_quaternion_rate,
+    make_quaternion,
+    make_rotation,
+    multiply_quaternions,
+    normalise_quaternion,
     rotate,
     rotate_back,
-    rotation_matrix,
     turn_quaternion,
-    unit_quaternion,
 )
 from tests.rigid_solids import angular_momentum
 
@@ -37,7 +37,7 @@ vectors = st.tuples(*[st.floats(-10.0, 10.0)] * 3).map(np.array)
 
 
 def random_rotations(count: int, seed: int = 0) -> Floats:
-    return unit_quaternion(np.random.default_rng(seed).normal(size=(count, 4)))
+    return normalise_quaternion(np.random.default_rng(seed).normal(size=(count, 4)))
 
 
 def as_scipy(quaternion: Floats) -> Rotation:
@@ -49,16 +49,16 @@ def as_scipy(quaternion: Floats) -> Rotation:
 
 def test_matrix_and_product_agree_with_scipy() -> None:
     left, right = random_rotations(50), random_rotations(50, 1)
-    assert np.allclose(rotation_matrix(left), as_scipy(left).as_matrix(), atol=4 * ROUND_OFF)
+    assert np.allclose(make_rotation(left), as_scipy(left).as_matrix(), atol=4 * ROUND_OFF)
     both = as_scipy(left) * as_scipy(right)
-    found = rotation_matrix(quaternion_product(left, right))
+    found = make_rotation(multiply_quaternions(left, right))
     assert np.allclose(found, both.as_matrix(), atol=8 * ROUND_OFF)
 
 
 @settings(max_examples=50, deadline=None)
 @given(vectors)
 def test_turn_by_rotation_vector_agrees_with_scipy(phi):
-    found = rotation_matrix(quaternion_of_rotation(phi))
+    found = make_rotation(make_quaternion(phi))
     assert np.allclose(found, Rotation.from_rotvec(phi).as_matrix(), atol=4e-14)
 
 
@@ -66,8 +66,8 @@ def test_turn_by_rotation_vector_agrees_with_scipy(phi):
 def test_matrix_to_quaternion_and_back(angle: float) -> None:
     axes = np.random.default_rng(2).normal(size=(30, 3))
     axes = np.vstack([axes / np.linalg.norm(axes, axis=1)[:, None], np.eye(3)])
-    matrix = rotation_matrix(quaternion_of_rotation(angle * axes))
-    assert np.allclose(rotation_matrix(quaternion_of_matrix(matrix)), matrix, atol=4 * ROUND_OFF)
+    matrix = make_rotation(make_quaternion(angle * axes))
+    assert np.allclose(make_rotation(extract_quaternion(matrix)), matrix, atol=4 * ROUND_OFF)
 
 
 def test_rotate_and_back_keep_length() -> None:
@@ -91,13 +91,13 @@ def test_rate_is_the_derivative_of_the_turn() -> None:
     q, spin, h = random_rotations(1)[0], np.array([1.0, 2.0, -0.5]), 1e-6
     ahead, behind = turn_quaternion(q, h * spin), turn_quaternion(q, -h * spin)
     # central difference: h^2 |w|^3 / 24 = 2e-12 of truncation, 1e-16 / h = 1e-10 of round-off
-    assert np.allclose((ahead - behind) / (2 * h), quaternion_rate(q, spin), atol=5e-10)
+    assert np.allclose((ahead - behind) / (2 * h), find_quaternion_rate(q, spin), atol=5e-10)
 
 
 @pytest.mark.parametrize("bad", [[0, 0, 0, 0], [1, np.nan, 0, 0], [1, 0, 0]])
 def test_no_rotation_is_refused(bad: list[float]) -> None:
     with pytest.raises(SceneError, match="quaternion"):
-        unit_quaternion(bad)
+        normalise_quaternion(bad)
 
 
 # --- free bodies ---
@@ -110,18 +110,20 @@ def euler_by_ode(inertia: Floats, q: Floats, spin: Floats, seconds: float) -> tu
 
     def rates(_: float, state: Floats) -> Floats:
         turn, w = state[:4] / np.linalg.norm(state[:4]), state[4:]
-        return np.concatenate([quaternion_rate(turn, w), gyroscopic_acceleration(inertia, turn, w)])
+        return np.concatenate(
+            [find_quaternion_rate(turn, w), find_spin_acceleration(inertia, turn, w)]
+        )
 
     end = solve_ivp(
         rates, (0, seconds), np.concatenate([q, spin]), method="DOP853", rtol=1e-13, atol=1e-13
     ).y[:, -1]
-    return unit_quaternion(end[:4]), end[4:]
+    return normalise_quaternion(end[:4]), end[4:]
 
 
 def march(inertia: Floats, q: Floats, spin: Floats, h: float, steps: int) -> tuple[Floats, Floats]:
-    principal = principal_inertia(inertia)
+    principal = find_principal_axes(inertia)
     for _ in range(steps):
-        q, spin = free_rotation(principal, q, spin, h)
+        q, spin = rotate_freely(principal, q, spin, h)
     return q, spin
 
 
@@ -136,7 +138,7 @@ def test_free_rotation_is_of_second_order() -> None:
     for steps in (50, 100, 200):
         found, found_spin = march(INERTIA, q, spin, 2.0 / steps, steps)
         errors.append(
-            np.linalg.norm(rotation_matrix(found) - rotation_matrix(exact))
+            np.linalg.norm(make_rotation(found) - make_rotation(exact))
             + np.linalg.norm(found_spin - exact_spin)
         )
     order = np.log2(np.array(errors[:-1]) / errors[1:])
@@ -148,13 +150,13 @@ def test_free_rotation_is_of_second_order() -> None:
 def test_free_rotation_keeps_momentum_and_energy(axis: int | None) -> None:
     """Both to round-off of every step, at any spin and next to a principal axis."""
     q, spin = random_rotations(1)[0], np.array([1.0, 2.0, -1.5])
-    principal = principal_inertia(INERTIA)
+    principal = find_principal_axes(INERTIA)
     if axis is not None:
-        spin = rotate(quaternion_product(q, principal[1]), 3.0 * np.eye(3)[axis] + 1e-9)
+        spin = rotate(multiply_quaternions(q, principal[1]), 3.0 * np.eye(3)[axis] + 1e-9)
     momentum = angular_momentum(INERTIA, q, spin)
     energy, lost = energy_of(INERTIA, q, spin), 0.0
     for _ in range(1000):
-        q, spin = free_rotation(principal, q, spin, 0.05)
+        q, spin = rotate_freely(principal, q, spin, 0.05)
         lost = max(lost, float(np.abs(angular_momentum(INERTIA, q, spin) - momentum).max()))
     # a few roundings of |L| = 10 in each step, which need not cancel
     assert lost < 1000 * 10 * 2 * ROUND_OFF
@@ -166,7 +168,7 @@ def test_free_rotation_leaves_a_body_at_rest_alone(speed: float) -> None:
     """A body turns by what its spin says: round-off of the energy has no direction of its own."""
     q, h = random_rotations(1)[0], 1e-3
     for way in np.random.default_rng(2).normal(size=(20, 3)):
-        turned, spin = free_rotation(principal_inertia(INERTIA), q, speed * way, h)
+        turned, spin = rotate_freely(find_principal_axes(INERTIA), q, speed * way, h)
         assert np.abs(turned - q).max() < 2 * speed * np.linalg.norm(way) * h + 4 * ROUND_OFF
         assert np.allclose(spin, speed * way, rtol=1e-9, atol=0)
 
@@ -179,14 +181,14 @@ def test_bodies_with_equal_moments_move_exactly(moments: list[float]) -> None:
     exact, exact_spin = euler_by_ode(inertia, q, spin, 3.0)
     found, found_spin = march(inertia, q, spin, 3.0, 1)
     # the ODE solver's tolerance 1e-13 over a few radians
-    assert np.allclose(rotation_matrix(found), rotation_matrix(exact), atol=2e-11)
+    assert np.allclose(make_rotation(found), make_rotation(exact), atol=2e-11)
     assert np.allclose(found_spin, exact_spin, atol=2e-11)
 
 
 @pytest.mark.long
 def test_intermediate_axis_flips_when_the_ode_says_so() -> None:
     """A box thrown about its middle axis turns over (Dzhanibekov); time of the flip and path."""
-    inertia = box(1.0, 2.0, 3.0).mass_properties(1.0)[1]
+    inertia = make_box(1.0, 2.0, 3.0).mass_properties(1.0)[1]
     spin = np.array([1e-3, 5.0, 0.0])  # middle moment about y
     q, seconds = IDENTITY, 6.0
     exact, exact_spin = euler_by_ode(inertia, q, spin, seconds)
@@ -202,16 +204,16 @@ def test_intermediate_axis_flips_when_the_ode_says_so() -> None:
 def test_stack_of_bodies_is_each_body() -> None:
     inertia = np.array([INERTIA, np.eye(3), np.diag([1.0, 2.0, 2.5])])
     q, spin = random_rotations(3), np.random.default_rng(5).normal(size=(3, 3))
-    many = free_rotation(principal_inertia(inertia), q, spin, 0.1)
+    many = rotate_freely(find_principal_axes(inertia), q, spin, 0.1)
     for k in range(3):
-        one = free_rotation(principal_inertia(inertia[k]), q[k], spin[k], 0.1)
+        one = rotate_freely(find_principal_axes(inertia[k]), q[k], spin[k], 0.1)
         assert np.allclose(many[0][k], one[0], atol=4 * ROUND_OFF)
         assert np.allclose(many[1][k], one[1], atol=8 * ROUND_OFF)
 
 
 def test_world_inertia_turns_with_the_body() -> None:
     q = random_rotations(1)[0]
-    placed = world_inertia(INERTIA, q)
+    placed = turn_inertia(INERTIA, q)
     assert np.allclose(np.linalg.eigvalsh(placed), np.linalg.eigvalsh(INERTIA), atol=1e-14)
     axis = np.linalg.eigh(INERTIA)[1][:, 0]
     assert np.allclose(placed @ rotate(q, axis), np.linalg.eigvalsh(INERTIA)[0] * rotate(q, axis))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from rigid_lcp import Disc, HalfSpace, Polygon, Scene, Simulation, box
+from rigid_lcp import Disc, HalfSpace, Polygon, Scene, Simulation, make_box
 from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import NoSolution, NotConverged
 from rigid_lcp.motion import runge_kutta
@@ -22,10 +22,10 @@ from tests.rigid_motions import (
 )
 from validation.bench.rigid.scenes import (
     G,
-    block_on_incline,
-    bouncing_disc,
-    sliding_rod,
-    sliding_rod_limit,
+    drop_disc,
+    find_rod_limit,
+    incline_block,
+    slide_rod,
     stack,
 )
 
@@ -116,7 +116,7 @@ def test_a_block_that_slides_past_an_edge_lands_on_nothing(dim: int) -> None:
     scene = Scene(dim)
     blocks = {
         2: (Polygon.rectangle(1.0, 0.2), Polygon.rectangle(0.4, 0.1)),
-        3: (box(1.0, 0.5, 0.2), box(0.4, 0.3, 0.1)),
+        3: (make_box(1.0, 0.5, 0.2), make_box(0.4, 0.3, 0.1)),
     }
     below, above = blocks[dim]
     along, up = np.eye(dim)[0], np.eye(dim)[-1]
@@ -155,7 +155,7 @@ def test_blocks_that_are_pushed_slide_past_an_edge() -> None:
 
 def test_sliding_stops_where_it_should() -> None:
     """``v^2 / (2 mu g)``, met to the speed that counts as rest: the step is cut at the event."""
-    run = block_on_incline(0.0, 0.5, method="acceleration", step=0.01)
+    run = incline_block(0.0, 0.5, method="acceleration", step=0.01)
     run.motion.velocity[0, 0] = 1.0
     run.advance(0.3)
     assert run.positions[0, 0] == pytest.approx(1 / G, abs=1e-9)
@@ -166,7 +166,7 @@ def test_sliding_stops_where_it_should() -> None:
 @pytest.mark.long
 def test_bounces_keep_the_energy() -> None:
     """Restitution 1: 1e-13 a bounce; time between bounces as on paper."""
-    run = bouncing_disc(0.01, 1.0, method="acceleration", step=0.01)
+    run = drop_disc(0.01, 1.0, method="acceleration", step=0.01)
     energy, bounces = run.energy, 400
     run.advance(2 * bounces * np.sqrt(2 * 0.01 / G))
     assert run.pace.collisions == bounces  # the first after sqrt(2h/g) = 45 ms, then every 90 ms
@@ -175,7 +175,7 @@ def test_bounces_keep_the_energy() -> None:
 
 def test_zeno_is_cut_off() -> None:
     """Bounces are met one by one until they are too slow to be worth it; then rest."""
-    run = bouncing_disc(0.1, 0.5, method="acceleration", step=0.01)
+    run = drop_disc(0.1, 0.5, method="acceleration", step=0.01)
     seconds = bouncing_time(0.1, 0.5)
     run.advance(0.99 * seconds)
     assert run.positions[0, 1] > 0.1
@@ -189,7 +189,7 @@ def test_zeno_is_cut_off() -> None:
 @pytest.mark.long
 def test_step_is_halved_and_doubled(monkeypatch: pytest.MonkeyPatch) -> None:
     """Section 9: overlaps halve the step; three clean steps double it, up to the longest one."""
-    run = bouncing_disc(0.1, 0.5, method="acceleration", step=0.01)
+    run = drop_disc(0.1, 0.5, method="acceleration", step=0.01)
     monkeypatch.setattr(runge_kutta, "RUNGE_KUTTA", BY_HALVING)
     run.advance(0.15)
     assert run.pace.halved > 5
@@ -248,8 +248,8 @@ def test_just_below_painleves_limit_the_tip_stops_at_once(below: float) -> None:
     direction beyond rest threw the rod off with up to 4e8 times its energy; and a step that went
     on where the rod would have turned met states without forces, which it does not come to.
     """
-    limit = sliding_rod_limit(sliding_rod(1.0, method="acceleration"))
-    runs = [sliding_rod((1 - below) * limit, method="acceleration", step=h) for h in (1e-2, 1e-3)]
+    limit = find_rod_limit(slide_rod(1.0, method="acceleration"))
+    runs = [slide_rod((1 - below) * limit, method="acceleration", step=h) for h in (1e-2, 1e-3)]
     for run in runs:
         energy = run.energy
         run.advance(1e-2)
@@ -261,19 +261,19 @@ def test_just_below_painleves_limit_the_tip_stops_at_once(below: float) -> None:
 
 def test_painleve() -> None:
     """Below its limit the sliding rod has forces; above it none, and impulses go on."""
-    limit = sliding_rod_limit(sliding_rod(1.0, method="acceleration"))
+    limit = find_rod_limit(slide_rod(1.0, method="acceleration"))
     assert limit == pytest.approx(4 / 3, rel=1e-6)  # a uniform thin rod at tan t = 2
-    below = sliding_rod(0.99 * limit, method="acceleration")
+    below = slide_rod(0.99 * limit, method="acceleration")
     below.advance(1e-7)
     mass, inertia = below.world.mass[0], below.world.inertia[0]
     x, y = (below.contacts.point - below.positions)[0]
     compliance = 1 / mass + x * x / inertia - 0.99 * limit * x * y / inertia
     assert below.contacts.normal_force[0] == pytest.approx(G / compliance, rel=1e-3)
-    above = sliding_rod(1.01 * limit, method="acceleration")
+    above = slide_rod(1.01 * limit, method="acceleration")
     with pytest.raises(NoSolution, match="Painleve") as error:
         above.advance(1e-3)
     assert "time-stepping" in error.value.remedy
-    impulses = sliding_rod(1.01 * limit, method="time-stepping")
+    impulses = slide_rod(1.01 * limit, method="time-stepping")
     energy = impulses.energy
     impulses.advance(0.05)
     assert impulses.worst_residual < 1e-9
@@ -295,7 +295,7 @@ def test_residual_is_judged(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(integrator, "solve_friction", wrong)
     monkeypatch.setattr(integrator, "try_lasting_forces", lambda *_: None)
-    run = block_on_incline(0.1, 0.5, method="acceleration")
+    run = incline_block(0.1, 0.5, method="acceleration")
     with pytest.raises(NotConverged, match="residual"):
         run.advance(0.01)
 

@@ -7,10 +7,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from rigid_lcp import HalfSpace, Polyhedron, Scene, Simulation, Sphere, box
+from rigid_lcp import HalfSpace, Polyhedron, Scene, Simulation, Sphere, make_box
 from rigid_lcp.arrays import Floats
 from rigid_lcp.scene.simulation import Method
-from rigid_lcp.shapes.rotations import quaternion_of_rotation, rotate
+from rigid_lcp.shapes.rotations import make_quaternion, rotate
 from tests import rigid_motions as motions
 
 G = 9.81
@@ -104,7 +104,11 @@ def test_a_sphere_rolls_in_circles_on_a_turntable(method: Method) -> None:
     spin = [slip[1] / radius, -slip[0] / radius, 0.7]  # w x (0, 0, -R) = slip: it rolls
     scene = Scene(3)
     scene.add(
-        box(4.0, 4.0, 0.2), fixed=True, position=(0, 0, -0.1), spin=(0, 0, turning), friction=0.9
+        make_box(4.0, 4.0, 0.2),
+        fixed=True,
+        position=(0, 0, -0.1),
+        spin=(0, 0, turning),
+        friction=0.9,
     )
     scene.add(Sphere(radius), density=DENSITY, position=x0, velocity=v0, spin=spin, friction=0.9)
     run = Simulation(scene, method, step=h)
@@ -159,9 +163,9 @@ and h = s / sqrt(2):  ``(I + m (h^2 - s^2/4)) w- = (I + m (h^2 + s^2/4)) w+``  (
 
 def tipping_cube(method: str, step: float, seconds: float) -> Simulation:
     """A cube on one corner of an edge that is raised by `TILT`, faces at 45 degrees about it."""
-    turn = quaternion_of_rotation([0.0, TILT, 0.0])
-    level = quaternion_of_rotation([np.pi / 4, 0.0, 0.0])
-    cube = box(SIZE, SIZE, SIZE)
+    turn = make_quaternion([0.0, TILT, 0.0])
+    level = make_quaternion([np.pi / 4, 0.0, 0.0])
+    cube = make_box(SIZE, SIZE, SIZE)
     placed = Polyhedron(rotate(turn, rotate(level, cube.vertices)))
     scene = Scene(3)
     height = -placed.vertices[:, 2].min()

@@ -13,17 +13,17 @@ from rigid_lcp.friction.attempts.smoothed_path import (
     SMOOTHED,
     begin_path,
     choose_other_path,
+    find_smoothed_map,
     find_smoothed_point,
-    smoothed_map,
-    smoothed_path,
+    follow_smoothed,
 )
-from rigid_lcp.friction.linear.factorisation import factorisation
-from rigid_lcp.friction.methods.interior_point import Path, interior_point
+from rigid_lcp.friction.linear.factorisation import choose_factorisation
+from rigid_lcp.friction.methods.interior_point import Path, solve_interior_point
 from rigid_lcp.friction.problem.definition import (
     FrictionProblem,
-    friction_problem,
+    make_problem,
 )
-from validation.bench.rigid.packings import packing, tower
+from validation.bench.rigid.packings import build_packing, build_tower
 
 
 def jordan_root(vector: Floats) -> Floats:
@@ -82,7 +82,7 @@ def hostile(dim: int, seed: int) -> tuple[Floats, Floats, Floats, Floats]:
 def test_the_map_is_its_numpy_twin_and_its_derivatives_are_differences(dim, sigma):
     force, velocity, mu, rho = hostile(dim, 3)
     law = mu, rho, sigma, 0.3
-    found, by_force, by_velocity = smoothed_map(force, velocity, *law)
+    found, by_force, by_velocity = find_smoothed_map(force, velocity, *law)
     plain = plain_map(force, velocity, *law)
     assert np.abs(found - plain).max() < 1e-12 * np.abs(plain).max()
     step = 1e-6  # central differences: error step^2 / sigma^(1/2)^2 of curvature, and 1e-16 / step
@@ -99,21 +99,21 @@ def test_the_map_is_its_numpy_twin_and_its_derivatives_are_differences(dim, sigm
 @pytest.fixture(scope="module")
 def kicked() -> FrictionProblem:
     """A settled bed of 150 spheres, friction 0.1, whose bodies were hit."""
-    still = packing(150, 3, seed=3, friction=0.1)
+    still = build_packing(150, 3, seed=3, friction=0.1)
     assert still.bodies is not None
     hit = np.random.default_rng(3).standard_normal(still.bodies.jacobian.shape[1])
     push = still.bodies.jacobian @ hit
     push *= 0.3 * np.linalg.norm(still.offset) / np.linalg.norm(push)
-    made: FrictionProblem = friction_problem(still.bodies, still.offset + push, still.friction, 3)
+    made: FrictionProblem = make_problem(still.bodies, still.offset + push, still.friction, 3)
     return made
 
 
 @pytest.mark.long
 def test_a_point_lies_inside_the_cones_and_has_sigma_for_its_product(kicked, monkeypatch):
     """``x o s = sigma e``: the product is sigma, and what is beside the axis nothing."""
-    module = sys.modules[smoothed_path.__module__]
+    module = sys.modules[follow_smoothed.__module__]
     monkeypatch.setattr(module, "SMOOTHED", replace(SMOOTHED, found=1e-9))
-    linear = factorisation(kicked)
+    linear = choose_factorisation(kicked)
     force, sigma = begin_path(kicked, linear)
     force, found, _ = find_smoothed_point(kicked, force, sigma, linear, 60)
     assert found
@@ -131,27 +131,27 @@ def test_a_point_lies_inside_the_cones_and_has_sigma_for_its_product(kicked, mon
 
 def test_it_solves_a_bed_on_which_the_interior_point_stops(kicked: FrictionProblem) -> None:
     """Without any other method but Newton's at its end; the residual is the judge."""
-    found = smoothed_path(kicked)
+    found = follow_smoothed(kicked)
     assert found.solved
     assert kicked.residual(found.r) <= 1e-12
-    jammed = interior_point(kicked, None, 1e-10, Path(compliance=1e-4))
+    jammed = solve_interior_point(kicked, None, 1e-10, Path(compliance=1e-4))
     assert jammed.residual > 1e-9
 
 
 def test_a_tower_and_contacts_without_friction_are_solved() -> None:
-    boxes = tower(10, 3)
+    boxes = build_tower(10, 3)
     smooth = boxes.friction.copy()
     smooth[::2] = 0.0
     assert boxes.bodies is not None
     for friction in (boxes.friction, smooth, np.zeros_like(smooth)):
-        problem = friction_problem(boxes.bodies, boxes.offset, friction, 3)
-        assert smoothed_path(problem).residual < 1e-10
+        problem = make_problem(boxes.bodies, boxes.offset, friction, 3)
+        assert follow_smoothed(problem).residual < 1e-10
 
 
 def test_what_has_no_solution_ends_and_says_so() -> None:
     """One contact that nothing can keep from approaching."""
-    problem = friction_problem(np.zeros((3, 3)), [-1.0, 0.0, 0.0], 0.5, 3)
-    assert not smoothed_path(problem).solved
+    problem = make_problem(np.zeros((3, 3)), [-1.0, 0.0, 0.0], 0.5, 3)
+    assert not follow_smoothed(problem).solved
 
 
 def test_other_paths_differ() -> None:

@@ -28,11 +28,11 @@ from rigid_lcp.friction.auto.paths import (
 from rigid_lcp.friction.auto.plan import ALL_PATHS, LAST, run_plan
 from rigid_lcp.friction.auto.solve import solve_auto
 from rigid_lcp.friction.auto.trial import LIMITS, Trial
-from rigid_lcp.friction.linear.factorisation import factorisation
-from rigid_lcp.friction.problem.definition import FrictionProblem, friction_problem
+from rigid_lcp.friction.linear.factorisation import choose_factorisation
+from rigid_lcp.friction.problem.definition import FrictionProblem, make_problem
 from validation.bench.rigid import packings
 from validation.bench.rigid.friction_problems import read_problem
-from validation.bench.rigid.packings import packing
+from validation.bench.rigid.packings import build_packing
 
 FOLDER = Path(os.environ.get("TRACKBED_DATA", "")) / "friction_problems"
 STORED = (
@@ -66,7 +66,7 @@ def test_block_on_a_slope(dim, ratio):
 
 def tower(boxes: int, top: float, dim: int) -> tuple[BodySpace, np.ndarray]:
     """Unit boxes on each other, contacts at the corners of each face, under gravity 1."""
-    made = packings.tower(boxes, dim, top_mass=top, step=1.0 / packings.GRAVITY)
+    made = packings.build_tower(boxes, dim, top_mass=top, step=1.0 / packings.GRAVITY)
     return made.bodies, made.offset
 
 
@@ -157,7 +157,7 @@ def test_a_warm_start_costs_less_and_a_wrong_one_does_no_harm():
 def test_low_friction_is_reached_along_the_convex_path_bent_to_coulombs():
     """At friction .1 much of a bed slides: the convex answer is wrong by 1e-3 and Newton fails from
     there; the same path with the term |u_T| ends at Coulomb's law, without a sweep."""
-    problem = packing(60, 2, seed=3, friction=0.1)
+    problem = build_packing(60, 2, seed=3, friction=0.1)
     found = solve_auto(problem)
     assert found.solved
     assert found.method == "interior-point + newton"
@@ -169,7 +169,7 @@ def random_problem(contacts: int, rank: int, friction: float, seed: int) -> Fric
     """W = B B^T of low rank, q at random: with q out of its image there may be no solution."""
     g = np.random.default_rng(seed)
     b = g.standard_normal((3 * contacts, rank))
-    return friction_problem(b @ b.T, g.standard_normal(3 * contacts), friction, 3)
+    return make_problem(b @ b.T, g.standard_normal(3 * contacts), friction, 3)
 
 
 @pytest.mark.parametrize("ratio", [1e12, 1e15, 1e18])
@@ -184,7 +184,7 @@ def test_an_exact_answer_is_solved_whatever_bodies_weigh_beside_others(ratio):
 @pytest.fixture(scope="module")
 def still() -> FrictionProblem:
     """120 spheres at rest, friction .1."""
-    return packing(120, 3, seed=0, friction=0.1)
+    return build_packing(120, 3, seed=0, friction=0.1)
 
 
 @pytest.fixture(scope="module")
@@ -205,11 +205,11 @@ def jammed(monkeypatch) -> None:
 def test_the_sharp_path_solves_in_few_steps_what_the_smoothed_one_leaves(monkeypatch):
     """The one ends at Coulomb's law within 40 factorisations, the other has not after 150: what the
     order of the two rests on."""
-    problem = packing(60, 3, seed=1, friction=0.3)
+    problem = build_packing(60, 3, seed=1, friction=0.3)
     path = Trial(problem, None, 1e-12)
     assert not follow_convex_path(path)
     sharp, smoothed = (Trial(problem, None, 1e-12) for _ in range(2))
-    smoothed.linear = sharp.linear = factorisation(problem)
+    smoothed.linear = sharp.linear = choose_factorisation(problem)
     assert follow_sharp_path(sharp)
     assert problem.residual(sharp.best.r) <= 1e-12
     assert sharp.work["factorisations"] <= 40

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rigid_lcp import Disc, HalfSpace, Polygon, Scene, Simulation
-from rigid_lcp.contact.arrays import contact_frames
+from rigid_lcp.contact.arrays import build_frames
 from rigid_lcp.errors import NotConverged
 from rigid_lcp.scene import simulation
 from rigid_lcp.scene.simulation import Method
@@ -19,10 +19,10 @@ from tests.rigid_motions import (
 )
 from validation.bench.rigid.scenes import (
     G,
-    block_on_incline,
-    bouncing_disc,
-    disc_on_incline,
-    poured,
+    drop_disc,
+    fill_trough,
+    incline_block,
+    incline_disc,
     stack,
 )
 
@@ -46,7 +46,7 @@ def test_free_flight_is_exact() -> None:
 def test_disc_rolls_or_slides(mu: float, method: Method) -> None:
     """``2/3 g sin`` or ``g (sin - mu cos)``: constant accelerations, so exact at any step."""
     slope = radians(20)
-    run = disc_on_incline(slope, mu, method=method, step=2e-3)
+    run = incline_disc(slope, mu, method=method, step=2e-3)
     run.advance(0.1)
     expected = disc_on_incline_acceleration(slope, mu)
     assert run.velocities[0, 0] == pytest.approx(expected * 0.1, rel=1e-11)
@@ -60,7 +60,7 @@ def test_disc_rolls_or_slides(mu: float, method: Method) -> None:
 @pytest.mark.long
 def test_block_slides_to_rest() -> None:
     """It stops after ``v^2 / (2 mu g)``, to first order: within half a step's way at the end."""
-    run = block_on_incline(0.0, 0.5, step=1e-3)
+    run = incline_block(0.0, 0.5, step=1e-3)
     run.motion.velocity[0, 0] = 1.0
     run.advance(0.3)
     assert run.positions[0, 0] == pytest.approx(1 / G, abs=0.5 * (0.5 * G * 1e-3) * 1e-3)
@@ -72,7 +72,7 @@ def test_zeno_bounce() -> None:
     """It has stopped by ``sqrt(2h/g) (1+e)/(1-e)``, up to the steps that hold several bounces."""
     errors = []
     for step in (4e-3, 5e-4):
-        run = bouncing_disc(0.1, 0.5, step=step)
+        run = drop_disc(0.1, 0.5, step=step)
         seconds = bouncing_time(0.1, 0.5)
         while np.abs(run.velocities[0, 1]) > 1e-9 or run.positions[0, 1] > 0.1 + 1e-9:
             run.advance(step)
@@ -85,7 +85,7 @@ def test_zeno_bounce() -> None:
 @pytest.mark.long
 def test_energy_of_many_bounces() -> None:
     """Restitution 1: a bounce keeps the energy to round-off, whatever the step."""
-    run = bouncing_disc(0.02, 1.0, step=3e-3)
+    run = drop_disc(0.02, 1.0, step=3e-3)
     energy, bounces, falling = run.energy, 0, True
     for _ in range(4500):
         run.advance(3e-3)
@@ -142,13 +142,13 @@ def test_forces_are_in_balance() -> None:
     weight = run.world.mass[:5] * G
     np.testing.assert_allclose(total[:5, 1], weight, rtol=1e-9)
     np.testing.assert_allclose(total[:5, 0], 0, atol=1e-9 * weight.max())
-    assert contact_frames(contacts.normal).shape == (10, 2, 2)
+    assert build_frames(contacts.normal).shape == (10, 2, 2)
 
 
 @pytest.mark.long
 def test_poured_grains_come_to_rest() -> None:
     """A small heap loses its energy, and its overlaps stay below 1e-4 of a grain."""
-    run = poured(12, step=2e-3)
+    run = fill_trough(12, step=2e-3)
     run.advance(0.5)
     assert np.abs(run.velocities).max() < 0.05 * sqrt(G * 0.02)
     assert run.overlap < 1e-4 * run.world.length
@@ -158,7 +158,7 @@ def test_poured_grains_come_to_rest() -> None:
 def test_no_overlap_is_left_after_a_step() -> None:
     """Grains that are poured turn, and are hit, faster than a step foresees: with steps of 4 ms the
     geometry at its end is what counts.  A projection is exact to 1e-9 of the forces it takes."""
-    run = poured(12, seed=5)
+    run = fill_trough(12, seed=5)
     for _ in range(40):
         run.advance(4e-3)
         assert run.overlap < 1e-8 * run.world.length

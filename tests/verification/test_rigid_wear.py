@@ -10,18 +10,28 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_lcp import Disc, HalfSpace, Polygon, Polyhedron, Scene, Simulation, Sphere, Wear, box
+from rigid_lcp import (
+    Disc,
+    HalfSpace,
+    Polygon,
+    Polyhedron,
+    Scene,
+    Simulation,
+    Sphere,
+    Wear,
+    make_box,
+)
 from rigid_lcp.errors import SceneError, ShapeError, UsageError
 from rigid_lcp.motion import make_world
-from rigid_lcp.shapes import quaternion_of_rotation, quaternion_product
+from rigid_lcp.shapes import make_quaternion, multiply_quaternions
 from rigid_lcp.wear.abrasion import (
-    energy_of,
+    find_energy,
     find_slip_work,
     replace_worn,
     rub_grains,
     start_wear,
 )
-from rigid_lcp.wear.cuts import cut_depth, find_volume, rub_corners, unworn, wear_shape
+from rigid_lcp.wear.cuts import find_cut_depth, find_volume, make_unworn, rub_corners, wear_shape
 from tests.rigid_solids import CUBE, ballast_stone, contacts
 
 GRAVITY = 9.81
@@ -36,7 +46,7 @@ def slope(dim, angle=0.5, friction=0.3, length=1.0, mass=1.0, **options) -> Simu
     scene = Scene(dim, [g * np.sin(angle), *[0.0] * (dim - 2), -g * np.cos(angle)])
     scene.add(HalfSpace([0.0] * (dim - 1) + [1.0]), friction=friction)
     sides = [0.2 * length, *[0.1 * length] * (dim - 1)]
-    block = Polygon.rectangle(*sides) if dim == 2 else box(*sides)
+    block = Polygon.rectangle(*sides) if dim == 2 else make_box(*sides)
     place = [0.0] * (dim - 1) + [0.05 * length]
     scene.add(block, density=2700.0 * mass / length**dim, position=place)
     return Simulation(scene, **options)
@@ -144,7 +154,7 @@ def test_what_stays_keeps_every_points_velocity(dim):
     assert body.mass == pytest.approx(2 * 0.96, rel=1e-13)
     assert after.mass == pytest.approx(0.08, rel=1e-12)
     assert after.energy == pytest.approx(
-        energy_of(scene.bodies[0], scene.gravity) - energy_of(body, scene.gravity)
+        find_energy(scene.bodies[0], scene.gravity) - find_energy(body, scene.gravity)
     )
     assert after.energy > 0
     way = wear_shape(state.grains[0])[1]
@@ -154,8 +164,8 @@ def test_what_stays_keeps_every_points_velocity(dim):
 def test_crossing_edges_share_the_wear_and_become_chamfers():
     """A cube's edge across another's: each loses half, along the whole edge, ``V = l t^2 2 / 2`` of
     a right-angled edge to the depth t of the chamfer."""
-    lower = quaternion_of_rotation([np.pi / 4, 0.0, 0.0])
-    upper = quaternion_product(quaternion_of_rotation([0.0, 0.0, np.pi / 2]), lower)
+    lower = make_quaternion([np.pi / 4, 0.0, 0.0])
+    upper = multiply_quaternions(make_quaternion([0.0, 0.0, np.pi / 2]), lower)
     scene = Scene(3, [0, 0, 0])
     for turn, high in ((lower, 0.0), (upper, 2**0.5)):
         scene.add(CUBE, density=1.0, position=[0, 0, high], angle=turn)
@@ -175,14 +185,14 @@ def test_crossing_edges_share_the_wear_and_become_chamfers():
 def test_chamfer_by_chamfer_is_one_chamfer_of_the_sum(shape):
     """Wear in ten parts, at any corner (or edge) of the chamfer, is wear at once."""
     corner = np.array([int(np.argmax(shape.vertices.sum(axis=1)))])
-    grain, where = unworn(shape), corner
+    grain, where = make_unworn(shape), corner
     for k in range(10):
         grain, _ = wear_shape(rub_corners(grain, where, 1e-3))
         height = grain.shape.vertices @ grain.normal[0]
         on = np.flatnonzero(height > height.max() - 1e-9)
         where = on[: 1 + k % 2] if shape.dim == 3 else on[k % 2 :][:1]
     assert len(grain.normal) == 1
-    once, _ = wear_shape(rub_corners(unworn(shape), corner, 1e-2))
+    once, _ = wear_shape(rub_corners(make_unworn(shape), corner, 1e-2))
     assert find_volume(grain.shape) == pytest.approx(0.99, rel=1e-13)
     assert np.sort(grain.shape.vertices, axis=0) == pytest.approx(
         np.sort(once.shape.vertices, axis=0), abs=1e-12
@@ -197,7 +207,7 @@ def test_depth_of_a_cut_in_closed_form(share):
         Polygon([[-1, 0], [1, 0], [0.3, 2.0]]),
         Polyhedron([[0, 0, 2.0], [1, 0, 0], [-0.5, 0.9, 0], [-0.5, -0.9, 0]]),
     ):
-        depth = cut_depth(tip, np.eye(tip.dim)[-1], share * find_volume(tip))
+        depth = find_cut_depth(tip, np.eye(tip.dim)[-1], share * find_volume(tip))
         assert (depth / 2.0) ** tip.dim == pytest.approx(share, rel=1e-13, abs=1e-15)  # round-off
 
 
@@ -210,7 +220,7 @@ def make_shape(form: str, rng: np.random.Generator):
         "needle": lambda: NEEDLE,
         "sliver": lambda: SLIVER,
         "tetrahedron": lambda: Polyhedron(rng.normal(size=(4, 3))),
-        "plate": lambda: box(1.0, 0.7, 1e-3),
+        "plate": lambda: make_box(1.0, 0.7, 1e-3),
     }[form]()
 
 
@@ -231,7 +241,7 @@ def test_worn_shapes_lose_exactly_what_they_shall(form, seed, share):
     rng = np.random.default_rng(seed)
     shape = make_shape(form, rng)
     whole = find_volume(shape)
-    grain, place, asked = unworn(shape), np.zeros(shape.dim), 0.0
+    grain, place, asked = make_unworn(shape), np.zeros(shape.dim), 0.0
     for _ in range(3):
         for _ in range(4):
             ends = grain.shape.edges[rng.integers(len(grain.shape.edges)), :2]
@@ -256,13 +266,13 @@ def test_worn_shapes_lose_exactly_what_they_shall(form, seed, share):
 def test_wear_too_small_to_cut_waits_and_too_much_is_refused(shape):
     """One corner worn by 0.01, another by 1e-20 of the volume: such a chamfer is no edge."""
     first, other = np.array([0]), np.array([2])
-    assert wear_shape(rub_corners(unworn(shape), first, 1e-18)) is None
-    grain = rub_corners(rub_corners(unworn(shape), first, 0.01), other, 1e-20)
+    assert wear_shape(rub_corners(make_unworn(shape), first, 1e-18)) is None
+    grain = rub_corners(rub_corners(make_unworn(shape), first, 0.01), other, 1e-20)
     made, _ = wear_shape(grain)
     assert len(made.shape.faces) == len(shape.faces) + 1
     assert made.pending[1] == 1e-20
     with pytest.raises(ShapeError, match="cut more often"):
-        wear_shape(rub_corners(unworn(shape), first, 0.6))
+        wear_shape(rub_corners(make_unworn(shape), first, 0.6))
     with pytest.raises(ShapeError, match=r"^wear of \S.* at 0\.\d+ s: .*\n.*cut more often"):
         slope(shape.dim, step=1e-2, wear=Wear(1.0, every=5)).advance(0.5)
 

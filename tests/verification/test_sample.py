@@ -17,18 +17,18 @@ from adapters.bed.overlaps import find_pairs_within
 from adapters.bed.radii import (
     PAPER_RELATIVE_DENSITY,
     RadiusDistribution,
+    draw_radii,
     expect_grain_count,
-    sample_radii,
 )
 from adapters.bed.sample import (
     GRAVITY,
-    coordination_number,
     draw_sample_start,
     find_sample_mass,
     measure_bed_height,
+    measure_coordination,
+    measure_relative_density,
     measure_sample,
     measure_volume_below,
-    relative_density,
 )
 from adapters.bed.state import Contacts, FloatArray, State, make_no_contacts
 from adapters.errors import NotConverged, SceneError
@@ -68,7 +68,7 @@ def test_radii_follow_their_law(law: RadiusDistribution) -> None:
 
     The mean volume is within five standard errors of the sample.
     """
-    radius = sample_radii(law, 20_000, seed=3)
+    radius = draw_radii(law, 20_000, seed=3)
     assert law.smallest <= radius.min()
     assert radius.max() <= law.greatest
     cut = law.truncation
@@ -94,9 +94,9 @@ def test_mean_volume_is_the_integral(mean: float, relative: float, truncation: f
 
 def test_radii_are_reproducible() -> None:
     """The same seed gives the same radii, another seed others; constant radii are the mean."""
-    assert np.array_equal(sample_radii(TABLE_1, 99, 1), sample_radii(TABLE_1, 99, 1))
-    assert not np.array_equal(sample_radii(TABLE_1, 99, 1), sample_radii(TABLE_1, 99, 2))
-    assert sample_radii(RadiusDistribution("constant", 2e-3), 3, 1).tolist() == [2e-3] * 3
+    assert np.array_equal(draw_radii(TABLE_1, 99, 1), draw_radii(TABLE_1, 99, 1))
+    assert not np.array_equal(draw_radii(TABLE_1, 99, 1), draw_radii(TABLE_1, 99, 2))
+    assert draw_radii(RadiusDistribution("constant", 2e-3), 3, 1).tolist() == [2e-3] * 3
 
 
 def test_table_1_does_not_give_the_papers_weight() -> None:
@@ -132,7 +132,7 @@ def test_start_is_inside_and_without_overlap(
     Walls as the engine gets them, with a lid at the height the start reports.
     """
     law = RadiusDistribution("uniform", 3e-3, spread * 3e-3)
-    radius = sample_radii(law, count, seed)
+    radius = draw_radii(law, count, seed)
     position, height = draw_sample_start(radius, container, density, seed)
     for i, j in find_pairs_within(position, radius, 0.0):
         raise AssertionError(f"grains {i} and {j} overlap")
@@ -141,7 +141,7 @@ def test_start_is_inside_and_without_overlap(
         assert ((position - point) @ normal >= radius * (1 - 1e-9)).all()
     axis_distance = np.hypot(position[:, 0], position[:, 1])
     assert (axis_distance + radius <= walls.cylinder_radius * (1 + 1e-9)).all()
-    filled = relative_density(position, radius, container, height)
+    filled = measure_relative_density(position, radius, container, height)
     assert filled <= density * (1 + 1e-12)
     if height > 4 * radius.max():
         assert filled == pytest.approx(density, rel=1e-12)
@@ -191,16 +191,18 @@ def test_grains_as_wide_as_the_container(container: Container, fits: float) -> N
 def test_start_at_the_densest_a_scene_allows() -> None:
     """Relative density 0.15 is reached with radii spread by a factor of ten."""
     law = RadiusDistribution("uniform", 3e-3, 0.47 * 3e-3)
-    radius = sample_radii(law, 1000, 2)
+    radius = draw_radii(law, 1000, 2)
     position, height = draw_sample_start(radius, QUARTER, 0.15, 2)
     assert len(find_pairs_within(position, radius, 0.0)) == 0
-    assert relative_density(position, radius, QUARTER, height) == pytest.approx(0.15, rel=1e-12)
+    assert measure_relative_density(position, radius, QUARTER, height) == pytest.approx(
+        0.15, rel=1e-12
+    )
 
 
 def test_start_that_is_too_dense_is_refused() -> None:
     """Random addition can not reach a packed bed, and says so with a remedy."""
     with pytest.raises(NotConverged, match="start looser"):
-        draw_sample_start(sample_radii(TABLE_1, 200, 1), QUARTER, 0.5, 1)
+        draw_sample_start(draw_radii(TABLE_1, 200, 1), QUARTER, 0.5, 1)
 
 
 # ---------------------------------------------------------------------------------- volumes
@@ -221,7 +223,7 @@ def test_cap_is_the_integral_of_discs(height: float, centre: float, radius: floa
 def test_relative_density_is_monte_carlo(seed: int, low: float, thickness: float) -> None:
     """Density of a layer = share of random points inside grains, within five standard errors."""
     container = Container("cylinder", ("x", "y"), radius=0.04)
-    radius = sample_radii(TABLE_1, 60, seed)
+    radius = draw_radii(TABLE_1, 60, seed)
     position, height = draw_sample_start(radius, container, 0.1, seed)
     bottom, top = low * height, (low + thickness) * height
     generator = np.random.default_rng(seed)
@@ -230,7 +232,7 @@ def test_relative_density_is_monte_carlo(seed: int, low: float, thickness: float
     inside = np.zeros(len(point), bool)
     for centre, r in zip(position, radius, strict=True):
         inside |= np.sum((point - centre) ** 2, axis=1) < r * r
-    exact = relative_density(position, radius, container, top, bottom)
+    exact = measure_relative_density(position, radius, container, top, bottom)
     error = sqrt(max(exact * (1 - exact), 1 / len(point)) / len(point))
     assert abs(inside.mean() - exact) < 5 * error
 
@@ -245,9 +247,11 @@ def test_cubic_lattice() -> None:
     position, box = cubic_lattice((3, 4, 5)), Container("box", size_x=3, size_y=4)
     radius = np.full(len(position), 0.5)
     for top in (1.0, 2.5, 5.0):
-        assert relative_density(position, radius, box, top) == pytest.approx(pi / 6, rel=1e-14)
+        assert measure_relative_density(position, radius, box, top) == pytest.approx(
+            pi / 6, rel=1e-14
+        )
     for bottom, top in ((0.5, 1.0), (1.0, 2.5), (2.5, 5.0)):
-        layer = relative_density(position, radius, box, top, bottom)
+        layer = measure_relative_density(position, radius, box, top, bottom)
         assert layer == pytest.approx(pi / 6, rel=1e-13)
     assert measure_bed_height(position, radius) == pytest.approx(5.0, rel=1e-14)
 
@@ -261,7 +265,7 @@ def test_coordination_of_a_cubic_lattice() -> None:
     pair = find_pairs_within(position, np.full(27, 0.5), 1e-9) + 1
     floor = np.zeros((27, 3))
     floor[position[:, 2] < 1, 2] = 2.5
-    found = coordination_number(
+    found = measure_coordination(
         contacts_between(pair.tolist()), np.arange(1, 28), {"floor": floor, "cylinder": 0 * floor}
     )
     assert found.grains == pytest.approx(4.0)
@@ -274,12 +278,12 @@ def test_rattlers_do_not_count_as_carrying() -> None:
     """Grains of one contact or none are rattlers; identifiers may have gaps."""
     identifier = np.array([2, 5, 7, 11, 40])
     contacts = contacts_between([(2, 5), (5, 7), (2, 7), (7, 11)])
-    found = coordination_number(contacts, identifier, {})
+    found = measure_coordination(contacts, identifier, {})
     assert found.grains == pytest.approx(8 / 5)
     assert found.with_walls == found.grains
     assert found.without_rattlers == pytest.approx((2 + 2 + 3) / 3)
     assert found.rattler_share == pytest.approx(2 / 5)
-    gas = coordination_number(make_no_contacts(), np.arange(4), {})
+    gas = measure_coordination(make_no_contacts(), np.arange(4), {})
     assert (gas.grains, gas.with_walls, gas.without_rattlers, gas.rattler_share) == (0, 0, 0, 1)
 
 

@@ -49,7 +49,7 @@ MINUS, TIMES, UNKNOWN = "\N{MINUS SIGN}", "\N{MULTIPLICATION SIGN}", "\N{EN DASH
 """Signs as in print, and what stands for a number that is not known."""
 
 
-def page(title: str, body: Iterable[str]) -> str:
+def make_page(title: str, body: Iterable[str]) -> str:
     """A whole page; the policy in its head forbids it to load anything."""
     policy = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
     return "\n".join(
@@ -72,7 +72,7 @@ def page(title: str, body: Iterable[str]) -> str:
     )
 
 
-def number(value: float | None, text: str) -> str:
+def mark_number(value: float | None, text: str) -> str:
     """A number as ``text``, its full value beside it for machines; a dash when not known."""
     if value is None or not isfinite(value):
         return UNKNOWN
@@ -89,44 +89,44 @@ def _typeset(text: str) -> str:
     return mantissa + exponent + power
 
 
-def micrometres(value: float, form: str = ".1f") -> str:
+def format_um(value: float, form: str = ".1f") -> str:
     """A length in m, shown in micrometres without the unit."""
-    return number(value, f"{1e6 * value:{form}}")
+    return mark_number(value, f"{1e6 * value:{form}}")
 
 
-def per_cent(value: float, form: str = "+.1f") -> str:
+def format_share(value: float, form: str = "+.1f") -> str:
     """A share of one, shown in per cent with its sign."""
-    return number(value, f"{100 * value:{form}} %")
+    return mark_number(value, f"{100 * value:{form}} %")
 
 
-def plain(value: float, form: str) -> str:
+def format_number(value: float, form: str) -> str:
     """Any number in a format."""
-    return number(value, f"{value:{form}}")
+    return mark_number(value, f"{value:{form}}")
 
 
-def verdict(ok: bool | None) -> str:
+def format_verdict(ok: bool | None) -> str:
     """Whether a bar is met."""
     if ok is None:
         return UNKNOWN
     return '<span class="yes">met</span>' if ok else '<span class="no">missed</span>'
 
 
-def section(title: str, *parts: str) -> str:
+def make_section(title: str, *parts: str) -> str:
     """A heading and what stands below it."""
     return "\n".join([f"<h2>{escape(title)}</h2>", *parts])
 
 
-def paragraph(text: str, kind: str = "") -> str:
+def make_paragraph(text: str, kind: str = "") -> str:
     """A paragraph of HTML ``text``."""
     return f'<p class="{kind}">{text}</p>' if kind else f"<p>{text}</p>"
 
 
-def bullets(items: Iterable[str]) -> str:
+def make_list(items: Iterable[str]) -> str:
     """A list of HTML items."""
     return "<ul>" + "".join(f"<li>{item}</li>" for item in items) + "</ul>"
 
 
-def table(
+def make_table(
     caption: str, header: Sequence[str], rows: Iterable[Sequence[str]], marked: str = "",
     words: frozenset[int] = frozenset(),
 ) -> str:  # fmt: skip
@@ -155,7 +155,7 @@ def table(
     return "\n".join(lines)
 
 
-def picture(path: Path | None, description: str, caption: str) -> str:
+def make_picture(path: Path | None, description: str, caption: str) -> str:
     """The image file ``path`` inside the page; nothing for None."""
     if path is None:
         return ""
@@ -167,6 +167,6 @@ def picture(path: Path | None, description: str, caption: str) -> str:
     )
 
 
-def folded(summary: str, content: str) -> str:
+def make_folded(summary: str, content: str) -> str:
     """Content that opens on a click."""
     return f"<details><summary>{escape(summary)}</summary>{content}</details>"

@@ -133,7 +133,7 @@ class RunFolder:
         return read_object(self.path / RESULT) or None
 
     @contextmanager
-    def locked(self) -> Iterator[None]:
+    def lock(self) -> Iterator[None]:
         """Hold the lock of the folder's only writer; see `lock_folder`."""
         with lock_folder(self.path) as self._lock:
             try:
@@ -155,7 +155,9 @@ class RunFolder:
                 remedy="leave the folder of a run alone; start it again",
             )  # fmt: skip
 
-    def settle(self, manifest: Mapping[str, Any], scene: str, *, resume: bool, force: bool) -> bool:
+    def prepare(
+        self, manifest: Mapping[str, Any], scene: str, *, resume: bool, force: bool
+    ) -> bool:
         """Make the folder ready for a run of ``manifest``; whether a run that is there goes on.
 
         An empty folder is taken.  One with another scene's run, a finished run, or an unfinished

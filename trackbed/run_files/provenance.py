@@ -34,16 +34,16 @@ def find_commit() -> str:
     """Commit of the checkout this file lies in, "-modified" when it differs; else ""."""
     here = Path(__file__).resolve()
 
-    def git(*words: str) -> str:
+    def run_git(*words: str) -> str:
         return subprocess.run(
             ["git", "-C", str(here.parent), *words],
             capture_output=True, text=True, check=True, stdin=subprocess.DEVNULL,
         ).stdout.strip()  # fmt: skip
 
     try:
-        git("ls-files", "--error-unmatch", here.name)  # installed inside a stranger's checkout?
-        modified = git("status", "--porcelain", "--untracked-files=no")
-        return git("rev-parse", "HEAD") + ("-modified" if modified else "")
+        run_git("ls-files", "--error-unmatch", here.name)  # installed inside a stranger's checkout?
+        modified = run_git("status", "--porcelain", "--untracked-files=no")
+        return run_git("rev-parse", "HEAD") + ("-modified" if modified else "")
     except (OSError, subprocess.CalledProcessError):
         return ""
 

@@ -27,14 +27,14 @@ def handle_signals(
         for number, old in before.items():
             signal.signal(number, signal.SIG_DFL if old is None else old)
 
-    def hear(number: int, _frame: object) -> None:
+    def call_handler(number: int, _frame: object) -> None:
         if once:
             restore()
         handler(signal.Signals(number))
 
     with suppress(ValueError):  # not in the main thread
         for number in (signal.SIGTERM, signal.SIGINT):
-            before[number] = signal.signal(number, hear)
+            before[number] = signal.signal(number, call_handler)
     try:
         yield
     finally:

@@ -20,10 +20,10 @@ NO_FOLDER = (EEXIST, ENOTDIR)
 def open_unlinked(path: Path, mode: str) -> IO[Any]:
     """Open a file as `open` does, but raise `OSError` (ELOOP) where ``path`` is a symbolic link."""
 
-    def opener(name: str, flags: int) -> int:
+    def open_descriptor(name: str, flags: int) -> int:
         return os.open(name, flags | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666)
 
-    return open(path, mode, encoding=None if "b" in mode else "utf-8", opener=opener)
+    return open(path, mode, encoding=None if "b" in mode else "utf-8", opener=open_descriptor)
 
 
 @contextmanager

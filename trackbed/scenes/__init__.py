@@ -8,7 +8,7 @@ from pathlib import Path
 
 from trackbed.run_verbs import KINDS
 
-__all__ = ["find_scene_verb", "list_scenes", "read_template", "scene_path"]
+__all__ = ["find_scene_file", "find_scene_verb", "list_scenes", "read_template"]
 
 
 def list_scenes() -> tuple[str, ...]:
@@ -24,7 +24,7 @@ def read_template(name: str) -> str:
     return (files(__name__) / f"{name}.toml").read_text(encoding="utf-8")
 
 
-def scene_path(name: str) -> Path:
+def find_scene_file(name: str) -> Path:
     """File of the scene ``name``."""
     return Path(str(files(__name__) / f"{name}.toml"))
 

@@ -37,18 +37,18 @@ def run(quick: bool) -> list[Check]:
     grains, repeats = (20_000, 5) if quick else (100_000, 7)
     checks = []
     with tempfile.TemporaryDirectory() as folder:
-        first = first_call_seconds(Path(folder))
+        first = time_first_call(Path(folder))
         checks.append(Check("first call, compilation included", first, "<= 10", first <= 10, "s"))
         for digits, reason in ((6, "the engine's default"), (17, "without loss")):
             path = Path(folder) / f"digits{digits}.dump"
-            coordinate = dump_write_realistic(path, grains, digits)
+            coordinate = write_dump(path, grains, digits)
             megabytes = path.stat().st_size / 1e6
-            ours = cpu_seconds("trackbed", path, repeats, coordinate, digits)
+            ours = measure_reader("trackbed", path, repeats, coordinate, digits)
             speed = megabytes / ours
             name = f"reading speed, {digits} digits ({reason}), {megabytes:.0f} MB"
             checks.append(Check(name, speed, ">= 60", speed >= 60, "MB/s"))
             peers = {
-                peer: cpu_seconds(peer, path, repeats, coordinate, digits) / ours
+                peer: measure_reader(peer, path, repeats, coordinate, digits) / ours
                 for peer in READERS
                 if peer != "trackbed"
             }
@@ -61,7 +61,7 @@ def run(quick: bool) -> list[Check]:
     return checks
 
 
-def dump_write_realistic(path: Path, grains: int, digits: int) -> np.ndarray:
+def write_dump(path: Path, grains: int, digits: int) -> np.ndarray:
     """Write the dump; returns x of the last frame in order of identifiers [m], shape (n,)."""
     random = np.random.default_rng(2007)
     scale = np.array([1, 1, 0.05, 0.05, 0.05, 0.01, 0.01, 0.01, 1, 1, 1, 3e-4])
@@ -78,14 +78,14 @@ def dump_write_realistic(path: Path, grains: int, digits: int) -> np.ndarray:
     return values[np.argsort(values[:, 0]), 2]
 
 
-def cpu_seconds(
+def measure_reader(
     reader: str, path: Path, repeats: int, coordinate: np.ndarray, digits: int
 ) -> float:
     """Median CPU time [s] of a reader in a process of its own; nan when it is not installed."""
     result = path.with_suffix(".npy")
     for python in (sys.executable, os.environ.get("TRACKBED_PEER_PYTHON", sys.executable)):
         command = [python, __file__, reader, str(path), str(repeats), str(result)]
-        process = subprocess.run(command, env=environment(), capture_output=True, text=True)
+        process = subprocess.run(command, env=make_environment(), capture_output=True, text=True)
         if process.returncode != MISSING:
             break
     else:
@@ -97,21 +97,21 @@ def cpu_seconds(
     return float(np.median(json.loads(process.stdout)))
 
 
-def first_call_seconds(folder: Path) -> float:
+def time_first_call(folder: Path) -> float:
     """CPU time [s] to read a dump of one grain in a new process with nothing compiled before."""
     path = folder / "one.dump"
-    dump_write_realistic(path, 1, 6)
+    write_dump(path, 1, 6)
     command = [sys.executable, __file__, "trackbed", str(path), "0", str(folder / "one.npy")]
     before = os.times()
     cache = {"NUMBA_CACHE_DIR": str(folder / "cache")}
-    subprocess.run(command, env=environment() | cache, check=True, capture_output=True)
+    subprocess.run(command, env=make_environment() | cache, check=True, capture_output=True)
     after = os.times()
     return (after.children_user + after.children_system) - (
         before.children_user + before.children_system
     )
 
 
-def environment() -> dict[str, str]:
+def make_environment() -> dict[str, str]:
     """One thread for every reader, and this package on the path."""
     names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OVITO_THREAD_COUNT")
     root = str(Path(__file__).resolve().parents[2])
@@ -175,7 +175,7 @@ READERS = {
 }
 
 
-def timed(reader: str, path: str, repeats: int, result: str) -> int:
+def time_reads(reader: str, path: str, repeats: int, result: str) -> int:
     """What the timed process does: print its CPU times [s], save the coordinates it read."""
     try:
         coordinate = READERS[reader](path)
@@ -192,4 +192,4 @@ def timed(reader: str, path: str, repeats: int, result: str) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(timed(sys.argv[1], sys.argv[2], int(sys.argv[3]), sys.argv[4]))
+    sys.exit(time_reads(sys.argv[1], sys.argv[2], int(sys.argv[3]), sys.argv[4]))

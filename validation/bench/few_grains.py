@@ -19,7 +19,7 @@ from adapters.files.dump_reader import read_frames
 from adapters.files.window import read_contacts
 from adapters.scene.file import load_scene
 from adapters.scene.tables import Scene
-from trackbed.scenes import scene_path
+from trackbed.scenes import find_scene_file
 
 RADIUS = 3.2e-3
 """Radius of every grain here [m], the mean of Table 1."""
@@ -64,27 +64,27 @@ class Track:
     """Contacts between grains at each instant."""
 
 
-def table_1(*overrides: str) -> Scene:
+def load_table_1(*overrides: str) -> Scene:
     """Grains, walls and contact law of the paper's Table 1 (``karrech.toml``), changed."""
-    return load_scene(scene_path("karrech"), overrides)
+    return load_scene(find_scene_file("karrech"), overrides)
 
 
-def grain_mass(scene: Scene) -> float:
+def find_grain_mass(scene: Scene) -> float:
     """Mass of a grain [kg]."""
     return 4 / 3 * pi * scene.material.grain.density * RADIUS**3
 
 
-def shear_modulus(scene: Scene) -> float:
+def find_shear_modulus(scene: Scene) -> float:
     """G* of two grains [Pa]."""
     grain = (scene.material.grain.young, scene.material.grain.poisson)
-    return contact_law.equivalent_shear_modulus(*grain, *grain)
+    return contact_law.combine_shear_moduli(*grain, *grain)
 
 
 TrackRun = Callable[..., Track]
 """Runs a few grains on an engine, with the arguments of `track_run`, which does on LIGGGHTS."""
 
 
-def track_run(
+def run_grains(
     scene: Scene, position: FloatArray, velocity: FloatArray, motion: Sequence[str], *,
     time_step: float, every: int = 1, materials: Callable[[str], str] = str,
 ) -> Track:  # fmt: skip
@@ -144,7 +144,7 @@ def mirror_tangential(scene_part: str) -> str:
     return scene_part.replace("wall/gran model hertz ", "wall/gran model ${contact_model} ")
 
 
-def head_on(
+def collide(
     scene: Scene,
     speed: float,
     *,
@@ -152,14 +152,14 @@ def head_on(
     mirror: bool = False,
     slide: float = 0.0,
     materials: Callable[[str], str] = str,
-    run: TrackRun = track_run,
+    run: TrackRun = run_grains,
 ) -> tuple[Collision, Track]:
     """Two grains that meet at ``speed`` [m/s], or one and its image in the mirror plane x = 0.
 
     ``steps`` in the time of an undamped contact; ``slide`` [m/s] is a velocity of both along z.
     """
-    mass = grain_mass(scene) / 2
-    undamped = contact_law.hertz_collision(speed, scene.stiffness.grain, RADIUS / 2, mass)
+    mass = find_grain_mass(scene) / 2
+    undamped = contact_law.solve_hertz_collision(speed, scene.stiffness.grain, RADIUS / 2, mass)
     time_step = undamped.contact_time / steps
     gap = 2.25 * speed * time_step  # small, and no whole number of steps
     middle = np.array([0.0 if mirror else PLACE[0], *PLACE[1:]])
@@ -186,14 +186,14 @@ def head_on(
     return Collision(rebound / speed, float(overlap.max()), ends[1] - ends[0]), track
 
 
-def driven_contact(
+def drive_contact(
     scene: Scene,
     overlap: FloatArray,
     displacement: FloatArray,
     *,
     speed: float = 1e-3,
     steps: int = 1000,
-    run: TrackRun = track_run,
+    run: TrackRun = run_grains,
 ) -> tuple[Track, FloatArray, FloatArray]:
     """One contact driven along straight legs between the corners of a path; the other grain held.
 
@@ -216,19 +216,19 @@ def driven_contact(
     return track, 2 * RADIUS - np.linalg.norm(apart, axis=1), apart[:, 1]
 
 
-def mirror_slide(
+def slide_on_mirror(
     scene: Scene,
     speed: float,
     runs: int,
     materials: Callable[[str], str] = str,
-    run: TrackRun = track_run,
+    run: TrackRun = run_grains,
 ) -> Track:
     """A grain that 1 N presses on the mirror plane x = 0 slides along z at ``speed`` [m/s].
 
     In ``runs`` commands ``run`` of ten steps each, at the scene's own time step.
     """
     modulus = scene.stiffness.mirror
-    overlap = float(contact_law.overlap_under_force(1.0, modulus, RADIUS))
+    overlap = float(contact_law.find_overlap_under_force(1.0, modulus, RADIUS))
     push = ["fix motion grains nve/sphere", "fix push grains addforce -1.0 0.0 0.0"]
     return run(
         scene,

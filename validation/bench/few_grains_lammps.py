@@ -30,7 +30,7 @@ VECTORS = ("x y z", "vx vy vz", "omegax omegay omegaz", "fx fy fz")
 """Columns of position, velocity, spin and force."""
 
 
-def track_run(
+def run_grains(
     scene: Scene, position: FloatArray, velocity: FloatArray, motion: Sequence[str], *,
     time_step: float, every: int = 1, materials: Callable[[str], str] = str,
 ) -> Track:  # fmt: skip

@@ -40,7 +40,7 @@ audit = 1e-3
 Table 1; the peak is the pressure of `qdem_fem.track.loads.train` under an axle of 100 kN."""
 
 
-def scene_at(folder: Path, *overrides: str) -> TrackPrepared:
+def load_track(folder: Path, *overrides: str) -> TrackPrepared:
     """The track of 20 grains, its files in a folder."""
     path = folder / "scene.toml"
     path.write_text(SCENE, encoding="utf-8")

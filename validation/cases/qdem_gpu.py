@@ -27,8 +27,8 @@ from qdem_fem.bodies import Given
 from qdem_fem.files.errors import LibraryMissing
 from qdem_fem.mesh.generation import make_box_mesh
 from validation.bench.qdem_gpu.beam import FORCE, MATERIAL, SIZE
-from validation.bench.qdem_gpu.contact import contacts_compare
-from validation.bench.qdem_gpu.packing import packing_checks
+from validation.bench.qdem_gpu.contact import compare_contacts
+from validation.bench.qdem_gpu.packing import check_packing
 from validation.case import Check
 
 Floats = NDArray[np.float64]
@@ -56,8 +56,8 @@ TIP = 92.22e-6
 def run(quick: bool) -> list[Check]:
     """Twins in the simulator; with a GPU also on it, speeds, bandwidth, cantilever, packing."""
     checks = []
-    for name, error in twins_in_simulator().items():
-        checks.append(_at_most(f"GPU kernel in the simulator over CPU kernel: {name}", error, 1.0))
+    for name, error in compare_in_simulator().items():
+        checks.append(_check(f"GPU kernel in the simulator over CPU kernel: {name}", error, 1.0))
     try:
         from qdem_fem.kernel.cuda.assembly import require_gpu
 
@@ -65,24 +65,24 @@ def run(quick: bool) -> list[Check]:
     except LibraryMissing as error:
         absent = f"GPUs used: no speed of a GPU was measured ({error.what})"
         return [*checks, Check(absent, 0.0, "finite", True)]
-    for name, apart in twins_compare().items():
-        checks.append(_at_most(f"GPU over CPU kernel: {name}", apart, 1.0))
-    packing = packing_checks(8 if quick else 16)
-    return [*checks, *speed_checks(quick), cantilever_check(quick), *packing]
+    for name, apart in compare_twins().items():
+        checks.append(_check(f"GPU over CPU kernel: {name}", apart, 1.0))
+    packing = check_packing(8 if quick else 16)
+    return [*checks, *check_speed(quick), check_cantilever(quick), *packing]
 
 
-def _at_most(name: str, value: float, bar: float) -> Check:
+def _check(name: str, value: float, bar: float) -> Check:
     return Check(name, value, f"<= {bar:g}", value <= bar, "of round-off")
 
 
 # --- the two kernels on the same input ----------------------------------------------------------
 
 
-def twins_in_simulator() -> dict[str, float]:
-    """`twins_compare` in a new process with numba's simulator of a GPU."""
+def compare_in_simulator() -> dict[str, float]:
+    """`compare_twins` in a new process with numba's simulator of a GPU."""
     code = (
         "import json; from qdem_fem.kernel.cuda import step; step.THREADS_A_BLOCK = 16; "
-        "from validation.cases.qdem_gpu import twins_compare; print(json.dumps(twins_compare()))"
+        "from validation.cases.qdem_gpu import compare_twins; print(json.dumps(compare_twins()))"
     )
     variables = os.environ | {"NUMBA_ENABLE_CUDASIM": "1", "NUMBA_NUM_THREADS": "1"}
     finished = subprocess.run(
@@ -93,7 +93,7 @@ def twins_in_simulator() -> dict[str, float]:
     return found
 
 
-def twins_compare() -> dict[str, float]:
+def compare_twins() -> dict[str, float]:
     """Largest difference between CPU and GPU after a few steps, over its bar, for every variant.
 
     Each variant starts from a random strain of some percent and a random velocity.
@@ -101,47 +101,47 @@ def twins_compare() -> dict[str, float]:
     found = {}
     for strain, precision, viscous in product(STRAINS, PRECISIONS, (False, True)):
         name = f"{strain}, {precision}" + ", viscous" * viscous
-        found[name] = twins_apart(strain, precision, viscous, all_conditions)
-    found["no condition at all"] = twins_apart("finger", "float64", False, no_condition)
-    found["in frames of its own"] = twins_apart("finger", "float32", False, loads_alone)
-    found["periodic"] = twins_apart("finger", "float64", False, periodic_sides)
-    found["inversion: steps, count and state"] = stop_apart(-80.0, 12)
-    found["not a number: steps and count"] = stop_apart(np.nan, 12)
-    return found | contacts_compare()
+        found[name] = compare_two(strain, precision, viscous, set_conditions)
+    found["no condition at all"] = compare_two("finger", "float64", False, leave_free)
+    found["in frames of its own"] = compare_two("finger", "float32", False, set_loads)
+    found["periodic"] = compare_two("finger", "float64", False, tie_sides)
+    found["inversion: steps, count and state"] = compare_stops(-80.0, 12)
+    found["not a number: steps and count"] = compare_stops(np.nan, 12)
+    return found | compare_contacts()
 
 
 Conditions = Callable[[q.Simulation, q.Body], None]
 
 
-def no_condition(run: q.Simulation, body: q.Body) -> None:
+def leave_free(run: q.Simulation, body: q.Body) -> None:
     """Free flight."""
 
 
-def all_conditions(run: q.Simulation, body: q.Body) -> None:
+def set_conditions(run: q.Simulation, body: q.Body) -> None:
     """Every kind of condition, several of them on the same nodes."""
     left, right = body.nodes[:, 0] == 0, body.nodes[:, 0] == 1
     run.fix(body, left)
-    run.prescribe(body, right, "y", q.ramp(1e-2, 1e-3))
+    run.prescribe(body, right, "y", q.make_ramp(1e-2, 1e-3))
     run.load(body, right, lambda t: (30.0, 20.0, -100 * np.cos(500 * np.asarray(t))))
     run.pressure(body, body.nodes[:, 2] == 0.5, 2e3)
     for normal in ((0, 1, 1), (1, 2, 0)):
         run.roller(body, (body.nodes[:, 0] == 0.5) & (body.nodes[:, 1] == 0), normal)
 
 
-def loads_alone(run: q.Simulation, body: q.Body) -> None:
+def set_loads(run: q.Simulation, body: q.Body) -> None:
     """Loads and gravity on a body that is free, and so has a frame in single precision."""
     run.load(
         body, body.nodes[:, 0] == 1, lambda t: (30.0, 20.0, -100 * np.cos(500 * np.asarray(t)))
     )
 
 
-def periodic_sides(run: q.Simulation, body: q.Body) -> None:
+def tie_sides(run: q.Simulation, body: q.Body) -> None:
     """The y-faces move as one."""
     run.periodic(body, body.nodes[:, 1] == 0, body.nodes[:, 1] == 0.5)
     run.fix(body, body.nodes[:, 0] == 0, "x")
 
 
-def twin(
+def make_twin(
     device: Device, strain: Any, precision: Precision, viscous: bool,
     conditions: Conditions,
 ) -> tuple[q.Simulation, q.Body]:  # fmt: skip
@@ -152,7 +152,7 @@ def twin(
         bulk_viscosity=20.0 * viscous,
     )  # fmt: skip
     body = q.Body((mesh.nodes, mesh.elements), material, name="block")
-    gravity = None if conditions is no_condition else (0.3, 0.0, -9.81)
+    gravity = None if conditions is leave_free else (0.3, 0.0, -9.81)
     run = q.Simulation(
         [body], strain=strain, precision=precision, step=1.5e-3, gravity=gravity, threads=1,
         device=device,
@@ -164,12 +164,12 @@ def twin(
     return run, body
 
 
-def twins_apart(strain: Any, precision: Precision, viscous: bool, conditions: Conditions) -> float:
+def compare_two(strain: Any, precision: Precision, viscous: bool, conditions: Conditions) -> float:
     """Largest difference of displacement, velocity, samples and work, over its bar."""
     results = []
     critical = None
     for device in DEVICES:
-        run, body = twin(device, strain, precision, viscous, conditions)
+        run, body = make_twin(device, strain, precision, viscous, conditions)
         run.elements_critical_step = critical or run.critical_step  # found once, on the processor
         critical = run.elements_critical_step
         ratio = run.step / critical.value
@@ -196,17 +196,17 @@ def twins_apart(strain: Any, precision: Precision, viscous: bool, conditions: Co
     )
 
 
-def stop_apart(speed: float, steps: int) -> float:
+def compare_stops(speed: float, steps: int) -> float:
     """A window whose elements turn bad as a corner is driven in; inf unless both stop at once."""
     results = []
     for device in DEVICES:
-        run, body = twin(device, "finger", "float64", False, no_condition)
+        run, body = make_twin(device, "finger", "float64", False, leave_free)
         assembly, (loads, held) = run.assembly, run.pack_lists()
         velocity = np.zeros(body.nodes.shape)
         velocity[np.argmax(body.nodes.sum(axis=1))] = speed
         assembly.set_field("velocity", velocity)
         given = Given(np.ones((steps + 1, 1)), loads, held)
-        done, bad = assembly.window(steps, run.step, given, np.zeros(3))
+        done, bad = assembly.advance_window(steps, run.step, given, np.zeros(3))
         results.append((done, bad, np.nan_to_num(assembly.field("displacement"))))
     (done, bad, u), (done2, bad2, u2) = results
     if (done, bad) != (done2, bad2) or not 1 < done < steps or not bad > 0:
@@ -217,7 +217,7 @@ def stop_apart(speed: float, steps: int) -> float:
 # --- speeds, only on a GPU ----------------------------------------------------------------------
 
 
-def beam(elements: int, precision: Precision) -> tuple[q.Simulation, q.Body]:
+def make_beam(elements: int, precision: Precision) -> tuple[q.Simulation, q.Body]:
     """The paper's cantilever on the GPU, at 0.9 of the critical step."""
     mesh = make_box_mesh(SIZE, CELLS[elements], "five")
     young, poisson, density = MATERIAL
@@ -227,7 +227,7 @@ def beam(elements: int, precision: Precision) -> tuple[q.Simulation, q.Body]:
     return run, body
 
 
-def traffic(run: q.Simulation) -> int:
+def count_bytes(run: q.Simulation) -> int:
     """Least bytes of a step, from the arrays: every access of a kernel to an array counts once.
 
     Elements read their data and displacements and add to forces (read, write); nodes read and
@@ -240,7 +240,7 @@ def traffic(run: q.Simulation) -> int:
     return int(sum(array.nbytes for array in once) + nodal + 4 * assembly.n_nodes)
 
 
-def copy_bandwidth(size: int = 1 << 30, repeats: int = 20) -> float:
+def measure_bandwidth(size: int = 1 << 30, repeats: int = 20) -> float:
     """Bytes read and written a second by a copy within the GPU, the best of five [B/s]."""
     from qdem_fem.kernel.cuda.step import cuda
 
@@ -256,13 +256,13 @@ def copy_bandwidth(size: int = 1 << 30, repeats: int = 20) -> float:
     return 2 * size * repeats / min(seconds[1:])
 
 
-def speed_checks(quick: bool) -> list[Check]:
+def check_speed(quick: bool) -> list[Check]:
     """Mel/s of whole windows by wall time, and the share of the copy bandwidth."""
-    bandwidth = copy_bandwidth()
+    bandwidth = measure_bandwidth()
     checks = [Check("GPU, copy bandwidth", bandwidth / 1e9, "finite", True, "GB/s")]
     for elements in list(CELLS)[: 1 if quick else 2]:
         for precision in PRECISIONS:
-            run, body = beam(elements, precision)
+            run, body = make_beam(elements, precision)
             run.load(body, body.nodes[:, 0] == SIZE[0], FORCE)
             count = 1_000_000_000 // elements
             run.advance(count * run.step, sampling=1.0)  # compiles
@@ -273,7 +273,7 @@ def speed_checks(quick: bool) -> list[Check]:
                 seconds.append(time.perf_counter() - start)
             finite = bool(np.isfinite(body.displacement).all())
             speed = count * elements / float(np.median(seconds)) if finite else np.nan
-            share = speed / elements * traffic(run) / bandwidth
+            share = speed / elements * count_bytes(run) / bandwidth
             name = f"GPU, {elements:,} elements, {precision}"
             checks += [
                 Check(name, speed / 1e6, "finite", finite, "Mel/s"),
@@ -282,9 +282,9 @@ def speed_checks(quick: bool) -> list[Check]:
     return checks
 
 
-def cantilever_check(quick: bool) -> Check:
+def check_cantilever(quick: bool) -> Check:
     """Seconds for 2 s (quick: 0.04 s) of the paper's cantilever; the beam swings about its tip."""
-    run, body = beam(488_400, "float64")
+    run, body = make_beam(488_400, "float64")
     run.load(body, body.nodes[:, 0] == SIZE[0], (0, 0, -200.0))
     tip = np.argmin(abs(body.nodes - (SIZE[0], SIZE[1] / 2, SIZE[2] / 2)).sum(axis=1))
     _ = run.step  # the critical step is not part of the time

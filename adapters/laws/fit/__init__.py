@@ -1,6 +1,6 @@
 """Fitting laws to a series: regime, candidates, band, refusal, prediction."""
 
-from adapters.laws.fit.candidates import ROWS_FEWEST, BoolArray, increments, thinned
+from adapters.laws.fit.candidates import ROWS_FEWEST, BoolArray, find_increments, thin_rows
 from adapters.laws.fit.outlook import AGREE
 from adapters.laws.fit.prediction import fit_auto, fit_series, read_series
 from adapters.laws.fit.regime import (
@@ -19,6 +19,6 @@ from adapters.laws.fit.residual import (
 
 __all__ = [
     "AGREE", "EXPONENTS", "FIRST_WINDOW", "PRIOR", "ROWS_FEWEST", "WHY_NOT", "WHY_NOT_PISTON",
-    "BoolArray", "Regime", "find_regime_of_weight", "fit_auto", "fit_series", "increments",
-    "measure_coordinates_error", "measure_displacement_error", "read_series", "thinned",
+    "BoolArray", "Regime", "find_increments", "find_regime_of_weight", "fit_auto", "fit_series",
+    "measure_coordinates_error", "measure_displacement_error", "read_series", "thin_rows",
 ]  # fmt: skip

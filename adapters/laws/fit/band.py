@@ -32,8 +32,9 @@ def estimate_prediction_band(
     correlation; the fit is repeated on such series, and the scatter of its prediction is widened
     by Student's t for the effective number of cycles.
 
-    As in `fit_auto.outlook` it never reaches back beyond the last value by more than that reading's
-    own error: a bed that has settled, and goes on by the law, does not rise, however badly it fits.
+    As in `fit_auto.find_outlook` it never reaches back beyond the last value by more than that
+    reading's own error: a bed that has settled, and goes on by the law, does not rise, however
+    badly it fits.
 
     The band does not hold for bursts (small beds) and collapse: rates that grow faster than in
     proportion to N.

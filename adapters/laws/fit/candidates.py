@@ -77,7 +77,7 @@ class Candidates:
         return low, high
 
 
-def thinned(cycle: FloatArray, displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
+def thin_rows(cycle: FloatArray, displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Means over bins evenly spaced in ln N, `ROWS_PER_DECADE`; the last row stays as it is.
 
     Less than a decade of data gets as many as a decade.  A bin's cycle is the geometric mean of its
@@ -105,7 +105,7 @@ def cut_windows(cycle: FloatArray) -> list[tuple[float, slice]]:
     return list(found.values())
 
 
-def increments(
+def find_increments(
     cycle: FloatArray, displacement: FloatArray, to_cycle: float | FloatArray
 ) -> dict[tuple[str, float], FloatArray]:
     """Increment to ``to_cycle``, shape (n,), of every law on every window that determines it.
@@ -161,13 +161,13 @@ def count_held_out_rows(cycle: FloatArray) -> int:
 
 
 def find_candidates(cycle: FloatArray, displacement: FloatArray, to_cycle: float) -> Candidates:
-    """Predictions for ``to_cycle`` and errors on the held-out block, rows `thinned` before."""
-    found = increments(cycle, displacement, to_cycle)
+    """Predictions for ``to_cycle`` and errors on the held-out block, rows `thin_rows` before."""
+    found = find_increments(cycle, displacement, to_cycle)
     count, before = displacement.shape[1], count_held_out_rows(cycle)
     miss = dict.fromkeys(found, np.full(count, np.nan))
     combined, distance = np.zeros(count), 0.0
     if before:
-        past = increments(cycle[:before], displacement[:before], float(cycle[-1]))
+        past = find_increments(cycle[:before], displacement[:before], float(cycle[-1]))
         happened = displacement[-1] - displacement[before - 1]
         distance = float(np.log(cycle[-1] / cycle[before - 1]))
         miss |= {key: np.abs(past[key] - happened) for key in found if key in past}

@@ -8,7 +8,7 @@ from math import isfinite, log
 import numpy as np
 
 from adapters.bed import FloatArray
-from adapters.files import too_few
+from adapters.files import make_too_few_error
 from adapters.laws import get_law
 from adapters.laws.fit.candidates import (
     ROWS_FEWEST,
@@ -16,7 +16,7 @@ from adapters.laws.fit.candidates import (
     Candidates,
     find_candidates,
     fit_constant_rate_gains,
-    thinned,
+    thin_rows,
 )
 from adapters.laws.fit.regime import (
     CERTAIN,
@@ -25,11 +25,11 @@ from adapters.laws.fit.regime import (
     ROUND_OFF,
     SHAKEDOWN,
     Regime,
+    count_independent,
     find_regimes,
     fit_tail_residual,
-    independent,
+    make_tail_column,
     select_tail,
-    tail_column,
     weigh_exponents,
 )
 from adapters.laws.form import check_training_data
@@ -46,7 +46,7 @@ TO_TELL = "to see a regime"
 class Outlook:
     """What n series are expected to do; each array of shape (n,), in the unit of the series.
 
-    Prediction and ends of bands are not finite where the laws overflow; `fit.refusal.refusals`
+    Prediction and ends of bands are not finite where the laws overflow; `fit.refusal.find_refusals`
     raises then.
     """
 
@@ -71,7 +71,7 @@ class Outlook:
     """The user's number of cycle 0, as in `Series`: for sentences."""
 
 
-def outlook(
+def find_outlook(
     cycle: FloatArray, displacement: FloatArray, to_cycle: float, probability: float = 0.9
 ) -> Outlook:
     """Regime, prediction and band of n series (k, n) at ``to_cycle``, whatever the regime.
@@ -99,8 +99,8 @@ def outlook(
     """
     cycle, displacement = check_training_data(get_law("log"), cycle, displacement)
     if len(cycle) < ROWS_FEWEST:
-        raise too_few(len(cycle), ROWS_FEWEST, TO_TELL, where="law auto")
-    few, means = thinned(cycle, displacement)
+        raise make_too_few_error(len(cycle), ROWS_FEWEST, TO_TELL, where="law auto")
+    few, means = thin_rows(cycle, displacement)
     last, regimes = displacement[-1], find_regimes(few, means)
     settled, reach = np.abs(displacement).max(axis=0), (float(cycle[-1]), to_cycle)
     bounded = np.array([regime.name == SHAKEDOWN for regime in regimes])
@@ -113,7 +113,7 @@ def outlook(
         moved = np.zeros_like(last) if known else candidates.median(votes)
         endless = np.where(unbounded, fit_constant_rate_gains(few, means, to_cycle), np.nan)
 
-        def band(probability: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        def find_band(probability: float) -> tuple[FloatArray, FloatArray, FloatArray]:
             """Low end, high end, and half-width of a reading."""
             reading, tail = estimate_tail_error(
                 cycle, displacement, exponent, to_cycle, probability
@@ -132,8 +132,8 @@ def outlook(
             high = np.where(moved < 0, np.minimum(high, last + reading), high)
             return low, high, reading
 
-        low, high, _ = band(probability)
-        *judged, reading = band(JUDGED)
+        low, high, _ = find_band(probability)
+        *judged, reading = find_band(JUDGED)
     least = np.fmax(RESOLUTION * np.ptp(displacement, axis=0), ROUND_OFF * settled)
     return Outlook(
         regimes, last + moved, low, high, candidates, votes, *reach, last, settled,
@@ -172,12 +172,12 @@ def estimate_tail_error(
 
     exponent = np.clip(exponent, -1.0, 1.0)
     residual = fit_tail_residual(cycle, displacement, exponent)
-    counted = independent(residual)
+    counted = count_independent(residual)
     freedom = np.maximum(counted - 3, 1.0)
     variance = (residual * residual).sum(axis=0) / len(residual) * counted / freedom
-    column = tail_column((cycle[select_tail(cycle)] / cycle[-1])[:, None], exponent)
+    column = make_tail_column((cycle[select_tail(cycle)] / cycle[-1])[:, None], exponent)
     square = ((column - column.mean(axis=0)) ** 2).sum(axis=0)
-    ahead = tail_column(np.array(to_cycle / cycle[-1]), exponent)
+    ahead = make_tail_column(np.array(to_cycle / cycle[-1]), exponent)
     slope = variance * len(residual) / counted / square
     student = stdtrit(freedom, (1 + probability) / 2)
     return student * np.sqrt(variance), student * np.sqrt(variance + slope * ahead**2)

@@ -10,11 +10,11 @@ import numpy as np
 
 from adapters.bed import FloatArray
 from adapters.errors import JumpRefused, NotConverged, UsageError
-from adapters.files import Series, read_series, too_few
+from adapters.files import Series, make_too_few_error, read_series
 from adapters.laws.fit.band import estimate_prediction_band
-from adapters.laws.fit.candidates import ROWS_FEWEST, thinned
-from adapters.laws.fit.outlook import TO_TELL, LawSaid, compare_laws, outlook
-from adapters.laws.fit.refusal import Refusal, failed, failure, refusals
+from adapters.laws.fit.candidates import ROWS_FEWEST, thin_rows
+from adapters.laws.fit.outlook import TO_TELL, LawSaid, compare_laws, find_outlook
+from adapters.laws.fit.refusal import Refusal, find_failure, find_refusals, predict_failure
 from adapters.laws.fit.regime import find_regimes
 from adapters.laws.form import Law
 
@@ -69,7 +69,7 @@ def fit_series(
     is too short (one row more than the law has parameters), `JumpRefused` when the series or the
     result reaches ``fail_at``, `NotConverged` when the result is not finite.
     """
-    cycle, settlement = _training_rows(series, law)
+    cycle, settlement = _select_training_rows(series, law)
     last = float(cycle[-1])
     _check_target(series, last, to_cycle, probability, fail_at)
     begin = series.counted_from
@@ -81,69 +81,70 @@ def fit_series(
             below, above = estimate_prediction_band(law, cycle, settlement, to_cycle, probability)
             band = (prediction - below, prediction + above)
     named = dict(zip(law.parameter_names, map(float, parameters), strict=True))
-    if refusal := failed(cycle + begin, settlement, fail_at):
-        raise _refused(refusal, law.name, named, {})
+    if refusal := find_failure(cycle + begin, settlement, fail_at):
+        raise _make_refusal(refusal, law.name, named, {})
     if not (np.isfinite(parameters).all() and np.isfinite(band).all()):
         raise NotConverged(
             f"the law {law.name} gives no finite settlement at cycle {to_cycle + begin:.10g}",
             remedy="predict less far, or use the law log",
         )
-    if refusal := failure(prediction, fail_at, to_cycle + begin):
-        raise _refused(refusal, law.name, named, {})
+    if refusal := predict_failure(prediction, fail_at, to_cycle + begin):
+        raise _make_refusal(refusal, law.name, named, {})
     return Prediction(
         law.name, named, prediction, band, series.unit, find_regime(series),
-        failure_excluded=failure_excluded(band, fail_at),
+        failure_excluded=excludes_failure(band, fail_at),
     )  # fmt: skip
 
 
 def fit_auto(
     series: Series, to_cycle: float, probability: float = 0.9, fail_at: float | None = None
 ) -> Prediction:
-    """Predict the settlement at ``to_cycle`` from the slow laws together; see `fit_auto.outlook`.
+    """Predict the settlement at ``to_cycle`` from the slow laws together; see
+    `fit_auto.find_outlook`.
 
     ``parameters`` of the result: ``exponent`` beta of the tail with its deviation, which the
     regime follows from, and under each law's name the settlement that it alone predicts (the
     median of its windows); ``laws`` says which agree.
 
-    Raises `JumpRefused` where `fit.refusal.refusals` says so and ``to_cycle`` lies behind the
+    Raises `JumpRefused` where `fit.refusal.find_refusals` says so and ``to_cycle`` lies behind the
     series; it has ``laws`` too.  Otherwise as `fit_series`: a regime that is refused comes before
     a result that is not finite.
     """
     rows = series.cycle > 0
     cycle, settlement = series.cycle[rows], series.settlement[rows]
     if len(cycle) < ROWS_FEWEST:
-        raise too_few(
+        raise make_too_few_error(
             len(cycle), ROWS_FEWEST, TO_TELL, where=series.where or "law auto",
             left_out=series.left_out, else_do=", or name a law: --law log",
         )  # fmt: skip
     _check_target(series, float(cycle[-1]), to_cycle, probability, fail_at)
-    found = outlook(cycle, settlement[:, None], to_cycle, probability)
+    found = find_outlook(cycle, settlement[:, None], to_cycle, probability)
     begin, settled = series.counted_from, np.abs(settlement[:, None] - series.begun).max(axis=0)
     found = replace(found, settled=settled, counted_from=begin)
     parameters = found.regime[0].parameters()
     prediction = float(found.prediction[0])
-    refusal = failed(cycle + begin, settlement, fail_at)
+    refusal = find_failure(cycle + begin, settlement, fail_at)
     if refusal is None and isfinite(prediction):
-        refusal = failure(prediction, fail_at, to_cycle + begin)
-    refusal = refusal or refusals(found)[0]
+        refusal = predict_failure(prediction, fail_at, to_cycle + begin)
+    refusal = refusal or find_refusals(found)[0]
     said = compare_laws(found, refused=refusal is not None)
     if refusal:
-        raise _refused(refusal, "auto", parameters, said)
+        raise _make_refusal(refusal, "auto", parameters, said)
     alone = {name: one.prediction for name, one in said.items()}
     parameters |= {name: value for name, value in alone.items() if value is not None}
     band = (float(found.low[0]), float(found.high[0]))
     return Prediction(
         "auto", parameters, prediction, band, series.unit, found.regime[0].name, said,
-        failure_excluded=failure_excluded(band, fail_at),
+        failure_excluded=excludes_failure(band, fail_at),
     )  # fmt: skip
 
 
-def failure_excluded(band: tuple[float, float], fail_at: float | None) -> bool | None:
+def excludes_failure(band: tuple[float, float], fail_at: float | None) -> bool | None:
     """Whether ``band`` ends below the bound of failure, of either sign; None without a bound."""
     return None if fail_at is None else max(map(abs, band)) < fail_at
 
 
-def _refused(
+def _make_refusal(
     refusal: Refusal, law: str, parameters: dict[str, Any], said: dict[str, LawSaid]
 ) -> JumpRefused:
     return JumpRefused(
@@ -162,7 +163,7 @@ def find_regime(series: Series) -> str | None:
     rows = series.cycle > 0
     if rows.sum() < ROWS_FEWEST:
         return None
-    return find_regimes(*thinned(series.cycle[rows], series.settlement[rows, None]))[0].name
+    return find_regimes(*thin_rows(series.cycle[rows], series.settlement[rows, None]))[0].name
 
 
 def _check_target(
@@ -181,12 +182,14 @@ def _check_target(
         )
 
 
-def _training_rows(series: Series, law: Law) -> tuple[FloatArray, FloatArray]:
+def _select_training_rows(series: Series, law: Law) -> tuple[FloatArray, FloatArray]:
     """Cycles and settlement that ``law`` can take: cycle 0 only where it has a value there."""
     rows = (series.cycle > 0) if law.first_state else np.ones(len(series.cycle), bool)
     cycle, settlement = series.cycle[rows], series.settlement[rows]
     fewest = law.minimum_cycles + 1
     if len(cycle) < fewest:
         purpose = f"to fit the law {law.name} and know its error"
-        raise too_few(len(cycle), fewest, purpose, where=series.where, left_out=series.left_out)
+        raise make_too_few_error(
+            len(cycle), fewest, purpose, where=series.where, left_out=series.left_out
+        )
     return cycle, settlement

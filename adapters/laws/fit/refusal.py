@@ -30,7 +30,7 @@ class Refusal:
     """What to do."""
 
 
-def refusals(outlook: Outlook) -> list[Refusal | None]:
+def find_refusals(outlook: Outlook) -> list[Refusal | None]:
     """Why each of n series is not predicted; None where it is.
 
     - the regime is ratcheting or collapse (90 %): no law says when that ends;
@@ -43,10 +43,10 @@ def refusals(outlook: Outlook) -> list[Refusal | None]:
     A prediction for the last cycle itself is a reading, and never refused.  Raises `NotConverged`
     where the regime allows a prediction and the laws give no finite one.
     """
-    return [_refusal(outlook, series) for series in range(len(outlook.regime))]
+    return [_find_refusal(outlook, series) for series in range(len(outlook.regime))]
 
 
-def _refusal(outlook: Outlook, series: int) -> Refusal | None:
+def _find_refusal(outlook: Outlook, series: int) -> Refusal | None:
     if outlook.to_cycle == outlook.last_cycle:
         return None
     regime, begin = outlook.regime[series], outlook.counted_from
@@ -78,7 +78,9 @@ def _refusal(outlook: Outlook, series: int) -> Refusal | None:
     return None
 
 
-def failed(cycle: FloatArray, settlement: FloatArray, fail_at: float | None) -> Refusal | None:
+def find_failure(
+    cycle: FloatArray, settlement: FloatArray, fail_at: float | None
+) -> Refusal | None:
     """Collapse where a series, ``settlement`` (k,) at the user's cycles (k,), has reached the
     user's bound in the same unit, of either sign: whatever would be predicted then."""
     reached = np.flatnonzero(np.abs(settlement) >= (np.inf if fail_at is None else fail_at))
@@ -93,7 +95,7 @@ def failed(cycle: FloatArray, settlement: FloatArray, fail_at: float | None) -> 
     )
 
 
-def failure(prediction: float, fail_at: float | None, to_cycle: float) -> Refusal | None:
+def predict_failure(prediction: float, fail_at: float | None, to_cycle: float) -> Refusal | None:
     """Collapse where ``prediction``, for the user's cycle ``to_cycle``, reaches the user's bound,
     in the same unit, of either sign."""
     if fail_at is None or abs(prediction) < fail_at:

@@ -74,7 +74,7 @@ def select_tail(cycle: FloatArray, decades: float = 1.0) -> slice:
     return slice(max(0, min(first, len(cycle) - TAIL_ROWS)), None)
 
 
-def tail_column(ratio: FloatArray, exponent: FloatArray) -> FloatArray:
+def make_tail_column(ratio: FloatArray, exponent: FloatArray) -> FloatArray:
     """(x^beta - 1) / beta of x = N / N_k, ln x where beta is 0; arguments broadcast."""
     log = np.log(ratio)
     small = np.abs(exponent) < 1e-9
@@ -85,13 +85,13 @@ def weigh_exponents(cycle: FloatArray, displacement: FloatArray) -> FloatArray:
     """Probability of each of `EXPONENTS`, shape (g, n), for series (k, n) at cycles > 0, (k,).
 
     Least squares on the tail for every beta; Student's likelihood (the noise is not known) with as
-    many degrees of freedom as there are `independent` residuals.  A tail without any movement
+    many degrees of freedom as there are `count_independent` residuals.  A tail without any movement
     gives the prior.
     """
     rows = select_tail(cycle)
     ratio = cycle[rows] / cycle[-1]
     series = displacement[rows] - displacement[rows].mean(axis=0)
-    columns = tail_column(ratio[:, None], EXPONENTS)
+    columns = make_tail_column(ratio[:, None], EXPONENTS)
     columns = columns - columns.mean(axis=0)
     columns /= np.linalg.norm(columns, axis=0)
     along = columns.T @ series
@@ -100,13 +100,13 @@ def weigh_exponents(cycle: FloatArray, displacement: FloatArray) -> FloatArray:
     missed = np.where(total > 0, np.maximum(total - along**2, 0.0) + reading, 1.0)
     best = missed.argmin(axis=0)
     residual = series - columns[:, best] * along[best, np.arange(series.shape[1])]
-    counted = np.maximum(independent(residual), 4.0)
+    counted = np.maximum(count_independent(residual), 4.0)
     fit = np.log(missed / missed.min(axis=0))
     weight = np.exp(-(counted - 2) / 2 * fit) / (1 + (EXPONENTS[:, None] / PRIOR) ** 2)
     return np.asarray(weight / weight.sum(axis=0))
 
 
-def independent(residual: FloatArray) -> FloatArray:
+def count_independent(residual: FloatArray) -> FloatArray:
     """How many of k residuals (k, n) count: k (1 - rho) / (1 + rho), rho of neighbours, >= 0.
 
     What an engine computes is a sum of increments, so neighbouring cycles are off alike.
@@ -126,7 +126,7 @@ def fit_tail_residual(
     """Tail less c + a (N^beta - 1) / beta fitted to it, shape (rows, n), ``exponent`` (n,)."""
     rows = select_tail(cycle)
     series = displacement[rows] - displacement[rows].mean(axis=0)
-    column = tail_column((cycle[rows] / cycle[-1])[:, None], exponent)
+    column = make_tail_column((cycle[rows] / cycle[-1])[:, None], exponent)
     column = column - column.mean(axis=0)
     slope = (column * series).sum(axis=0) / (column * column).sum(axis=0)
     return np.asarray(series - slope * column)

@@ -22,7 +22,7 @@ def measure_displacement_error(
     by as much as this measures: it compares methods, and proves none.
     """
     computed = np.asarray(computed, float)
-    return _relative_error(computed - start, np.asarray(estimated, float) - start)
+    return _measure_relative_error(computed - start, np.asarray(estimated, float) - start)
 
 
 def measure_coordinates_error(computed: FloatArray, estimated: FloatArray) -> float:
@@ -32,10 +32,10 @@ def measure_coordinates_error(computed: FloatArray, estimated: FloatArray) -> fl
     its origin, so the number is small for any method, moving nothing included; to be quoted
     only beside `measure_displacement_error`.
     """
-    return _relative_error(np.asarray(computed, float), np.asarray(estimated, float))
+    return _measure_relative_error(np.asarray(computed, float), np.asarray(estimated, float))
 
 
-def _relative_error(computed: FloatArray, estimated: FloatArray) -> float:
+def _measure_relative_error(computed: FloatArray, estimated: FloatArray) -> float:
     size = float(np.linalg.norm(computed))
     if not size > 0:
         raise UsageError("the relative error has no denominator: nothing moved")

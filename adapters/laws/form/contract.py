@@ -109,6 +109,6 @@ def outer(factor: float | FloatArray, parameter: FloatArray) -> FloatArray:
     return np.asarray(np.multiply.outer(np.asarray(factor, float), parameter))
 
 
-def log_ratio(start: float, end: float | FloatArray) -> FloatArray:
+def find_log_ratio(start: float, end: float | FloatArray) -> FloatArray:
     """ln(end / start), to round-off of the result also where the two nearly agree."""
     return np.asarray(np.log1p((np.asarray(end, float) - start) / start))

@@ -41,7 +41,7 @@ class Shape:
     logarithmic: bool = True
     """True: searched in ln theta, as every number of cycles is."""
 
-    def searched(self) -> FloatArray:
+    def make_grid(self) -> FloatArray:
         """Grid in the variable that is searched, shape (count,)."""
         if self.logarithmic:
             return np.linspace(np.log(self.low), np.log(self.high), self.count)
@@ -58,12 +58,12 @@ def bound_time_shape(cycle: FloatArray) -> Shape:
     return Shape(0.1 * first, 100 * last, 1 + round(5 * float(np.log10(1000 * last / first))))
 
 
-def centred(array: FloatArray) -> FloatArray:
+def centre(array: FloatArray) -> FloatArray:
     """Less its mean along the first axis: this eliminates c."""
     return array - array.mean(axis=0, keepdims=True)
 
 
-def unit_vectors(values: FloatArray) -> tuple[FloatArray, FloatArray]:
+def normalise(values: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Centred columns (k, ...) over their norms (...), which come second; 0 where one vanishes."""
     norm = np.sqrt((values * values).sum(axis=0))
     unit = np.zeros_like(values)
@@ -86,16 +86,16 @@ def fit_shaped(
 def fit_chunk(
     column: Column, shapes: tuple[Shape, ...], cycle: FloatArray, displacement: FloatArray
 ) -> FloatArray:
-    target = centred(displacement)
+    target = centre(displacement)
     searched = search_grid(column, shapes, cycle, target)
-    theta = _theta(shapes, _search(column, shapes, cycle, target, searched))
+    theta = _find_theta(shapes, _search(column, shapes, cycle, target, searched))
     values = column(cycle[:, None], theta)
-    found, _ = _projected(values, target)
+    found, _ = _project(values, target)
     constant = displacement.mean(axis=0) - found * values.mean(axis=0)
     return np.concatenate([constant[None], found[None], theta])
 
 
-def _theta(shapes: tuple[Shape, ...], searched: FloatArray) -> FloatArray:
+def _find_theta(shapes: tuple[Shape, ...], searched: FloatArray) -> FloatArray:
     """Shape parameters (m, ...) from the variables that are searched."""
     return np.stack(
         [np.exp(s) if shape.logarithmic else s for shape, s in zip(shapes, searched, strict=True)]
@@ -106,18 +106,18 @@ def search_grid(
     column: Column, shapes: tuple[Shape, ...], cycle: FloatArray, target: FloatArray
 ) -> FloatArray:
     """The grid point that explains most of each series, shape (m, n), as searched variables."""
-    grids = np.meshgrid(*(shape.searched() for shape in shapes), indexing="ij")
+    grids = np.meshgrid(*(shape.make_grid() for shape in shapes), indexing="ij")
     points = np.stack([grid.ravel() for grid in grids])
     rows = np.unique(np.linspace(0, len(cycle) - 1, min(len(cycle), GRID_ROWS)).astype(int))
-    unit, _ = unit_vectors(centred(column(cycle[rows, None], _theta(shapes, points))))
-    along = np.matmul(unit.T, centred(target[rows]))
+    unit, _ = normalise(centre(column(cycle[rows, None], _find_theta(shapes, points))))
+    along = np.matmul(unit.T, centre(target[rows]))
     return points[:, np.argmax(along * along, axis=0)]
 
 
-def _projected(values: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _project(values: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Amplitudes (n,) and residuals (k, n) of centred series with columns (k, n)."""
-    values = centred(values)
-    unit, norm = unit_vectors(values)
+    values = centre(values)
+    unit, norm = normalise(values)
     along = (unit * target).sum(axis=0)
     found = np.divide(along, norm, out=np.zeros_like(along), where=norm > 0)
     return found, target - found * values
@@ -132,34 +132,34 @@ def _search(
     ``start`` and the result: searched variables, shape (m, n).  A step is taken only where it
     lowers the sum of squares, so the result is never worse than the grid's.
     """
-    grids = [shape.searched() for shape in shapes]
+    grids = [shape.make_grid() for shape in shapes]
     low = np.array([grid[0] for grid in grids])[:, None]
     high = np.array([grid[-1] for grid in grids])[:, None]
     best, damping = start.copy(), np.full(start.shape[1], 1e-3)
     active = np.flatnonzero((target * target).sum(axis=0) > 0)
     times = cycle[:, None]
 
-    def residual(searched: FloatArray, series: FloatArray) -> FloatArray:
-        return _projected(column(times, _theta(shapes, searched)), series)[1]
+    def find_residual(searched: FloatArray, series: FloatArray) -> FloatArray:
+        return _project(column(times, _find_theta(shapes, searched)), series)[1]
 
     for _ in range(STEPS):
         if not len(active):
             break
         here, series = best[:, active], target[:, active]
-        missed = residual(here, series)
+        missed = find_residual(here, series)
         square = (missed * missed).sum(axis=0)
         slopes = []
         for index in range(len(shapes)):
             probe = here.copy()
             inside = here[index] + 1e-7 <= high[index]
             probe[index] += np.where(inside, 1e-7, -1e-7)
-            change = residual(probe, series) - missed
+            change = find_residual(probe, series) - missed
             slope = change / (probe[index] - here[index])
             outward = np.where((slope * missed).sum(axis=0) > 0, low[index], high[index])
             slopes.append(np.where(here[index] == outward, 0.0, slope))  # held by its bound
         step = solve_damped_step(np.stack(slopes), missed, damping[active])
         tried = np.clip(here + step, low, high)
-        again = residual(tried, series)
+        again = find_residual(tried, series)
         lower = (again * again).sum(axis=0)
         better = lower < square
         moved = np.abs(tried - here).max(axis=0)

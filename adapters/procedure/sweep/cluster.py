@@ -55,7 +55,7 @@ def open_client(
             )
             stack.enter_context(place)
         elif scheduler == SLURM:
-            place = stack.enter_context(_slurm(config))
+            place = stack.enter_context(_open_slurm(config))
             jobs = workers or members
             place.adapt(minimum_jobs=jobs, maximum_jobs=jobs)  # a job that is lost is replaced
         else:
@@ -72,7 +72,7 @@ def open_client(
         yield client
 
 
-def _slurm(config: Path | None) -> Any:
+def _open_slurm(config: Path | None) -> Any:
     """A `dask_jobqueue.SLURMCluster` with the keywords of a TOML file, besides Dask's own files."""
     from dask_jobqueue.slurm import SLURMCluster
 

@@ -152,20 +152,20 @@ def plan_sweep(
         settings = dict(zip(axes, values, strict=True))
         overrides = [*fixed, *(f"{key}={value}" for key, value in settings.items())]
         if own_seeds is None:
-            first = _scene(scene_path, overrides, settings).sample.seed
+            first = _load_member(scene_path, overrides, settings).sample.seed
             chosen = [str(first + number) for number in range(seeds or 1)]
         else:
             chosen = own_seeds
         for seed in chosen:
             with_seed = (*overrides, f"{SEED}={seed}")
-            scene = _scene(scene_path, with_seed, settings)
+            scene = _load_member(scene_path, with_seed, settings)
             name = name_member(settings, scene.sample.seed)
             members.append(Member(name, settings, scene.sample.seed, with_seed, scene))
     _refuse_twins(members)
     return Sweep(scene_path.absolute(), folder, tuple(members))
 
 
-def _scene(path: Path, overrides: Sequence[str], settings: Mapping[str, str]) -> Scene:
+def _load_member(path: Path, overrides: Sequence[str], settings: Mapping[str, str]) -> Scene:
     """A member's scene, checked; every member must have load cycles to compare."""
     try:
         scene = load_scene(path, overrides)

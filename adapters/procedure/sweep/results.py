@@ -56,7 +56,7 @@ class Band:
     @property
     def half_at_end(self) -> float | None:
         """`half` at the last cycle [m]; None for a single seed."""
-        return _number(self.half[-1])
+        return _clean_number(self.half[-1])
 
 
 def estimate_mean(values: FloatArray) -> tuple[Any, Any]:
@@ -74,14 +74,14 @@ def estimate_mean(values: FloatArray) -> tuple[Any, Any]:
     return mean, factor * values.std(axis=0, ddof=1)
 
 
-def type_settings(member: Member) -> dict[str, Any]:
+def convert_settings(member: Member) -> dict[str, Any]:
     """Values of the keys swept over, as the checked scene has them; lists as JSON text."""
     values = flatten_keys(member.scene.model_dump(mode="json"))
     typed = {key: values.get(key) for key in member.settings}
     return {k: json.dumps(v) if isinstance(v, list) else v for k, v in typed.items()}
 
 
-def settlement_rows(sweep: Sweep, member: Member) -> list[dict[str, Any]]:
+def read_settlement_rows(sweep: Sweep, member: Member) -> list[dict[str, Any]]:
     """Rows of ``settlement.csv`` of a member, by the names in `COLUMNS`."""
     outcomes = RunFolder(sweep.run_folder(member)).outcomes()
     return [row for outcome in outcomes for row in outcome.rows]
@@ -92,7 +92,10 @@ def estimate_bands(sweep: Sweep, finished: set[str]) -> list[Band]:
     bands = []
     for group, members in sweep.groups().items():
         curves = [
-            {int(row["cycle"]): float(row["settlement"]) for row in settlement_rows(sweep, member)}
+            {
+                int(row["cycle"]): float(row["settlement"])
+                for row in read_settlement_rows(sweep, member)
+            }
             for member in members
             if member.name in finished
         ]
@@ -101,7 +104,7 @@ def estimate_bands(sweep: Sweep, finished: set[str]) -> list[Band]:
         cycles = sorted(set.intersection(*map(set, curves)))
         values = np.array([[curve[cycle] for cycle in cycles] for curve in curves])
         mean, half = estimate_mean(values)
-        settings = type_settings(members[0])
+        settings = convert_settings(members[0])
         cycle = np.array(cycles, float)
         bands.append(Band(group, settings, len(curves), len(members), cycle, mean, half))
     return bands
@@ -115,8 +118,8 @@ def write_results(sweep: Sweep, results: Sequence[Result]) -> tuple[list[Band], 
     )
     member_rows, curve_rows = [], []
     for member in sweep.members:
-        key = {"member": member.name, **type_settings(member), SEED: member.seed}
-        rows = settlement_rows(sweep, member)
+        key = {"member": member.name, **convert_settings(member), SEED: member.seed}
+        rows = read_settlement_rows(sweep, member)
         curve_rows += [key | {name: row.get(name) for name in COLUMNS} for row in rows]
         figures = {name: rows[-1].get(name) if rows else None for name in SAMPLE_FIGURES}
         result = vars(by_name[member.name]).items()
@@ -125,7 +128,7 @@ def write_results(sweep: Sweep, results: Sequence[Result]) -> tuple[list[Band], 
     band_rows = [
         {
             **band.settings, "cycle": int(cycle), "seeds": band.seeds, "mean_m": float(mean),
-            "low_m": _number(mean - half), "high_m": _number(mean + half),
+            "low_m": _clean_number(mean - half), "high_m": _clean_number(mean + half),
         }
         for band in bands
         for cycle, mean, half in zip(band.cycle, band.mean, band.half, strict=True)
@@ -142,7 +145,7 @@ def write_results(sweep: Sweep, results: Sequence[Result]) -> tuple[list[Band], 
     return bands, paths
 
 
-def _number(value: float) -> float | None:
+def _clean_number(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 

@@ -8,10 +8,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from adapters.engines import interruptible
+from adapters.engines import allow_interrupts
 from adapters.errors import Interrupted, UsageError
-from adapters.files import RunFolder, name_full_disk
-from adapters.procedure import Progress, status
+from adapters.files import RunFolder, explain_full_disk
+from adapters.procedure import Progress, read_status
 from adapters.procedure.sweep.cluster import open_client
 from adapters.procedure.sweep.member import (
     STOPPED,
@@ -67,7 +67,7 @@ def find_result(sweep: Sweep, member: Member, ended: Ended | None) -> Result:
     folder = sweep.run_folder(member)
     here = None
     try:
-        here = status(folder)
+        here = read_status(folder)
         done = here.state == "finished"
     except UsageError:  # no run folder yet
         done = False
@@ -100,7 +100,7 @@ def run_sweep(sweep: Sweep, cluster: Cluster, progress: Progress) -> list[Result
     """
     check_folder(sweep)
     try:
-        with interruptible(), name_full_disk(sweep.folder), RunFolder(sweep.folder).locked():
+        with allow_interrupts(), explain_full_disk(sweep.folder), RunFolder(sweep.folder).lock():
             return _run_pending(sweep, cluster, progress)
     except Interrupted as stop:
         what = str(stop).partition("\n")[0]
@@ -109,9 +109,11 @@ def run_sweep(sweep: Sweep, cluster: Cluster, progress: Progress) -> list[Result
 
 def _run_pending(sweep: Sweep, cluster: Cluster, progress: Progress) -> list[Result]:
     results = {member.name: find_result(sweep, member, None) for member in sweep.members}
-    _record(sweep, cluster, results)
+    _write_record(sweep, cluster, results)
     pending = [m for m in sweep.members if results[m.name].state != "finished"]
-    progress.say(f"{len(sweep.members)} members, {len(sweep.members) - len(pending)} finished")
+    progress.print_line(
+        f"{len(sweep.members)} members, {len(sweep.members) - len(pending)} finished"
+    )
     sweep.stop_file.unlink(missing_ok=True)
     if pending:
         _run(sweep, cluster, pending, results, progress)
@@ -140,25 +142,25 @@ def _run(
             for member in pending
         }
 
-        def take(future: Any) -> None:
+        def take_result(future: Any) -> None:
             member = futures[future]
-            result = find_result(sweep, member, _ended(future))
+            result = find_result(sweep, member, _find_end(future))
             results[member.name] = result
-            _record(sweep, cluster, results)
+            _write_record(sweep, cluster, results)
             done = sum(one.state in ("finished", "failed") for one in results.values())
             if result.state != "stopped":
-                progress.say(f"{done} of {len(results)}: {sum_up_result(result)}")
+                progress.print_line(f"{done} of {len(results)}: {sum_up_result(result)}")
 
         taken = set()
         try:
             for future in as_completed(futures):
-                take(future)
+                take_result(future)
                 taken.add(future)  # behind it: a signal within is to lose no result
         except (KeyboardInterrupt, Exception):
             sweep.stop_file.touch()
             wait([*futures], timeout=STOP_S)
             for future in futures.keys() - taken:
-                take(future)
+                take_result(future)
             raise
 
 
@@ -174,11 +176,11 @@ def choose_engine(
     name = find_pinned_engine(sweep)
     if name is None:
         name, version = client.submit(find_worker_engine, pure=False).result()
-        progress.say(f"engine: {name} ({version})")
+        progress.print_line(f"engine: {name} ({version})")
     return [f'engine.name="{name}"']
 
 
-def _ended(future: Any) -> Ended:
+def _find_end(future: Any) -> Ended:
     """How a member ended; one whose workers died again and again failed as its engine does."""
     if not future.done():
         return STOPPED
@@ -197,7 +199,7 @@ def sum_up_result(result: Result) -> str:
     return f"{result.member} {result.state}, exit code {result.exit_code}: {first}"
 
 
-def _record(sweep: Sweep, cluster: Cluster, results: dict[str, Result]) -> None:
+def _write_record(sweep: Sweep, cluster: Cluster, results: dict[str, Result]) -> None:
     """Write ``sweep.json``: how far every member is."""
     content = make_sweep_record(sweep, cluster, list(results.values()))
     write_whole(sweep.folder / "sweep.json", json.dumps(content, indent=1) + "\n")

@@ -20,10 +20,10 @@ from qdem_fem.contact.cuda.law import (
 from qdem_fem.contact.cuda.pairs import renew_pairs
 from qdem_fem.contact.search import Pairs, PeriodicWidth
 from qdem_fem.contact.spheres import GO_ON, LOOK_AGAIN, TOO_DEEP, Contact, Planes, Spheres
-from qdem_fem.kernel.cuda import AGAIN, DEEP, cuda, grid
+from qdem_fem.kernel.cuda import AGAIN, DEEP, choose_grid, cuda
 
 
-def device_array(array: Any) -> Any:
+def copy_to_device(array: Any) -> Any:
     """An array on the GPU, with one row of zeros in place of none: it had better not be empty."""
     shape = tuple(max(length, 1) for length in array.shape)
     full = array if array.size else np.zeros(shape, array.dtype)
@@ -42,9 +42,9 @@ class DeviceContact:
 
     def __init__(self, c: Contact, side: PeriodicWidth | None) -> None:
         self.on = Contact(
-            Spheres(*map(device_array, c.spheres)), Pairs(*map(device_array, c.pairs)),
-            Planes(*map(device_array, c.planes)), float(c.friction), float(c.half_skin),
-            *map(device_array, c[5:]),
+            Spheres(*map(copy_to_device, c.spheres)), Pairs(*map(copy_to_device, c.pairs)),
+            Planes(*map(copy_to_device, c.planes)), float(c.friction), float(c.half_skin),
+            *map(copy_to_device, c[5:]),
         )  # fmt: skip
         """Every array on the GPU, of at least one row."""
         self.side = side
@@ -57,16 +57,16 @@ class DeviceContact:
     def launch_push(self, forces: Any, status: Any, k: int) -> None:
         """Forces found in the step before reach the nodes."""
         c = self.on
-        push_forces[grid(self.acting)](
+        push_forces[choose_grid(self.acting)](
             self.acting, c.pairs.acting, c.spheres.place, c.force, forces, status, k
         )
 
     def launch_step(
         self, displacement: Any, velocity: Any, status: Any, step: float, k: int
     ) -> None:
-        """Contact at the new displacement, as `qdem_fem.contact.spheres.advance_build`'s."""
-        c, (s, p, w, *_), few = self.on, self.on, grid(self.acting)
-        move_spheres[grid(self.size)](
+        """Contact at the new displacement, as `qdem_fem.contact.spheres.build_advance`'s."""
+        c, (s, p, w, *_), few = self.on, self.on, choose_grid(self.acting)
+        move_spheres[choose_grid(self.size)](
             s.reference, s.place, displacement, c.start, c.half_skin, c.position, status, k
         )
         build_pairs_forces(self.side is not None)[few](

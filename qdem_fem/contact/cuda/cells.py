@@ -17,7 +17,7 @@ import numpy as np
 
 from qdem_fem.contact.search import PeriodicWidth
 from qdem_fem.contact.search import cells as contact_cells
-from qdem_fem.kernel.cuda import cuda, grid, sum_before
+from qdem_fem.kernel.cuda import choose_grid, cuda, sum_before
 
 find_cell_bucket: Any = cuda.jit(device=True)(contact_cells.find_cell_bucket.py_func)
 
@@ -45,7 +45,7 @@ class Cells(NamedTuple):
 
 
 @cuda.jit
-def put_zeros(values: Any) -> None:
+def write_zeros(values: Any) -> None:
     """Whole numbers (n,) become zero."""
     i = cuda.grid(1)
     if i < values.size:
@@ -107,7 +107,7 @@ def find_entries(position: Any, near: float, side: PeriodicWidth | None) -> Entr
         cuda.device_array(length, np.uint8),
     )  # fmt: skip
     axis, width = (-1, 1.0) if side is None else (side.number, side.width)
-    place_entries[grid(count)](position, axis, width, near, *entries)
+    place_entries[choose_grid(count)](position, axis, width, near, *entries)
     return entries
 
 
@@ -116,8 +116,8 @@ def find_cells(entries: Entries, size: float) -> Cells:
     length = entries.there.size
     cell, bucket = cuda.device_array((length, 3), np.int64), cuda.device_array(length, np.int64)
     counts = cuda.device_array(max(16, 1 << (2 * length - 1).bit_length()), np.int64)
-    put_zeros[grid(counts.size)](counts)
-    count_cells[grid(length)](entries.at, entries.there, size, cell, bucket, counts)
+    write_zeros[choose_grid(counts.size)](counts)
+    count_cells[choose_grid(length)](entries.at, entries.there, size, cell, bucket, counts)
     start, order = sum_before(counts, counts.size), cuda.device_array(length, np.int64)
-    fill_cells[grid(length)](entries.there, bucket, start, counts, order)
+    fill_cells[choose_grid(length)](entries.there, bucket, start, counts, order)
     return Cells(cell, start, order)

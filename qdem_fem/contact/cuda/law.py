@@ -18,8 +18,8 @@ from qdem_fem.contact.spheres import DEEPEST
 from qdem_fem.contact.spheres import law as contact_kernel
 from qdem_fem.kernel.cuda import AGAIN, DEEP, LIMIT, cuda
 
-slider: Any = cuda.jit(device=True)(contact_kernel.slider.py_func)
-series: Any = cuda.jit(device=True)(contact_kernel.series.py_func)
+slider: Any = cuda.jit(device=True)(contact_kernel.slide_spring.py_func)
+series: Any = cuda.jit(device=True)(contact_kernel.add_in_series.py_func)
 
 
 @cuda.jit

@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from qdem_fem.contact.cuda.cells import find_cell_bucket, find_cells, find_entries, put_zeros
+from qdem_fem.contact.cuda.cells import find_cell_bucket, find_cells, find_entries, write_zeros
 from qdem_fem.contact.search import Pairs, PeriodicWidth
 from qdem_fem.contact.spheres import Contact
-from qdem_fem.kernel.cuda import cuda, grid, sum_before
+from qdem_fem.kernel.cuda import choose_grid, cuda, sum_before
 
 
 @cuda.jit(device=True)
@@ -37,7 +37,7 @@ def build_rows_kernel(filling: bool) -> Any:
     """The kernel that goes through the cells: it counts pairs, or, ``filling``, writes them."""
 
     @cuda.jit
-    def rows(
+    def scan_rows(
         at: Any, turn: Any, there: Any, cell: Any, start: Any, order: Any, radius: Any, body: Any,
         skin: Any, axis: Any, width: Any, counts: Any, backs: Any, first: Any, second: Any,
         image: Any,
@@ -92,7 +92,7 @@ def build_rows_kernel(filling: bool) -> Any:
         if not filling:
             counts[i] = found
 
-    return rows
+    return scan_rows
 
 
 @cuda.jit
@@ -202,31 +202,31 @@ def renew_pairs(
     entries = find_entries(position, 2 * largest + skin, side)
     cells = find_cells(entries, 2 * largest + skin)
     counts, backs = (cuda.device_array(count, np.int64) for _ in range(2))
-    put_zeros[grid(count)](backs)
+    write_zeros[choose_grid(count)](backs)
     looked = (*entries, *cells, radius, body, skin, axis, width, counts, backs)
-    build_rows_kernel(False)[grid(count)](*looked, old.first, old.second, entries.at)
+    build_rows_kernel(False)[choose_grid(count)](*looked, old.first, old.second, entries.at)
     first, back_first = sum_before(counts, count), sum_before(backs, count)
     rows = max(1, int(first[count]))
     second, back_pair = (cuda.device_array(rows, np.int64) for _ in range(2))
     image = old.image if side is None else cuda.device_array((rows, 3))
-    build_rows_kernel(True)[grid(count)](
+    build_rows_kernel(True)[choose_grid(count)](
         *looked, first, second, entries.at if side is None else image
     )
-    fill_backs[grid(count)](first, second, back_first, backs, back_pair)
-    sort_backs[grid(count)](back_first, back_pair)
+    fill_backs[choose_grid(count)](first, second, back_first, backs, back_pair)
+    sort_backs[choose_grid(count)](back_first, back_pair)
 
     planes = position, radius, c.planes.point, c.planes.normal, walls, skin
     near, acts = (cuda.device_array(count, np.int64) for _ in range(2))
-    count_walls[grid(count)](*planes, first, back_first, near, acts)
+    count_walls[choose_grid(count)](*planes, first, back_first, near, acts)
     wall_first, acting_first = sum_before(near, count), sum_before(acts, count)
     actors = int(acting_first[count])
     wall = cuda.device_array(max(1, int(wall_first[count])), np.int64)
     acting = cuda.device_array(max(1, actors), np.int64)
-    fill_walls[grid(count)](*planes, wall_first, acting_first, wall, acting)
+    fill_walls[choose_grid(count)](*planes, wall_first, acting_first, wall, acting)
 
     touching = cuda.device_array(rows, np.uint8)
     spring, pull = (cuda.device_array((rows, 3)) for _ in range(2))
-    carry_history[grid(count)](
+    carry_history[choose_grid(count)](
         old.first, old.second, old.touching, old.spring, old.pull, first, second, touching,
         spring, pull,
     )  # fmt: skip

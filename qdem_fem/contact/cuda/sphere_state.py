@@ -68,10 +68,10 @@ class CudaSphereContacts(SphereContacts):
         found: Floats = find_device_extents(position, side.number, self._constants[1])
         return found
 
-    def parted(self, position: Any) -> float:
+    def measure_gap(self, position: Any) -> float:
         return PARTED * find_gap(self._device.on, position, self._device.walls)
 
-    def idle(self) -> int:
+    def count_idle_pairs(self) -> int:
         return count_idle(self._device.on)
 
     def look_for_pairs(self, position: Any, skin: float) -> None:

@@ -12,11 +12,11 @@ import numpy as np
 
 from qdem_fem.contact.cuda.law import series
 from qdem_fem.contact.spheres import Contact
-from qdem_fem.kernel.cuda import cuda, grid
+from qdem_fem.kernel.cuda import choose_grid, cuda
 
 
 @cuda.jit
-def put_positions(
+def write_positions(
     reference: Any, place: Any, displacement: Any, position: Any, astray: Any
 ) -> None:
     """Positions of the spheres; ``astray`` (1,) is one where one is no number."""
@@ -30,8 +30,8 @@ def put_positions(
 
 
 @cuda.jit
-def put_extents(position: Any, axis: Any, first: Any, size: Any) -> None:
-    """`qdem_fem.contact.search.extents`, a thread a body."""
+def write_extents(position: Any, axis: Any, first: Any, size: Any) -> None:
+    """`qdem_fem.contact.search.find_extents`, a thread a body."""
     b = cuda.grid(1)
     if b >= size.size:
         return
@@ -130,20 +130,20 @@ def find_positions(c: Contact, displacement: Any) -> bool:
     """Write the spheres' positions; whether all are numbers."""
     astray = cuda.to_device(np.zeros(1, np.int32))
     count = c.spheres.place.size
-    put_positions[grid(count)](
+    write_positions[choose_grid(count)](
         c.spheres.reference, c.spheres.place, displacement, c.position, astray
     )
     return not astray.copy_to_host()[0]
 
 
 def find_device_extents(position: Any, axis: int, first: Any) -> Any:
-    """`qdem_fem.contact.search.extents` of bodies along an axis [m], (bodies,), on the host.
+    """`qdem_fem.contact.search.find_extents` of bodies along an axis [m], (bodies,), on the host.
 
     ``position`` (c, 3) [m] and ``first`` (bodies + 1,) on the GPU.
     """
     bodies = first.size - 1
     size = cuda.device_array(bodies)
-    put_extents[grid(bodies)](position, axis, first, size)
+    write_extents[choose_grid(bodies)](position, axis, first, size)
     return size.copy_to_host()
 
 
@@ -153,7 +153,7 @@ def find_gap(c: Contact, position: Any, walls: int) -> float:
     pairs, planes = c.pairs, c.planes
     periodic = pairs.image.ndim > 1
     image = pairs.image if periodic else position  # not looked at
-    find_greatest_gap[grid(count)](
+    find_greatest_gap[choose_grid(count)](
         position, c.spheres.radius, pairs.first, pairs.second, pairs.touching, image, periodic,
         planes.point, planes.normal, planes.force, walls, greatest,
     )  # fmt: skip
@@ -163,7 +163,7 @@ def find_gap(c: Contact, position: Any, walls: int) -> float:
 def count_idle(c: Contact) -> int:
     """Pairs of the list that do not touch."""
     count = cuda.to_device(np.zeros(1, np.int64))
-    add_idle[grid(c.spheres.radius.size)](c.pairs.first, c.pairs.touching, count)
+    add_idle[choose_grid(c.spheres.radius.size)](c.pairs.first, c.pairs.touching, count)
     return int(count.copy_to_host()[0])
 
 
@@ -176,6 +176,6 @@ def bound_present(c: Contact, walls: int, inverse_mass: Any) -> float:
     greatest, total = cuda.to_device(np.zeros(1)), cuda.to_device(np.zeros(count))
     walled = cuda.device_array(count, np.uint8)
     listed = pairs.first, pairs.second, pairs.touching
-    sum_springs[grid(count)](*listed, c.spheres.normal, c.planes.force, walls, total, walled)
-    bound_greatest[grid(count)](*listed, total, walled, inverse_mass, greatest)
+    sum_springs[choose_grid(count)](*listed, c.spheres.normal, c.planes.force, walls, total, walled)
+    bound_greatest[choose_grid(count)](*listed, total, walled, inverse_mass, greatest)
     return float(greatest.copy_to_host()[0])

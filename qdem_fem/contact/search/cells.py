@@ -122,7 +122,7 @@ def compute_half_reach(radius: float, skin: float) -> float:  # pragma: no cover
 
 
 @njit(cache=True)
-def take_inside(
+def collect_inside(
     position: Any, radius: Any, skin: float, mine: Any, low: Any, high: Any, found: Any
 ) -> int:  # pragma: no cover
     """Put those of the spheres ``mine`` into ``found`` that reach into a box; how many."""
@@ -174,11 +174,11 @@ def find_pairs(
                 if not meet:
                     continue
                 more = order[first[h] : first[h + 1]]
-                ours = take_inside(position, radius, skin, own, low[h], high[h], here)
-                theirs = take_inside(position, radius, skin, more, low[g], high[g], there)
+                ours = collect_inside(position, radius, skin, own, low[h], high[h], here)
+                theirs = collect_inside(position, radius, skin, more, low[g], high[g], there)
                 most = found + ours * theirs
                 if most > one.size:
-                    one, other = longer(one, most), longer(other, most)
+                    one, other = grow_array(one, most), grow_array(other, most)
                 for i in here[:ours]:
                     for j in there[:theirs]:
                         reach = radius[i] + radius[j] + skin
@@ -192,7 +192,7 @@ def find_pairs(
 
 
 @njit(cache=True)
-def longer(array: Any, least: int) -> Any:  # pragma: no cover
+def grow_array(array: Any, least: int) -> Any:  # pragma: no cover
     """A copy with room for at least so many rows, and twice as many as before."""
     grown = np.empty((max(2 * len(array), least), *array.shape[1:]), array.dtype)
     grown[: len(array)] = array

@@ -108,7 +108,7 @@ def check_joined(body: Body, master: Integers, side: PeriodicWidth, where: str) 
         )
 
 
-def extents(along: Floats, first: Integers) -> Floats:
+def find_extents(along: Floats, first: Integers) -> Floats:
     """Extent of each body along an axis [m], (bodies,).
 
     ``along`` (c,): coordinates of the vertices of all bodies [m]; ``first`` (bodies + 1,): first
@@ -126,8 +126,8 @@ def check_extents(
 ) -> float:
     """Raise `ConditionError` for a body that comes within ``reach`` [m] of its own image.
 
-    ``size``: `extents` of the bodies along the axis [m].  Returns by how much the reach could be
-    more [m].
+    ``size``: `find_extents` of the bodies along the axis [m].  Returns by how much the reach could
+    be more [m].
     """
     room = side.width / 2 - reach
     if room <= 0:

@@ -9,12 +9,12 @@ from qdem_fem.contact.spheres.law import (
     Contact,
     Planes,
     Spheres,
+    add_in_series,
     advance_one,
     advance_threads,
-    minus,
-    put_row,
-    series,
-    slider,
+    slide_spring,
+    subtract_rows,
+    write_row,
 )
 from qdem_fem.contact.spheres.options import (
     NEAR,
@@ -32,8 +32,8 @@ from qdem_fem.contact.spheres.options import (
 
 __all__ = [
     "DEEPEST", "GO_ON", "LOOK_AGAIN", "NEAR", "SKIN_OF_SPHERES", "TOO_DEEP", "Contact",
-    "ContactPlane", "Planes", "SphereContact", "Spheres", "advance_one", "advance_threads",
-    "check_contact_number", "check_contact_planes", "check_planes_along", "compute_pair_stiffness",
-    "compute_tangential_stiffness", "find_body_value", "law", "make_plane_arrays", "minus",
-    "put_row", "series", "slider",
+    "ContactPlane", "Planes", "SphereContact", "Spheres", "add_in_series", "advance_one",
+    "advance_threads", "check_contact_number", "check_contact_planes", "check_planes_along",
+    "compute_pair_stiffness", "compute_tangential_stiffness", "find_body_value", "law",
+    "make_plane_arrays", "slide_spring", "subtract_rows", "write_row",
 ]  # fmt: skip

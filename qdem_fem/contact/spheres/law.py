@@ -17,7 +17,7 @@ from numba.extending import overload
 
 from qdem_fem import kernel as compiling
 from qdem_fem.contact.search import Pairs
-from qdem_fem.kernel import digest_sources, exact, inlined, row
+from qdem_fem.kernel import digest_sources, exact, inlined, read_row
 
 SPHERES_AT_ONCE = 512
 """Spheres that one thread takes at a time."""
@@ -83,7 +83,7 @@ class Contact(NamedTuple):
 
 
 @inlined
-def slider(
+def slide_spring(
     spring: Any, normal: Any, way: Any, stiffness: float, limit: float
 ) -> Any:  # pragma: no cover
     """The spring after a relative ``way`` [m] under a ``limit`` mu F_n [N]: ``(s, loss [J])``.
@@ -114,13 +114,13 @@ def slider(
 
 
 @inlined
-def minus(a: Any, i: int, b: Any, j: int) -> Any:  # pragma: no cover
+def subtract_rows(a: Any, i: int, b: Any, j: int) -> Any:  # pragma: no cover
     """Row i of ``a`` less row j of ``b``."""
     return a[i, 0] - b[j, 0], a[i, 1] - b[j, 1], a[i, 2] - b[j, 2]
 
 
 @inlined
-def put_row(a: Any, i: int, values: Any) -> None:  # pragma: no cover
+def write_row(a: Any, i: int, values: Any) -> None:  # pragma: no cover
     """Row i of ``a`` becomes ``values``."""
     a[i, 0], a[i, 1], a[i, 2] = values
 
@@ -137,7 +137,7 @@ def subtract_row(d: Any, image: Any, p: int) -> Any:  # pragma: no cover
 
 
 @overload(subtract_image, strict=False, jit_options={"error_model": "numpy", "forceinline": True})
-def _image_less(d: Any, image: Any, p: int) -> Any:
+def _choose_subtraction(d: Any, image: Any, p: int) -> Any:
     if image.ndim == 1:
         return lambda d, image, p: d
     return lambda d, image, p: subtract_row(d, image, p)
@@ -167,7 +167,7 @@ def compute_pairs_forces(
         fx, fy, fz = 0.0, 0.0, 0.0
         for p in range(pairs.first[i], pairs.first[i + 1]):
             j = pairs.second[p]
-            d = subtract_image(minus(c.position, i, c.position, j), pairs.image, p)
+            d = subtract_image(subtract_rows(c.position, i, c.position, j), pairs.image, p)
             square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
             reach = sphere.radius[i] + sphere.radius[j]
             open_now = square >= reach * reach
@@ -178,26 +178,26 @@ def compute_pairs_forces(
             deepest = max(deepest, overlap / min(sphere.radius[i], sphere.radius[j]))
             inverse = 1.0 / apart if apart > 0.0 else 0.0  # no distance is too deep in any case
             n = d[0] * inverse, d[1] * inverse, d[2] * inverse
-            push = series(sphere.normal[i], sphere.normal[j]) * overlap
-            k_t = series(sphere.tangential[i], sphere.tangential[j])
+            push = add_in_series(sphere.normal[i], sphere.normal[j]) * overlap
+            k_t = add_in_series(sphere.tangential[i], sphere.tangential[j])
             v, at, there = velocity, sphere.place[i], sphere.place[j]
             way = (
                 step * (v[at] - v[there]), step * (v[at + 1] - v[there + 1]),
                 step * (v[at + 2] - v[there + 2]),
             )  # fmt: skip
-            s, loss = slider(row(pairs.spring, p), n, way, k_t, c.friction * push)
+            s, loss = slide_spring(read_row(pairs.spring, p), n, way, k_t, c.friction * push)
             f = push * n[0] - k_t * s[0], push * n[1] - k_t * s[1], push * n[2] - k_t * s[2]
             c.slid[i] += loss
             pairs.touching[p] = not open_now  # where spheres part, nothing is left of the spring
-            put_row(pairs.spring, p, s)
-            put_row(pairs.pull, p, f)
+            write_row(pairs.spring, p, s)
+            write_row(pairs.pull, p, f)
             fx, fy, fz = fx + f[0], fy + f[1], fz + f[2]
-        put_row(c.force, i, (fx, fy, fz))
+        write_row(c.force, i, (fx, fy, fz))
     return deepest
 
 
 @inlined
-def series(one: float, other: float) -> float:  # pragma: no cover
+def add_in_series(one: float, other: float) -> float:  # pragma: no cover
     """`qdem_fem.contact.spheres.compute_pair_stiffness`"""
     return 2.0 * one * other / (one + other)
 
@@ -211,8 +211,8 @@ def compute_planes_forces(
     for i in pairs.acting[low:high]:
         for entry in range(pairs.wall_first[i], pairs.wall_first[i + 1]):
             w = pairs.wall[entry]
-            n, spring, force = row(planes.normal, w), planes.spring[w], planes.force[w]
-            d, radius = minus(c.position, i, planes.point, w), c.spheres.radius[i]
+            n, spring, force = read_row(planes.normal, w), planes.spring[w], planes.force[w]
+            d, radius = subtract_rows(c.position, i, planes.point, w), c.spheres.radius[i]
             overlap = radius - (d[0] * n[0] + d[1] * n[1] + d[2] * n[2])
             if overlap <= 0.0 and force[i, 0] == 0.0 and force[i, 1] == 0.0 and force[i, 2] == 0.0:
                 continue
@@ -221,11 +221,11 @@ def compute_planes_forces(
             k_t = 2.0 * c.spheres.tangential[i]
             at = c.spheres.place[i]
             way = step * velocity[at], step * velocity[at + 1], step * velocity[at + 2]
-            s, loss = slider(row(spring, i), n, way, k_t, planes.friction[w] * push)
+            s, loss = slide_spring(read_row(spring, i), n, way, k_t, planes.friction[w] * push)
             f = push * n[0] - k_t * s[0], push * n[1] - k_t * s[1], push * n[2] - k_t * s[2]
             c.slid[i] += loss
-            put_row(spring, i, s)
-            put_row(force, i, f)
+            write_row(spring, i, s)
+            write_row(force, i, f)
             for k in range(3):
                 c.force[i, k] += f[k]
     return deepest
@@ -243,7 +243,7 @@ def add_reactions(c: Any, low: int, high: int) -> None:  # pragma: no cover
                     c.force[j, k] -= pairs.pull[p, k]
 
 
-def advance_build(threads: bool) -> Any:
+def build_advance(threads: bool) -> Any:
     """A step of contact for one thread, or for as many as numba is set to."""
     made_from = f"{threads} {digest_sources(compiling)}"
 
@@ -288,5 +288,5 @@ def advance_build(threads: bool) -> Any:
     return advance
 
 
-advance_one: Any = advance_build(threads=False)
-advance_threads: Any = advance_build(threads=True)
+advance_one: Any = build_advance(threads=False)
+advance_threads: Any = build_advance(threads=True)

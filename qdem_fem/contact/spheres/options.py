@@ -102,7 +102,7 @@ class SphereContact:
         check_contact_planes(self.planes)
         check_planes_along(self.periodic, self.planes)
 
-    def of_body(self, name: str, quantity: str) -> float:
+    def find_value(self, name: str, quantity: str) -> float:
         """``radius`` or ``normal_stiffness`` of a body; `ConditionError` where it has none."""
         return find_body_value(getattr(self, quantity), name, quantity)
 

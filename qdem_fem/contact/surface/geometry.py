@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from qdem_fem.contact.spheres import minus
-from qdem_fem.kernel import cross, dot, exact, inlined, row
+from qdem_fem.contact.spheres import subtract_rows
+from qdem_fem.kernel import cross, dot, exact, inlined, read_row
 
 TIE = 1e-9
 """Relative difference of squared distances below which two faces are equally near."""
@@ -19,11 +19,11 @@ TIE = 1e-9
 @exact
 def find_closest_on_face(p: Any, a: Any, b: Any, c: Any) -> Any:  # pragma: no cover
     """Barycentric coordinates of the point of triangle abc nearest to p (Ericson 2005, 5.1.5)."""
-    ab, ac, ap = less(b, a), less(c, a), less(p, a)
+    ab, ac, ap = subtract(b, a), subtract(c, a), subtract(p, a)
     d1, d2 = dot(ab, ap), dot(ac, ap)
     if d1 <= 0.0 and d2 <= 0.0:
         return 1.0, 0.0, 0.0
-    bp = less(p, b)
+    bp = subtract(p, b)
     d3, d4 = dot(ab, bp), dot(ac, bp)
     if d3 >= 0.0 and d4 <= d3:
         return 0.0, 1.0, 0.0
@@ -31,7 +31,7 @@ def find_closest_on_face(p: Any, a: Any, b: Any, c: Any) -> Any:  # pragma: no c
     if vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
         v = d1 / (d1 - d3)
         return 1.0 - v, v, 0.0
-    cp = less(p, c)
+    cp = subtract(p, c)
     d5, d6 = dot(ab, cp), dot(ac, cp)
     if d6 >= 0.0 and d5 <= d6:
         return 0.0, 0.0, 1.0
@@ -72,13 +72,13 @@ def blend_velocity(velocity: Any, place: Any, nodes: Any, share: Any) -> Any:  #
 
 
 @inlined
-def scaled(factor: float, a: Any) -> Any:  # pragma: no cover
+def scale(factor: float, a: Any) -> Any:  # pragma: no cover
     """``factor`` times a vector."""
     return factor * a[0], factor * a[1], factor * a[2]
 
 
 @inlined
-def less(a: Any, b: Any) -> Any:  # pragma: no cover
+def subtract(a: Any, b: Any) -> Any:  # pragma: no cover
     """``a - b``"""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
@@ -96,7 +96,7 @@ def compute_segments_apart(w: Any, u: Any, v: Any) -> float:  # pragma: no cover
         t, s = 0.0, min(1.0, max(0.0, -uw / uu))
     elif t > 1.0:
         t, s = 1.0, min(1.0, max(0.0, (uv - uw) / uu))
-    d = less(w, less(scaled(t, v), scaled(s, u)))
+    d = subtract(w, subtract(scale(t, v), scale(s, u)))
     return np.sqrt(dot(d, d))
 
 
@@ -104,8 +104,8 @@ def compute_segments_apart(w: Any, u: Any, v: Any) -> float:  # pragma: no cover
 def compute_face_normal(position: Any, face: Any, f: int) -> Any:  # pragma: no cover
     """Unit normal of a face."""
     i, j, k = face[f, 0], face[f, 1], face[f, 2]
-    n = cross(minus(position, j, position, i), minus(position, k, position, i))
-    return scaled(1.0 / np.sqrt(dot(n, n)), n)
+    n = cross(subtract_rows(position, j, position, i), subtract_rows(position, k, position, i))
+    return scale(1.0 / np.sqrt(dot(n, n)), n)
 
 
 @exact
@@ -117,23 +117,27 @@ def find_depth(p: Any, position: Any, face: Any, faces: Any) -> Any:  # pragma: 
     nearest, plane, found = np.inf, 0.0, -1
     for f in faces:
         i, j, k = face[f, 0], face[f, 1], face[f, 2]
-        share = find_closest_on_face(p, row(position, i), row(position, j), row(position, k))
-        d = less(p, blend(position, (i, j, k), share))
+        share = find_closest_on_face(
+            p, read_row(position, i), read_row(position, j), read_row(position, k)
+        )
+        d = subtract(p, blend(position, (i, j, k), share))
         square = dot(d, d)
         if square > nearest * (1.0 + TIE):
             continue
-        height = dot(less(p, row(position, i)), compute_face_normal(position, face, f))
+        height = dot(subtract(p, read_row(position, i)), compute_face_normal(position, face, f))
         if square < nearest * (1.0 - TIE) or abs(height) > abs(plane):
             nearest, plane, found = min(square, nearest), height, f
     if found < 0:
         return -np.inf, (0.0, 0.0, 0.0), -1, (0.0, 0.0, 0.0)
     i, j, k = face[found, 0], face[found, 1], face[found, 2]
-    share = find_closest_on_face(p, row(position, i), row(position, j), row(position, k))
+    share = find_closest_on_face(
+        p, read_row(position, i), read_row(position, j), read_row(position, k)
+    )
     n = compute_face_normal(position, face, found)
-    away = less(blend(position, (i, j, k), share), p)
+    away = subtract(blend(position, (i, j, k), share), p)
     length = np.sqrt(dot(away, away))
     if plane >= 0.0:
         return -length, n, found, share
     if -plane < length * (1.0 - TIE):  # the nearest point is on an edge that bends inwards
-        n = scaled(1.0 / length, away)
+        n = scale(1.0 / length, away)
     return length, n, found, share

@@ -11,7 +11,15 @@ import numpy as np
 from numba import njit
 
 from qdem_fem import kernel as compiling
-from qdem_fem.contact.spheres import GO_ON, LOOK_AGAIN, TOO_DEEP, minus, put_row, series, slider
+from qdem_fem.contact.spheres import (
+    GO_ON,
+    LOOK_AGAIN,
+    TOO_DEEP,
+    add_in_series,
+    slide_spring,
+    subtract_rows,
+    write_row,
+)
 from qdem_fem.contact.spheres import law as contact_kernel
 from qdem_fem.contact.surface import geometry as contact_surface_geometry
 from qdem_fem.contact.surface.geometry import (
@@ -20,10 +28,10 @@ from qdem_fem.contact.surface.geometry import (
     compute_face_normal,
     compute_segments_apart,
     find_depth,
-    less,
-    scaled,
+    scale,
+    subtract,
 )
-from qdem_fem.kernel import cross, digest_sources, dot, exact, inlined, row
+from qdem_fem.kernel import cross, digest_sources, dot, exact, inlined, read_row
 
 FLATNESS_POWER = 50
 """Power of a cosine: a vertex or an edge 1 degree from flat bears under 1 %, 10 degrees, half."""
@@ -42,14 +50,14 @@ def add_force(force: Any, nodes: Any, share: Any, f: Any, sign: float) -> None: 
 
 
 @inlined
-def law(
+def apply_law(
     c: Any, spring: Any, at: int, n: Any, g: float, way: Any, k_n: float, k_t: float,
     friction: float,
 ) -> Any:  # fmt: skip  # pragma: no cover
     """Force on the one that is inside by ``g`` along n; springs and the account are kept."""
     push = k_n * max(g, 0.0)
-    s, loss = slider(row(spring, at), n, way, k_t, friction * push)
-    put_row(spring, at, s)
+    s, loss = slide_spring(read_row(spring, at), n, way, k_t, friction * push)
+    write_row(spring, at, s)
     c.account[0] += 0.5 * push * max(g, 0.0) + 0.5 * k_t * dot(s, s)
     c.account[1] += loss
     return push * n[0] - k_t * s[0], push * n[1] - k_t * s[1], push * n[2] - k_t * s[2]
@@ -78,10 +86,10 @@ def compute_edge_flatness(
     i, j = surface.edge[e, 0], surface.edge[e, 1]
     flat = 0.0
     for k in range(2):
-        m = cross(minus(x, j, x, i), minus(x, surface.edge_opposite[e, k], x, i))
+        m = cross(subtract_rows(x, j, x, i), subtract_rows(x, surface.edge_opposite[e, k], x, i))
         # of either sense: the sign is that of the side the rest of the body is not on
-        if dot(m, minus(x, surface.edge_opposite[e, 1 - k], x, i)) > 0.0:
-            m = scaled(-1.0, m)
+        if dot(m, subtract_rows(x, surface.edge_opposite[e, 1 - k], x, i)) > 0.0:
+            m = scale(-1.0, m)
         flat = max(flat, sign * dot(m, n) / np.sqrt(dot(m, m)))
     return flat
 
@@ -102,7 +110,7 @@ def compute_points_forces(
             continue
         q = near.point[at]
         nodes = surface.point_node[q, 0], surface.point_node[q, 1], surface.point_node[q, 2]
-        share = row(surface.point_share, q)
+        share = read_row(surface.point_share, q)
         p = blend(x, nodes, share)
         faces = near.face[near.first[at] : near.first[at + 1]]
         g, n, f, below = find_depth(p, x, surface.face, faces)
@@ -114,17 +122,17 @@ def compute_points_forces(
         deepest = max(deepest, g if near.weight[at] > 0.0 else 0.0)
         other = near.body[at]
         half = 0.5 * max(near.weight[at], 0.0)
-        k_n = half * series(surface.modulus[surface.point_body[q]], surface.modulus[other])
-        k_t = half * series(surface.shear[surface.point_body[q]], surface.shear[other])
+        k_n = half * add_in_series(surface.modulus[surface.point_body[q]], surface.modulus[other])
+        k_t = half * add_in_series(surface.shear[surface.point_body[q]], surface.shear[other])
         under = surface.face[f, 0], surface.face[f, 1], surface.face[f, 2]
-        way = scaled(
+        way = scale(
             step,
-            less(
+            subtract(
                 blend_velocity(velocity, surface.place, nodes, share),
                 blend_velocity(velocity, surface.place, under, below),
             ),
         )
-        force = law(c, near.spring, at, n, g, way, k_n, k_t, c.friction)
+        force = apply_law(c, near.spring, at, n, g, way, k_n, k_t, c.friction)
         add_force(c.force, nodes, share, force, 1.0)
         add_force(c.force, under, below, force, -1.0)
         if g <= 0.0:
@@ -146,8 +154,8 @@ def compute_edges_forces(
             continue
         a, b = near.edges[at, 0], near.edges[at, 1]
         i, j, k, m = surface.edge[a, 0], surface.edge[a, 1], surface.edge[b, 0], surface.edge[b, 1]
-        u, v = minus(x, j, x, i), minus(x, m, x, k)
-        w = minus(x, i, x, k)
+        u, v = subtract_rows(x, j, x, i), subtract_rows(x, m, x, k)
+        w = subtract_rows(x, i, x, k)
         uu, uv, vv, uw, vw = dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w)
         determinant = uu * vv - uv * uv
         g, n, s, t = -1.0, (0.0, 0.0, 0.0), 0.0, 0.0
@@ -155,15 +163,15 @@ def compute_edges_forces(
             s, t = (uv * vw - vv * uw) / determinant, (uu * vw - uv * uw) / determinant
             if 0.0 < s < 1.0 and 0.0 < t < 1.0:
                 n = cross(u, v)
-                n = scaled(1.0 / np.sqrt(dot(n, n)), n)
-                if dot(minus(x, surface.edge_opposite[b, 0], x, k), n) > 0.0:
-                    n = scaled(-1.0, n)
+                n = scale(1.0 / np.sqrt(dot(n, n)), n)
+                if dot(subtract_rows(x, surface.edge_opposite[b, 0], x, k), n) > 0.0:
+                    n = scale(-1.0, n)
                 # n is outward of b where both its faces fall away from it, and inward of a
                 if (
-                    dot(minus(x, surface.edge_opposite[b, 0], x, k), n) < 0.0
-                    and dot(minus(x, surface.edge_opposite[b, 1], x, k), n) < 0.0
-                    and dot(minus(x, surface.edge_opposite[a, 0], x, i), n) > 0.0
-                    and dot(minus(x, surface.edge_opposite[a, 1], x, i), n) > 0.0
+                    dot(subtract_rows(x, surface.edge_opposite[b, 0], x, k), n) < 0.0
+                    and dot(subtract_rows(x, surface.edge_opposite[b, 1], x, k), n) < 0.0
+                    and dot(subtract_rows(x, surface.edge_opposite[a, 0], x, i), n) > 0.0
+                    and dot(subtract_rows(x, surface.edge_opposite[a, 1], x, i), n) > 0.0
                 ):
                     g = -dot(w, n)
                     if g > c.depth:
@@ -174,9 +182,9 @@ def compute_edges_forces(
             continue
         one, two = (1.0 - s, s, 0.0), (1.0 - t, t, 0.0)
         nodes, under = (i, j, i), (k, m, k)
-        way = scaled(
+        way = scale(
             step,
-            less(
+            subtract(
                 blend_velocity(velocity, surface.place, nodes, one),
                 blend_velocity(velocity, surface.place, under, two),
             ),
@@ -190,10 +198,10 @@ def compute_edges_forces(
             # what slides onto an edge begins without a force
             near.edge_start[at] = 0.0 if step == 0.0 or g + dot(way, n) <= 0.0 else g
         body, other = surface.edge_body[a], surface.edge_body[b]
-        k_n = near.edge_weight[at] * series(surface.modulus[body], surface.modulus[other])
-        k_t = near.edge_weight[at] * series(surface.shear[body], surface.shear[other])
+        k_n = near.edge_weight[at] * add_in_series(surface.modulus[body], surface.modulus[other])
+        k_t = near.edge_weight[at] * add_in_series(surface.shear[body], surface.shear[other])
         g_eff = g - near.edge_start[at] if g > 0.0 else 0.0
-        force = law(c, near.edge_spring, at, n, g_eff, way, k_n, k_t, c.friction)
+        force = apply_law(c, near.edge_spring, at, n, g_eff, way, k_n, k_t, c.friction)
         add_force(c.force, nodes, one, force, 1.0)
         add_force(c.force, under, two, force, -1.0)
         if g <= 0.0:
@@ -206,12 +214,12 @@ def compute_walls_forces(c: Any, velocity: Any, step: float) -> float:  # pragma
     surface, walls, x = c.surface, c.walls, c.position
     deepest = 0.0
     for w in range(walls.point.shape[0]):
-        n = row(walls.normal, w)
+        n = read_row(walls.normal, w)
         total = (0.0, 0.0, 0.0)
         for q in range(surface.point_area.size):
             nodes = surface.point_node[q, 0], surface.point_node[q, 1], surface.point_node[q, 2]
-            share = row(surface.point_share, q)
-            g = -dot(less(blend(x, nodes, share), row(walls.point, w)), n)
+            share = read_row(surface.point_share, q)
+            g = -dot(subtract(blend(x, nodes, share), read_row(walls.point, w)), n)
             if g <= 0.0 and walls.weight[w, q] < 0.0:
                 continue
             if g > 0.0 and walls.weight[w, q] < 0.0:
@@ -220,13 +228,13 @@ def compute_walls_forces(c: Any, velocity: Any, step: float) -> float:  # pragma
             weight = 2.0 * max(walls.weight[w, q], 0.0)
             k_n = weight * surface.modulus[surface.point_body[q]]
             k_t = weight * surface.shear[surface.point_body[q]]
-            way = scaled(step, blend_velocity(velocity, surface.place, nodes, share))
-            force = law(c, walls.spring[w], q, n, g, way, k_n, k_t, walls.friction[w])
+            way = scale(step, blend_velocity(velocity, surface.place, nodes, share))
+            force = apply_law(c, walls.spring[w], q, n, g, way, k_n, k_t, walls.friction[w])
             add_force(c.force, nodes, share, force, 1.0)
-            total = less(total, force)
+            total = subtract(total, force)
             if g <= 0.0:
                 walls.weight[w, q] = -1.0
-        put_row(walls.force, w, total)
+        write_row(walls.force, w, total)
     return deepest
 
 

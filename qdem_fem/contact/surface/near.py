@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from qdem_fem.contact.search import longer
+from qdem_fem.contact.search import grow_array
 from qdem_fem.contact.surface.arrays import Near, Surface
 from qdem_fem.contact.surface.geometry import blend
 from qdem_fem.files import Integers
-from qdem_fem.kernel import row
+from qdem_fem.kernel import read_row
 
 
 @njit(cache=True)
@@ -54,7 +54,7 @@ def find_points_nearby(
     for q in range(len(points)):
         nodes = surface.point_node[q, 0], surface.point_node[q, 1], surface.point_node[q, 2]
         points[q, 0], points[q, 1], points[q, 2] = blend(
-            position, nodes, row(surface.point_share, q)
+            position, nodes, read_row(surface.point_share, q)
         )
     face_low, face_high = make_boxes_of(position, surface.face)
     found = np.empty((64, 3), np.int64)  # point, body, first face
@@ -71,12 +71,12 @@ def find_points_nearby(
                 for f in range(first_face[b], first_face[b + 1]):
                     if are_boxes_near(points, points, q, face_low, face_high, f, reach):
                         if total == len(faces):
-                            faces = longer(faces, total + 1)
+                            faces = grow_array(faces, total + 1)
                         faces[total] = f
                         total += 1
                 if total > begin:
                     if count == len(found):
-                        found = longer(found, count + 1)
+                        found = grow_array(found, count + 1)
                     found[count, 0], found[count, 1], found[count, 2] = q, b, begin
                     count += 1
     first = np.empty(count + 1, np.int64)
@@ -102,7 +102,7 @@ def find_edges_nearby(
                 for j in range(first_edge[b], first_edge[b + 1]):
                     if are_boxes_near(edge_low, edge_high, i, edge_low, edge_high, j, reach):
                         if count == len(found):
-                            found = longer(found, count + 1)
+                            found = grow_array(found, count + 1)
                         found[count, 0], found[count, 1] = i, j
                         count += 1
     return found[:count].copy()

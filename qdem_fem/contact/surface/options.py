@@ -74,7 +74,7 @@ class SurfaceContact:
         check_contact_number(self.points, "points", above=True)
         check_contact_planes(self.planes)
 
-    def of_body(self, name: str, quantity: str) -> float:
+    def find_value(self, name: str, quantity: str) -> float:
         """``modulus`` of a body; `ConditionError` where it has none."""
         return find_body_value(getattr(self, quantity), name, quantity)
 

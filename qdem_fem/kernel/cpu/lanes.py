@@ -47,10 +47,10 @@ class Lanes(types.Type):
     @property
     def vector(self) -> ir.VectorType:
         """The LLVM type."""
-        return ir.VectorType(_number(self.dtype), self.width)
+        return ir.VectorType(_find_type(self.dtype), self.width)
 
 
-def _number(dtype: types.Float) -> ir.Type:
+def _find_type(dtype: types.Float) -> ir.Type:
     return ir.FloatType() if dtype is types.float32 else ir.DoubleType()
 
 
@@ -64,7 +64,7 @@ class LanesModel(models.PrimitiveModel):
 
 def _broadcast(builder: ir.IRBuilder, number: ir.Value, lanes: Lanes) -> ir.Value:
     """The same number in every lane, in the lanes' precision."""
-    scalar = _number(lanes.dtype)
+    scalar = _find_type(lanes.dtype)
     if number.type != scalar:
         cast = builder.fptrunc if isinstance(scalar, ir.FloatType) else builder.fpext
         number = cast(number, scalar)
@@ -79,7 +79,7 @@ def _shuffle(builder: ir.IRBuilder, a: ir.Value, b: ir.Value, lanes: Sequence[in
     return builder.shuffle_vector(a, b, mask)
 
 
-def _arithmetic(symbol: Callable[..., Any], instruction: str) -> None:
+def _register_operator(symbol: Callable[..., Any], instruction: str) -> None:
     """Teach numba ``lanes (symbol) lanes`` and both mixtures with a plain number."""
 
     class Typing(AbstractTemplate):
@@ -110,27 +110,27 @@ for _symbol, _instruction in (
     (operator.mul, "fmul"),
     (operator.truediv, "fdiv"),
 ):
-    _arithmetic(_symbol, _instruction)
+    _register_operator(_symbol, _instruction)
 
 
-def _pointer(context: Any, builder: Any, kind: types.Array, array: Any, offset: Any) -> Any:
+def _make_pointer(context: Any, builder: Any, kind: types.Array, array: Any, offset: Any) -> Any:
     """Address of element ``offset`` of a contiguous array, whatever its shape."""
     data = context.make_array(kind)(context, builder, array).data
     return builder.gep(data, [offset], inbounds=True)
 
 
-def _vector_at(builder: Any, pointer: Any, number: ir.Type, width: int) -> Any:
+def _cast_pointer(builder: Any, pointer: Any, number: ir.Type, width: int) -> Any:
     return builder.bitcast(pointer, ir.VectorType(number, width).as_pointer())
 
 
-def _node_rows(context: Any, builder: Any, kind: Any, array: Any, at: list[Any]) -> list[Any]:
+def _load_node_rows(context: Any, builder: Any, kind: Any, array: Any, at: list[Any]) -> list[Any]:
     """The vectors of four numbers that begin at the elements ``at`` of an array."""
-    number, size = _number(kind.dtype), kind.dtype.bitwidth // 8
-    pointers = [_pointer(context, builder, kind, array, offset) for offset in at]
-    return [builder.load(_vector_at(builder, p, number, 4), align=4 * size) for p in pointers]
+    number, size = _find_type(kind.dtype), kind.dtype.bitwidth // 8
+    pointers = [_make_pointer(context, builder, kind, array, offset) for offset in at]
+    return [builder.load(_cast_pointer(builder, p, number, 4), align=4 * size) for p in pointers]
 
 
-def _side_by_side(builder: Any, rows: list[Any]) -> list[Any]:
+def _join_rows(builder: Any, rows: list[Any]) -> list[Any]:
     """Four vectors, the i-th made of the rows i, 4 + i, 8 + i, ... one after the other."""
     four = []
     for i in range(4):
@@ -166,7 +166,7 @@ def _transpose(builder: Any, r: list[Any]) -> list[Any]:
     return [mix(a, c, *front), mix(a, c, *back), mix(b, d, *front), mix(b, d, *back)]
 
 
-def _block_corners(
+def _load_corners(
     context: Any, builder: Any, kind: Any, array: Any, block: Any, width: int, *, again: bool
 ) -> list[list[Any]]:
     """``corners[corner][lane]``: where a block's nodes begin in a nodal array.
@@ -183,7 +183,7 @@ def _block_corners(
         lanes = []
         for lane in range(width):
             at = builder.add(start, start.type(corner * width + lane))
-            number = builder.load(_pointer(context, builder, kind, array, at))
+            number = builder.load(_make_pointer(context, builder, kind, array, at))
             lanes.append(builder.sext(number, ir.IntType(64)))
         corners.append(lanes)
     return corners
@@ -195,15 +195,15 @@ def load_lanes(typingctx: Any, array: Any, offset: Any) -> Any:
     width = count_lane(array.dtype)
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        pointer = _pointer(context, builder, array, args[0], args[1])
-        vector = _vector_at(builder, pointer, _number(array.dtype), width)
+        pointer = _make_pointer(context, builder, array, args[0], args[1])
+        vector = _cast_pointer(builder, pointer, _find_type(array.dtype), width)
         return builder.load(vector, align=array.dtype.bitwidth // 8)
 
     return signature(Lanes(array.dtype, width), array, types.intp), codegen
 
 
 @intrinsic
-def stack_align(typingctx: Any) -> Any:
+def align_stack(typingctx: Any) -> Any:
     """Align the stack of the function that calls this for vector registers.
 
     LLVM decides on the frame before it knows that it will have to spill registers, and spills
@@ -227,7 +227,7 @@ def load_row(typingctx: Any, array: Any, offset: Any) -> Any:
     """The four numbers of one node, from element ``offset`` (a multiple of 4) on."""
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return _node_rows(context, builder, array, args[0], [args[1]])[0]
+        return _load_node_rows(context, builder, array, args[0], [args[1]])[0]
 
     return signature(Lanes(array.dtype, 4), array, types.intp), codegen
 
@@ -237,8 +237,8 @@ def store_row(typingctx: Any, array: Any, offset: Any, row: Any) -> Any:
     """Write the four numbers of one node."""
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        pointer = _pointer(context, builder, array, args[0], args[1])
-        vector = _vector_at(builder, pointer, _number(array.dtype), 4)
+        pointer = _make_pointer(context, builder, array, args[0], args[1])
+        vector = _cast_pointer(builder, pointer, _find_type(array.dtype), 4)
         builder.store(args[2], vector, align=array.dtype.bitwidth // 2)
         return context.get_dummy_value()
 
@@ -250,8 +250,8 @@ def clear_row(typingctx: Any, array: Any, offset: Any) -> Any:
     """Set the four numbers of one node to zero."""
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        pointer = _pointer(context, builder, array, args[0], args[1])
-        vector = _vector_at(builder, pointer, _number(array.dtype), 4)
+        pointer = _make_pointer(context, builder, array, args[0], args[1])
+        vector = _cast_pointer(builder, pointer, _find_type(array.dtype), 4)
         builder.store(
             ir.Constant(vector.type.pointee, None), vector, align=array.dtype.bitwidth // 2
         )
@@ -277,9 +277,9 @@ def gather_edges(typingctx: Any, vectors: Any, corners: Any, block: Any) -> Any:
     width = count_lane(vectors.dtype)
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        at = _block_corners(context, builder, corners, args[1], args[2], width, again=False)
+        at = _load_corners(context, builder, corners, args[1], args[2], width, again=False)
         rows = [
-            _side_by_side(builder, _node_rows(context, builder, vectors, args[0], corner))
+            _join_rows(builder, _load_node_rows(context, builder, vectors, args[0], corner))
             for corner in at
         ]
         out: list[Any] = []
@@ -306,9 +306,9 @@ def scatter_pulls(
     again = forces.dtype is types.float64 and not isinstance(viscous, types.NoneType)
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        at = _block_corners(context, builder, corners, args[1], args[2], width, again=again)
-        number, size = _number(forces.dtype), forces.dtype.bitwidth // 8
-        base = _pointer(context, builder, forces, args[0], args[3])
+        at = _load_corners(context, builder, corners, args[1], args[2], width, again=again)
+        number, size = _find_type(forces.dtype), forces.dtype.bitwidth // 8
+        base = _make_pointer(context, builder, forces, args[0], args[3])
         pull = cgutils.unpack_tuple(builder, args[4], 9)
         nought = ir.Constant(pull[0].type, None)
         rows = [_transpose(builder, [*pull[k : k + 3], nought]) for k in (0, 3, 6)]
@@ -319,7 +319,7 @@ def scatter_pulls(
         for lane in range(width):
             group = range(lane // 4 * 4, lane // 4 * 4 + 4)
             for corner, change in enumerate((sums, *rows)):
-                vector = _vector_at(
+                vector = _cast_pointer(
                     builder, builder.gep(base, [at[corner][lane]], inbounds=True), number, 4
                 )
                 row = _shuffle(builder, change[lane % 4], change[lane % 4], group)
@@ -338,7 +338,7 @@ def mark_not_positive(typingctx: Any, values: Any) -> Any:
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         nought = ir.Constant(values.vector, None)
-        one = _broadcast(builder, ir.Constant(_number(values.dtype), 1.0), values)
+        one = _broadcast(builder, ir.Constant(_find_type(values.dtype), 1.0), values)
         return builder.select(builder.fcmp_unordered("<=", args[0], nought), one, nought)
 
     return signature(values, values), codegen

@@ -85,10 +85,10 @@ def build_layout(
     node_place = np.empty(n_nodes, dtype=np.int64)
     node_place[node_order] = np.arange(n_nodes)
     lanes = count_lane(np.dtype(dtype))
-    element_order = _interleaved(element_order, lanes)
+    element_order = _interleave(element_order, lanes)
     m = len(element_order)
     if not m:
-        return _add_loose(_layout_empty(node_order, node_place, element_rows), loose)
+        return _add_loose(_make_empty_layout(node_order, node_place, element_rows), loose)
     blocks = -(-m // lanes)
     filled = np.concatenate([element_order, np.full(blocks * lanes - m, element_order[-1])])
 
@@ -136,7 +136,7 @@ def build_layout(
     return _add_loose(packed, loose)
 
 
-def _layout_empty(node_order: Integers, node_place: Integers, element_rows: Floats) -> Packed:
+def _make_empty_layout(node_order: Integers, node_place: Integers, element_rows: Floats) -> Packed:
     """The layout without any element: no chunk, no piece."""
     none, end = np.zeros(0, np.int64), np.zeros(1, np.int64)
     corners = np.zeros(0, np.int32)
@@ -156,7 +156,7 @@ def _add_loose(packed: Packed, loose: Integers | None) -> Packed:
     return replace(packed, window_count=start + 4 * len(place), node_window=window)
 
 
-def _interleaved(order: Integers, lanes: int) -> Integers:
+def _interleave(order: Integers, lanes: int) -> Integers:
     """Take the lanes of a block from ``INTERLEAVE`` elements apart."""
     tile = lanes * INTERLEAVE
     whole = len(order) // tile * tile

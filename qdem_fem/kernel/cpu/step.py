@@ -22,6 +22,7 @@ from qdem_fem.element import MEASURES, stress
 from qdem_fem.kernel import digest_sources
 from qdem_fem.kernel.cpu import lanes
 from qdem_fem.kernel.cpu.lanes import (
+    align_stack,
     clear_row,
     count_lane,
     gather_edges,
@@ -30,7 +31,6 @@ from qdem_fem.kernel.cpu.lanes import (
     make_zero_lanes,
     mark_not_positive,
     scatter_pulls,
-    stack_align,
     store_row,
     sum_lanes,
 )
@@ -82,13 +82,13 @@ def compute_viscous_pulls(
 
 
 @overload(compute_elastic_stress, strict=False, jit_options=INLINED)
-def _elastic_stress(law: Any, h: Any, lame_first: Any, lame_second: Any) -> Any:
+def _choose_elastic_stress(law: Any, h: Any, lame_first: Any, lame_second: Any) -> Any:
     chosen = inlined(BY_LAW[law.instance_class].compute_stress_numbers)
     return lambda law, h, lame_first, lame_second: chosen(h, lame_first, lame_second, law.half)
 
 
 @overload(compute_viscous_pulls, strict=False, jit_options=INLINED)
-def _viscous_pulls(
+def _choose_viscous_pulls(
     law: Any, h: Any, w: Any, g: Any, lame_first: Any, lame_second: Any, first: Any, second: Any
 ) -> Any:
     measure = BY_LAW[law.instance_class]
@@ -102,7 +102,7 @@ def _viscous_pulls(
         inlined(measure.compute_viscous_numbers),
     )
 
-    def composed(
+    def compose_pulls(
         law: Any, h: Any, w: Any, g: Any, lame_first: Any, lame_second: Any, first: Any,
         second: Any,
     ) -> Any:  # fmt: skip
@@ -111,7 +111,7 @@ def _viscous_pulls(
         q = viscous(h, rate, first, second, law.half)
         return compute_element_pulls(add(p, q), g), jacobian, compute_matrix_product(q, rate)
 
-    return composed
+    return compose_pulls
 
 
 @inlined()
@@ -134,7 +134,7 @@ def add_chunk_forces(
     Returns how many of its elements are inverted or not finite, and the power that viscosity
     takes [W].
     """
-    stack_align()
+    align_stack()
     width = count_lanes_of(rows)
     bad: Any = make_zero_lanes(rows)
     taken: Any = make_zero_lanes(rows)
@@ -169,7 +169,7 @@ def count_lanes_of(rows: Any) -> int:
 
 
 @overload(count_lanes_of, strict=False)
-def _lane_count_of(rows: Any) -> Any:
+def _find_lane_count(rows: Any) -> Any:
     width = count_lane(rows.dtype)
     return lambda rows: width
 
@@ -250,7 +250,7 @@ def apply_constraints(held: Any, table_row: Any, state: Any, step: float) -> flo
 
 
 @compiled()
-def take_probes(probes: Any, done: int, displacement: Any) -> None:
+def record_probes(probes: Any, done: int, displacement: Any) -> None:
     """Record the probes when the step number asks for it."""
     if done >= probes.first and (done - probes.first) % probes.stride == 0:
         sample = (done - probes.first) // probes.stride
@@ -269,7 +269,7 @@ def build_window(variant: str) -> Any:
     made_from = variant + digest_sources(stress, lanes, *MEASURES.values())
 
     @compiled(parallel=variant == "threads", cache=True)
-    def window(
+    def advance_window(
         law: Any, viscous: Any, layout: Any, state: Any, loads: Any, held: Any, probes: Any,
         table: Any, gravity: Any, work: Any, step: Any, steps: int,
     ) -> tuple[int, float]:  # fmt: skip
@@ -312,13 +312,13 @@ def build_window(variant: str) -> Any:
             if viscous is not None:
                 work[2] += step * taken.sum()
             work[0] += 0.5 * step * compute_loads_power(loads, table[k], velocity)
-            take_probes(probes, k + 1, displacement)
+            record_probes(probes, k + 1, displacement)
             inverted = bad.sum()
             if inverted > 0.0:
                 return k + 1, inverted
         return steps, 0.0
 
-    return window
+    return advance_window
 
 
 @cache

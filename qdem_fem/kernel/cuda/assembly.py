@@ -59,7 +59,7 @@ class NodeActions(NamedTuple):
     memory: Floats
     """Work [J] in this window and velocity given in the last step [m/s], (A + 1, 2)."""
 
-    def of_kind(self, kind: int) -> tuple[NDArray[np.intp], NDArray[np.int32]]:
+    def find_kind(self, kind: int) -> tuple[NDArray[np.intp], NDArray[np.int32]]:
         """Places of all actions of a kind, and their places in the list they came from."""
         found = np.flatnonzero(self.actions[:, 0] == kind)
         return found, self.actions[found, 3]
@@ -134,9 +134,9 @@ class CudaAssembly(Assembly):
         by_node = np.bincount(self.place, weights=self.mass, minlength=self.n_nodes)
         self._mass = cuda.to_device(by_node)
 
-    def kinetic(self) -> float:
+    def kinetic_energy(self) -> float:
         """`Assembly.kinetic`; fields stay on the GPU, where no body has a frame."""
-        return super().kinetic() if self.frames is not None else 0.5 * float(self._sums()[0])
+        return super().kinetic_energy() if self.frames is not None else 0.5 * float(self._sums()[0])
 
     def moment(self) -> Floats:
         """`Assembly.moment`; fields stay on the GPU, where no body has a frame."""
@@ -145,12 +145,12 @@ class CudaAssembly(Assembly):
     def _sums(self) -> Floats:
         return sum_motion(self.state.displacement, self.state.velocity, self._mass)
 
-    def _state(self, inverse_mass: Floats) -> Fields:
-        def zeros() -> Any:
+    def _make_state(self, inverse_mass: Floats) -> Fields:
+        def make_zeros() -> Any:
             return cuda.to_device(np.zeros(4 * self.n_nodes, self.dtype))
 
         masses = cuda.to_device(inverse_mass.astype(self.dtype))
-        return Fields(zeros(), zeros(), zeros(), masses)
+        return Fields(make_zeros(), make_zeros(), make_zeros(), masses)
 
     def _read(self, flat: Any, nodes: slice = EVERY) -> Floats:
         return flat.copy_to_host().reshape(-1, 4)[self.place[nodes], :3].astype(float)
@@ -208,9 +208,9 @@ class CudaAssembly(Assembly):
             contact.end(ended)
         remembered = memory.copy_to_host()
         for total, kind in ((0, cuda_step.LOAD), (1, cuda_step.HELD)):
-            work[total] += remembered[acted.of_kind(kind)[0], 0].sum()
+            work[total] += remembered[acted.find_kind(kind)[0], 0].sum()
         work[2] += taken_by_viscosity.copy_to_host().sum()
-        place, slot = acted.of_kind(cuda_step.HELD)
+        place, slot = acted.find_kind(cuda_step.HELD)
         given.held.previous[slot] = remembered[place, 1]
         if taken:
             kept = int(samples[:done].max(initial=-1)) + 1

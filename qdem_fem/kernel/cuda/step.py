@@ -57,13 +57,13 @@ compute_element_pulls = cuda.jit(device=True)(stress.compute_element_pulls)
 compute_matrix_product = cuda.jit(device=True)(stress.compute_matrix_product)
 
 
-def grid(count: int) -> tuple[int, int]:
+def choose_grid(count: int) -> tuple[int, int]:
     """Blocks and threads of a launch for so many."""
     return max(1, -(-count // THREADS_A_BLOCK)), THREADS_A_BLOCK
 
 
 @cuda.jit(device=True)
-def edges(field: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
+def find_edges(field: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
     """Nodal vectors of corners 1, 2, 3 less that of corner 0; ``a`` to ``d`` is where they lie."""
     x, y, z = field[a], field[a + 1], field[a + 2]
     return (
@@ -92,25 +92,25 @@ def build_pulls_function(strain: Strain, viscous: bool) -> Any:
     if not viscous:
 
         @cuda.jit(device=True)
-        def pulls_elastic(h: Any, w: Any, g: Any, rows: Any, e: Any, half: Any) -> Any:
+        def find_elastic_pulls(h: Any, w: Any, g: Any, rows: Any, e: Any, half: Any) -> Any:
             p, jacobian = elastic(h, rows[9, e], rows[10, e], half)
             return compute_element_pulls(p, g), jacobian, half - half
 
-        return pulls_elastic
+        return find_elastic_pulls
 
     if hasattr(measure, "compute_fused_pulls"):
         fused = cuda.jit(device=True)(measure.compute_fused_pulls)
 
         @cuda.jit(device=True)
-        def pulls_fused(h: Any, w: Any, g: Any, rows: Any, e: Any, half: Any) -> Any:
+        def fuse_pulls(h: Any, w: Any, g: Any, rows: Any, e: Any, half: Any) -> Any:
             return fused(h, w, g, rows[9, e], rows[10, e], rows[11, e], rows[12, e], half)
 
-        return pulls_fused
+        return fuse_pulls
 
     dashpot = cuda.jit(device=True)(measure.compute_viscous_numbers)
 
     @cuda.jit(device=True)
-    def pulls_composed(h: Any, w: Any, g: Any, rows: Any, e: Any, half: Any) -> Any:
+    def compose_pulls(h: Any, w: Any, g: Any, rows: Any, e: Any, half: Any) -> Any:
         p, jacobian = elastic(h, rows[9, e], rows[10, e], half)
         rate = compute_element_gradient(w, g)
         q = dashpot(h, rate, rows[11, e], rows[12, e], half)
@@ -120,7 +120,7 @@ def build_pulls_function(strain: Strain, viscous: bool) -> Any:
         )  # fmt: skip
         return compute_element_pulls(total, g), jacobian, compute_matrix_product(q, rate)
 
-    return pulls_composed
+    return compose_pulls
 
 
 @cache
@@ -129,7 +129,7 @@ def build_element_forces(strain: Strain, viscous: bool) -> Any:
     pulls_of = build_pulls_function(strain, viscous)
 
     @cuda.jit
-    def element_forces(
+    def add_element_forces(
         corners: Any, rows: Any, displacement: Any, velocity: Any, forces: Any, status: Any,
         taken: Any, half: Any, step: Any, k: Any,
     ) -> None:  # fmt: skip
@@ -148,8 +148,8 @@ def build_element_forces(strain: Strain, viscous: bool) -> Any:
             rows[0, e], rows[1, e], rows[2, e], rows[3, e], rows[4, e], rows[5, e], rows[6, e],
             rows[7, e], rows[8, e],
         )  # fmt: skip
-        u = edges(displacement, n0, n1, n2, n3)
-        w = edges(velocity, n0, n1, n2, n3) if viscous else u
+        u = find_edges(displacement, n0, n1, n2, n3)
+        w = find_edges(velocity, n0, n1, n2, n3) if viscous else u
         f, jacobian, power = pulls_of(compute_element_gradient(u, g), w, g, rows, e, half)
         if not jacobian > half - half:  # NaN is bad too
             cuda.atomic.add(status, BAD, 1)
@@ -160,7 +160,7 @@ def build_element_forces(strain: Strain, viscous: bool) -> Any:
         add_forces(forces, n2, -f[3], -f[4], -f[5])
         add_forces(forces, n3, -f[6], -f[7], -f[8])
 
-    return element_forces
+    return add_element_forces
 
 
 # --- what happens to one node; few nodes have actions, whose sums are in double precision -------
@@ -226,7 +226,7 @@ def apply_constraints(
 
 
 @cuda.jit(device=True)
-def take_probes(
+def record_probes(
     begin: Any, end: Any, actions: Any, record: Any, sample: Any, displacement: Any, at: Any
 ) -> None:
     """Write the node's displacement [m] down as sample ``sample`` of the window."""
@@ -241,7 +241,7 @@ def build_node_motion(gravity: bool) -> Any:
     """The kernel of the nodes; what a simulation does not have is not in its code."""
 
     @cuda.jit
-    def node_motion(
+    def move_nodes(
         first: Any, actions: Any, weights: Any, memory: Any, amplitudes: Any, record: Any,
         displacement: Any, velocity: Any, forces: Any, inverse_masses: Any, accelerations: Any,
         status: Any, step: Any, k: Any, sample: Any,
@@ -281,8 +281,8 @@ def build_node_motion(gravity: bool) -> Any:
                     begin, end, actions, weights, memory, amplitudes, k, velocity, at, step
                 )
                 if sample >= 0:
-                    take_probes(begin, end, actions, record, sample, displacement, at)
+                    record_probes(begin, end, actions, record, sample, displacement, at)
         if node == 0 and status[BAD] > 0:
             status[LIMIT] = k + 1
 
-    return node_motion
+    return move_nodes

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from qdem_fem.kernel.cuda.step import cuda, grid
+from qdem_fem.kernel.cuda.step import choose_grid, cuda
 
 PARTS = 2048
 """Threads, at most."""
@@ -49,7 +49,7 @@ def sum_motion_parts(displacement: Any, velocity: Any, mass: Any, sums: Any) -> 
 def sum_motion(displacement: Any, velocity: Any, mass: Any) -> NDArray[np.float64]:
     """`sum_motion_parts` of all nodes, (4,), on the host."""
     sums = cuda.device_array((min(PARTS, mass.size), 4))
-    sum_motion_parts[grid(sums.shape[0])](displacement, velocity, mass, sums)
+    sum_motion_parts[choose_grid(sums.shape[0])](displacement, velocity, mass, sums)
     found: NDArray[np.float64] = sums.copy_to_host().sum(axis=0)
     return found
 
@@ -88,8 +88,8 @@ def sum_before(values: Any, count: int) -> Any:
         before = cuda.to_device(np.zeros(1, np.int64))
     else:
         sums = cuda.device_array(chunks, np.int64)
-        sum_chunks[grid(chunks)](values, count, sums)
+        sum_chunks[choose_grid(chunks)](values, count, sums)
         before = sum_before(sums, chunks)
     first = cuda.device_array(count + 1, np.int64)
-    scan_chunks[grid(chunks)](values, count, before, first)
+    scan_chunks[choose_grid(chunks)](values, count, before, first)
     return first

@@ -55,9 +55,9 @@ def find_seat_share(distance: Floats, track: Track) -> Floats:
     """
     x, half = np.asarray(distance, float), track.spacing / 2
 
-    def carried(s: Floats) -> Floats:
+    def sum_load(s: Floats) -> Floats:
         size = np.abs(s)
         return np.asarray(np.sign(s) * (1 - np.exp(-size) * np.cos(size)))
 
     length = track.elastic_length
-    return (carried((x + half) / length) - carried((x - half) / length)) / 2
+    return (sum_load((x + half) / length) - sum_load((x - half) / length)) / 2

@@ -1,22 +1,23 @@
 """Ways that the plan tries beside the methods."""
 
-from rigid_lcp.friction.attempts.frictionless import frictionless
+from rigid_lcp.friction.attempts.frictionless import solve_frictionless
 from rigid_lcp.friction.attempts.proximal_points import (
     POINTS,
     PROXIMAL,
-    extrapolated_points,
-    proximal_newton,
+    extrapolate_points,
+    solve_proximal,
 )
-from rigid_lcp.friction.attempts.smoothed_path import smoothed_path
+from rigid_lcp.friction.attempts.smoothed_path import follow_smoothed
 from rigid_lcp.friction.attempts.sticking import (
-    heaviness,
-    refined,
+    find_heaviness,
+    refine_forces,
     seem_loose,
     seem_to_stick,
-    sticking,
+    solve_sticking,
 )
 
 __all__ = [
-    "POINTS", "PROXIMAL", "extrapolated_points", "frictionless", "heaviness",
-    "proximal_newton", "refined", "seem_loose", "seem_to_stick", "smoothed_path", "sticking",
+    "POINTS", "PROXIMAL", "extrapolate_points", "find_heaviness", "follow_smoothed",
+    "refine_forces", "seem_loose", "seem_to_stick", "solve_frictionless", "solve_proximal",
+    "solve_sticking",
 ]  # fmt: skip

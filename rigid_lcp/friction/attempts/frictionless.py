@@ -32,8 +32,8 @@ from rigid_lcp.friction.problem import (
     FrictionSolution,
     judge_forces,
 )
-from rigid_lcp.friction.sweeps import face_band, face_bandwidth, normal_products, normal_sweeps
-from rigid_lcp.sparse import csr_arrays
+from rigid_lcp.friction.sweeps import build_band, find_bandwidth, multiply_normals, sweep_normals
+from rigid_lcp.sparse import split_csr
 
 Indices = NDArray[np.int32]
 Solve = Callable[[Floats], Floats]
@@ -66,7 +66,7 @@ class FrictionlessNumbers:
 NUMBERS = FrictionlessNumbers()
 
 
-def frictionless(
+def solve_frictionless(
     problem: FrictionProblem,
     start: Floats | None = None,
     tolerance: float = 1e-12,
@@ -88,7 +88,7 @@ def frictionless(
         return judge_forces(problem, np.zeros(0), tolerance, "frictionless")
     a, b = build_normal_matrix(problem), np.ascontiguousarray(problem.offset[::dim])
     first = np.zeros(nc) if start is None else np.maximum(start[::dim], 0.0)
-    sweeps = normal_sweeps(*csr_arrays(a), b, first, NUMBERS.sweeps, *NUMBERS.settled)
+    sweeps = sweep_normals(*split_csr(a), b, first, NUMBERS.sweeps, *NUMBERS.settled)
     work = {"sweeps": float(sweeps), "exchanges": 0.0, "proximal": 0.0}
     order = reverse_cuthill_mckee(a, symmetric_mode=True)
     best, least = np.zeros(nc), np.inf
@@ -102,18 +102,18 @@ def frictionless(
             better = False
             for candidate in (sharper, f):
                 force = np.maximum(candidate, 0.0)
-                residual = normal_residual(a, b, force, problem.rho)
+                residual = find_normal_residual(a, b, force, problem.rho)
                 if residual < least:
                     best, least, better = force, residual, True
                 if least <= tolerance:
-                    return _solution(problem, best, tolerance, work)
+                    return _make_solution(problem, best, tolerance, work)
             if (step > 4 and not better) or work["exchanges"] - before >= limit:
                 break
             work["proximal"] += 1
-    return _solution(problem, best, tolerance, work)
+    return _make_solution(problem, best, tolerance, work)
 
 
-def _solution(
+def _make_solution(
     problem: FrictionProblem, normal: Floats, tolerance: float, work: dict[str, float]
 ) -> FrictionSolution:
     force = np.zeros(len(problem.offset))
@@ -162,7 +162,7 @@ def pivot_principally(
             smoothings -= 1
             f = np.maximum(f, 0.0)
             between = NUMBERS.sweeps_between
-            normal_sweeps(*csr_arrays(a_matrix), b, f, between, between, 0)
+            sweep_normals(*split_csr(a_matrix), b, f, between, between, 0)
             carries[:] = f > 0.0
         else:
             if patience < 0:
@@ -182,14 +182,14 @@ def build_normal_matrix(problem: FrictionProblem) -> sp.csr_array:
     dim, nc, bodies = problem.dim, problem.contacts, problem.bodies
     if problem.matrix is None and bodies is not None:
         normal = bodies.jacobian[::dim]
-        start, index, value = normal_products(
-            *csr_arrays(normal), *csr_arrays(bodies.inverse_mass), normal.shape[1]
+        start, index, value = multiply_normals(
+            *split_csr(normal), *split_csr(bodies.inverse_mass), normal.shape[1]
         )
         return sp.csr_array((value, index, start), (nc, nc))
     return sp.csr_array(problem.delassus[::dim][:, ::dim])
 
 
-def normal_residual(a_matrix: sp.csr_array, b: Floats, f: Floats, rho: float) -> float:
+def find_normal_residual(a_matrix: sp.csr_array, b: Floats, f: Floats, rho: float) -> float:
     """The residual of `rigid_lcp.friction.problem.cones` without friction: ``|min(f, rho a)| /
     |f|``."""
     a = rho * (b + a_matrix @ f)
@@ -205,10 +205,10 @@ def build_face_solver(a_matrix: sp.csr_array, inside: Indices, shift: float) -> 
     """
     if len(inside) == 0:
         return lambda right: right
-    rows = csr_arrays(a_matrix)
-    width = face_bandwidth(rows[0], rows[1], inside)
+    rows = split_csr(a_matrix)
+    width = find_bandwidth(rows[0], rows[1], inside)
     if len(inside) * (width + NUMBERS.band_overhead) ** 2 <= NUMBERS.band_most:
-        band, symmetric = face_band(*rows, inside, shift, width)
+        band, symmetric = build_band(*rows, inside, shift, width)
         if symmetric:
             cholesky, info = scipy.linalg.lapack.dpbtrf(band.T, lower=1, overwrite_ab=1)
             if info == 0:

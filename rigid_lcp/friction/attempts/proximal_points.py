@@ -33,9 +33,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigid_lcp.arrays import Floats
-from rigid_lcp.friction.linear import Factorisation, SingularSystem, factorisation
-from rigid_lcp.friction.methods import alart_curnier
-from rigid_lcp.friction.problem import FrictionProblem, FrictionSolution, judge_forces, length
+from rigid_lcp.friction.linear import Factorisation, SingularSystem, choose_factorisation
+from rigid_lcp.friction.methods import find_alart_curnier
+from rigid_lcp.friction.problem import FrictionProblem, FrictionSolution, judge_forces, norm
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class ExtrapolatedNumbers:
 PROXIMAL, POINTS = ProximalNumbers(), ExtrapolatedNumbers()
 
 
-def proximal_newton(
+def solve_proximal(
     problem: FrictionProblem, start: Floats, tolerance: float = 1e-12, *,
     linear: Factorisation | None = None, factorisations: int = PROXIMAL.factorisations,
     first_shift: float | None = None,
@@ -105,7 +105,7 @@ def proximal_newton(
     sweeps, or the forces of the step before); where `rigid_lcp.friction.methods.newton` converges
     it needs fewer factorisations.  ``work``: ``points`` and ``factorisations``.
     """
-    linear = linear or factorisation(problem)
+    linear = linear or choose_factorisation(problem)
     best = centre = start
     least = residual = problem.residual(start)
     spent, points = 0, 0
@@ -135,24 +135,24 @@ def proximal_newton(
     )  # fmt: skip
 
 
-def extrapolated_points(
+def extrapolate_points(
     problem: FrictionProblem, start: Floats, tolerance: float = 1e-12, *,
     linear: Factorisation | None = None, factorisations: int = POINTS.factorisations,
     patience: int = POINTS.factorisations,
 ) -> FrictionSolution:  # fmt: skip
-    """Points whose centre runs ahead, from ``start`` r (nc * dim,), as `proximal_newton`.
+    """Points whose centre runs ahead, from ``start`` r (nc * dim,), as `solve_proximal`.
 
     At most ``factorisations`` are spent, and ``patience`` of them without halving the residual.
     """
-    linear = linear or factorisation(problem)
+    linear = linear or choose_factorisation(problem)
     best = force = start
     least = residual = mark = problem.residual(start)
     spent = points = easy = marked = 0
     shift, ahead, drift = POINTS.first_shift, 0.0, np.zeros_like(force)
-    endless = POINTS.endless * max(problem.rho * length(problem.offset), length(force))
+    endless = POINTS.endless * max(problem.rho * norm(problem.offset), norm(force))
     while least > tolerance and spent < min(factorisations, marked + patience):
         centre = force + ahead * drift
-        if shift > POINTS.greatest_shift or not length(centre) < endless:
+        if shift > POINTS.greatest_shift or not norm(centre) < endless:
             break
         enough = max(POINTS.finer * min(residual, POINTS.rough), PROXIMAL.finest)
         point, found, steps = find_proximal_point(
@@ -200,14 +200,14 @@ def find_proximal_point(
     best, errors = centre, []
     for step in range(steps + 1):
         velocity = problem.velocity(force) + alpha * (force - centre)
-        f, a, b, _ = alart_curnier(
+        f, a, b, _ = find_alart_curnier(
             force.reshape(shape), velocity.reshape(shape), problem.friction, rho
         )
         error = float(np.linalg.norm(f)) / (float(np.linalg.norm(force)) or 1.0)
         if error < least:
             best, least = force, error
         errors.append(error)
-        if (error <= enough and step > 0) or step == steps or hopeless(errors):
+        if (error <= enough and step > 0) or step == steps or is_hopeless(errors):
             break
         try:
             force = force - linear.factor(a + alpha * b, b)(f.ravel())
@@ -216,7 +216,7 @@ def find_proximal_point(
     return best, least <= enough, step
 
 
-def hopeless(errors: list[float]) -> bool:
+def is_hopeless(errors: list[float]) -> bool:
     """Whether Newton's method goes astray, or in a circle, by the errors of its steps [-]."""
     now = errors[-1]
     if not np.isfinite(now):

@@ -35,9 +35,9 @@ import numpy as np
 from numba import njit
 
 from rigid_lcp.arrays import Floats
-from rigid_lcp.friction.linear import Factorisation, SingularSystem, factorisation
-from rigid_lcp.friction.methods import newton, spring_size
-from rigid_lcp.friction.problem import FrictionProblem, FrictionSolution, judge_forces, length
+from rigid_lcp.friction.linear import Factorisation, SingularSystem, choose_factorisation
+from rigid_lcp.friction.methods import find_spring_size, solve_newton
+from rigid_lcp.friction.problem import FrictionProblem, FrictionSolution, judge_forces, norm
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class SmoothedNumbers:
 SMOOTHED = SmoothedNumbers()
 
 
-def smoothed_path(
+def follow_smoothed(
     problem: FrictionProblem, begin: tuple[Floats, float] | None = None, tolerance: float = 1e-12,
     *, linear: Factorisation | None = None, factorisations: int = SMOOTHED.factorisations,
 ) -> FrictionSolution:  # fmt: skip
@@ -83,7 +83,7 @@ def smoothed_path(
     most settled beds; for what sticks or hardly slides `rigid_lcp.friction.methods.interior_point`
     and Newton need a third of that.  ``work``: ``points`` and ``factorisations``.
     """
-    linear = linear or factorisation(problem)
+    linear = linear or choose_factorisation(problem)
     best, least = np.zeros(problem.offset.shape), np.inf
     spent, points = 0 if begin else 1, 0
     try:
@@ -105,7 +105,7 @@ def smoothed_path(
             found_force, found_sigma, points = force, shrink * found_sigma, points + 1
             shrink, most = SMOOTHED.shrink, SMOOTHED.steps
             if tolerance < residual < SMOOTHED.near:
-                ended = newton(
+                ended = solve_newton(
                     problem, force, tolerance, linear=linear, iterations=SMOOTHED.end_steps,
                     patience=SMOOTHED.end_patience,
                 )  # fmt: skip
@@ -138,7 +138,7 @@ def begin_path(problem: FrictionProblem, linear: Factorisation) -> tuple[Floats,
     and of velocities as great as those of q.  Raises `SingularSystem`."""
     force = np.zeros((problem.contacts, problem.dim))
     speed = float(np.sqrt(np.mean(problem.offset**2))) or 1.0
-    size = spring_size(problem, linear, SMOOTHED.compliance) or problem.rho * speed
+    size = find_spring_size(problem, linear, SMOOTHED.compliance) or problem.rho * speed
     slides = problem.friction > 0.0
     force[:, 0] = size / np.where(slides, problem.friction, 1.0)
     return force.ravel(), float(np.mean(problem.contact_rho)) * speed * size
@@ -155,15 +155,15 @@ def find_smoothed_point(
     eps = rounding * np.sqrt(sigma) / float(rho.mean())
     enough = SMOOTHED.found * np.sqrt(sigma * problem.contacts)
 
-    def at(r: Floats) -> tuple[Floats, Floats, Floats]:
+    def find_map(r: Floats) -> tuple[Floats, Floats, Floats]:
         velocity = problem.velocity(r).reshape(shape)
-        made: tuple[Floats, Floats, Floats] = smoothed_map(
+        made: tuple[Floats, Floats, Floats] = find_smoothed_map(
             r.reshape(shape), velocity, problem.friction, rho, sigma, eps
         )
         return made
 
-    f, a, b = at(force)
-    error = length(f)
+    f, a, b = find_map(force)
+    error = norm(f)
     for done in range(steps):
         if error < enough:
             return force, True, done
@@ -173,8 +173,8 @@ def find_smoothed_point(
             return force, False, done + 1
         part = 1.0
         while True:
-            f, a, b = at(force - part * step)
-            now = length(f)
+            f, a, b = find_map(force - part * step)
+            now = norm(f)
             if now <= (1.0 - SMOOTHED.decrease * part) * error:
                 break
             part *= 0.5
@@ -185,7 +185,7 @@ def find_smoothed_point(
 
 
 @njit(cache=True)
-def smoothed_map(
+def find_smoothed_map(
     force: Floats, velocity: Floats, mu: Floats, rho: Floats, sigma: float, eps: float
 ) -> tuple[Floats, Floats, Floats]:
     """F and its derivatives A = dF/dr, B = dF/du.

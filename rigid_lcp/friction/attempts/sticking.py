@@ -7,10 +7,10 @@ W may be singular: proximal steps from nothing,
 
 converge to forces of least norm among those that fit, all with one factorisation.  What W answers
 with less than alpha (heavy bodies on light ones) they better little: where a step does not pay, a
-few products by the same factors find it (`gmres`).
+few products by the same factors find it (`solve_gmres`).
 
-So do the last digits of Newton's method (`refined`), which solves ``(A + B W) dr = -F`` with A
-shifted by ``shift / rho``.  The shift holds back what W answers with less than it: a boulder on a
+So do the last digits of Newton's method (`refine_forces`), which solves ``(A + B W) dr = -F`` with
+A shifted by ``shift / rho``.  The shift holds back what W answers with less than it: a boulder on a
 pebble moves with all contacts below it loaded alike, at an eigenvalue of W smaller than the mean of
 its diagonal by the ratio of their masses.  Plain steps better that part by ``lambda / (lambda +
 shift)`` each.  Instead the shifted factors precondition GMRES (Saad and Schultz, SIAM J. Sci. Stat.
@@ -27,14 +27,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigid_lcp.arrays import Floats
-from rigid_lcp.friction.linear import Factorisation, SingularSystem, Solve, factorisation
-from rigid_lcp.friction.methods import alart_curnier
+from rigid_lcp.friction.linear import Factorisation, SingularSystem, Solve, choose_factorisation
+from rigid_lcp.friction.methods import find_alart_curnier
 from rigid_lcp.friction.problem import (
     FORCE_ROUND_OFF,
     FrictionProblem,
     FrictionSolution,
     judge_forces,
-    length,
+    norm,
 )
 
 
@@ -58,7 +58,7 @@ class RefinementNumbers:
 REFINEMENT = RefinementNumbers()
 
 
-def refined(
+def refine_forces(
     problem: FrictionProblem, start: Floats, tolerance: float, *,
     linear: Factorisation | None = None, steps: int = REFINEMENT.steps,
 ) -> FrictionSolution:  # fmt: skip
@@ -69,7 +69,7 @@ def refined(
     and slide must be nearly known.
     """
     shape = (problem.contacts, problem.dim)
-    linear = linear or factorisation(problem)
+    linear = linear or choose_factorisation(problem)
     rho = problem.contact_rho
     force = best = start
     tolerance = max(tolerance, REFINEMENT.exact)
@@ -77,9 +77,9 @@ def refined(
     try:
         while least > tolerance and done < steps and level < REFINEMENT.level:
             velocity = problem.velocity(force).reshape(shape)
-            f, a, b, _ = alart_curnier(force.reshape(shape), velocity, problem.friction, rho)
+            f, a, b, _ = find_alart_curnier(force.reshape(shape), velocity, problem.friction, rho)
             solve = linear.factor(a + (REFINEMENT.shift / problem.rho) * b, b)
-            force = force - gmres(problem, a, b, solve, f.ravel())
+            force = force - solve_gmres(problem, a, b, solve, f.ravel())
             residual = problem.residual(force)
             done += 1
             level = level + 1 if 0.5 * least < residual < 10.0 * least else 0
@@ -93,7 +93,9 @@ def refined(
     return judge_forces(problem, best, tolerance, "refinement", {"factorisations": float(done)})
 
 
-def gmres(problem: FrictionProblem, a: Floats, b: Floats, solve: Solve, right: Floats) -> Floats:
+def solve_gmres(
+    problem: FrictionProblem, a: Floats, b: Floats, solve: Solve, right: Floats
+) -> Floats:
     """What makes ``(A + B W) dr - right`` least, preconditioned from the right by ``solve``.
 
     Arnoldi's vectors, made orthogonal twice: their number is small, their accuracy counts.
@@ -152,7 +154,7 @@ class StickingNumbers:
 STICKING = StickingNumbers()
 
 
-def sticking(
+def solve_sticking(
     problem: FrictionProblem, tolerance: float, *, linear: Factorisation | None = None
 ) -> FrictionSolution:
     """Forces that keep every contact at rest, if they lie in the cones of friction.
@@ -165,11 +167,13 @@ def sticking(
     force = best = np.zeros(contacts * dim)
     least, hidden = np.inf, False
     try:
-        linear = linear or factorisation(problem)
+        linear = linear or choose_factorisation(problem)
         solve = linear.factor(identity * (STICKING.shift / problem.rho), identity)
         for _ in range(STICKING.steps):
             velocity = problem.velocity(force)
-            step = gmres(problem, 0.0 * identity, identity, solve, velocity) if hidden else None
+            step = (
+                solve_gmres(problem, 0.0 * identity, identity, solve, velocity) if hidden else None
+            )
             force = force - (solve(velocity) if step is None else step)
             residual = problem.residual(force)
             ends = residual <= tolerance or residual > min(
@@ -200,16 +204,16 @@ def seem_loose(problem: FrictionProblem, force: Floats) -> bool:
     return pulled >= STICKING.loose * problem.contacts
 
 
-def heaviness(problem: FrictionProblem, stuck: Floats) -> float:
+def find_heaviness(problem: FrictionProblem, stuck: Floats) -> float:
     """How much finer than usual the residual has to be, as light bodies bear heavy ones; 1 or more.
 
     The residual is measured on the forces of all contacts.  ``stuck`` r (nc * dim,) [N or N s]:
     forces at which all contacts stick; where they are great but not mostly normal they are those
     of an ill-conditioned W and tell nothing.
     """
-    offered = problem.rho * length(problem.offset)
+    offered = problem.rho * norm(problem.offset)
     r = np.abs(stuck.reshape(-1, problem.dim))
     if offered == 0.0 or r[:, 1:].sum() > STICKING.straight * r[:, 0].sum():
         return 1.0
-    forces = length(stuck) / offered
+    forces = norm(stuck) / offered
     return max(1.0, min((forces / STICKING.heavy) ** 2, forces / STICKING.great))

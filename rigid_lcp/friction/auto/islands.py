@@ -20,7 +20,7 @@ from numba import njit
 from rigid_lcp.arrays import Bools, Floats, Ints
 from rigid_lcp.friction.problem import BodySpace, FrictionProblem, FrictionSolution, judge_forces
 from rigid_lcp.friction.sweeps import NONE, solve_contacts_apart
-from rigid_lcp.sparse import csr_arrays, diagonal_blocks
+from rigid_lcp.sparse import find_diagonal_blocks, split_csr
 
 Method = Callable[..., FrictionSolution]
 
@@ -28,13 +28,15 @@ ISLAND_ROUNDS = 4
 """Times [-] the islands are solved, ten times finer each, until the whole is fine enough."""
 
 
-def islands(problem: FrictionProblem) -> list[Ints]:
+def find_islands(problem: FrictionProblem) -> list[Ints]:
     """Contacts of every island, (contacts of it,) each, by W's pattern or by shared bodies."""
     if problem.contacts == 0:
         return []
     if problem.bodies is not None:
         first, body, block = problem.body_jacobians
-        mass = diagonal_blocks(*csr_arrays(problem.bodies.inverse_mass), problem.bodies.body_size)
+        mass = find_diagonal_blocks(
+            *split_csr(problem.bodies.inverse_mass), problem.bodies.body_size
+        )
         joins = np.asarray(mass.any(axis=(1, 2)))[body] & block.any(axis=(1, 2))
         label = label_islands(first, problem.contacts + body, joins, problem.contacts + len(mass))
     else:
@@ -72,20 +74,20 @@ def label_islands(first: Ints, other: Ints, joins: Bools, count: int) -> Ints:
 def cut_out_island(problem: FrictionProblem, contacts: Ints) -> FrictionProblem:
     """The problem of some contacts alone: their rows, and of the bodies only those they touch."""
     dim = problem.dim
-    rows = contact_rows(contacts, dim)
+    rows = list_contact_rows(contacts, dim)
     matrix = None if problem.matrix is None else sp.csr_array(problem.matrix[rows][:, rows])
     space = None
     if problem.bodies is not None:
         size = problem.bodies.body_size
         jacobian = sp.csr_array(problem.bodies.jacobian[rows])
         touched = np.unique(jacobian.indices // size)
-        freedoms = contact_rows(touched, size)
+        freedoms = list_contact_rows(touched, size)
         inverse_mass = problem.bodies.inverse_mass[freedoms][:, freedoms]
         space = BodySpace(sp.csr_array(jacobian[:, freedoms]), sp.csr_array(inverse_mass), size)
     return FrictionProblem(matrix, problem.offset[rows], problem.friction[contacts], dim, space)
 
 
-def contact_rows(contacts: Ints, dim: int) -> Ints:
+def list_contact_rows(contacts: Ints, dim: int) -> Ints:
     """Rows of W that belong to some contacts (or freedoms that belong to bodies), in order."""
     return (np.asarray(contacts)[:, None] * dim + np.arange(dim)).ravel()
 
@@ -103,7 +105,7 @@ def join_islands(
     force = np.zeros(problem.contacts * problem.dim)
     work: dict[str, float] = {"islands": float(len(parts))}
     for contacts, solution in zip(parts, solutions, strict=True):
-        force[contact_rows(contacts, problem.dim)] = solution.r
+        force[list_contact_rows(contacts, problem.dim)] = solution.r
         for name, count in solution.work.items():
             work[name] = work.get(name, 0.0) + count
     failed = [k for k, solution in enumerate(solutions) if not solution.solved]
@@ -135,7 +137,7 @@ def solve_islands(
     measures its residual by its own forces, the whole by all: where the whole comes out above
     ``tolerance`` although the islands did not, they are solved finer from where they are.
     """
-    parts = islands(problem)
+    parts = find_islands(problem)
     if len(parts) == 1:
         return method(problem, start, tolerance, **options)
     force = np.zeros(problem.contacts * problem.dim) if start is None else np.array(start, float)
@@ -148,7 +150,7 @@ def solve_islands(
         finer = tolerance * 0.1**round_
         begin: list[Floats | None] = [None] * len(larger)
         if start is not None or round_ > 0:
-            begin = [force[contact_rows(part, problem.dim)] for part in larger]
+            begin = [force[list_contact_rows(part, problem.dim)] for part in larger]
         solutions = [
             method(island, near, finer, **options)
             for island, near in zip(problems, begin, strict=True)
@@ -169,7 +171,7 @@ def solve_singles(problem: FrictionProblem, contacts: Ints, tolerance: float) ->
     dim = problem.dim
     apart = cut_out_island(problem, contacts)
     offset = apart.offset.reshape(-1, dim)
-    local = diagonal_blocks(*csr_arrays(apart.delassus), dim)
+    local = find_diagonal_blocks(*split_csr(apart.delassus), dim)
     force, status = solve_contacts_apart(local, offset, apart.friction)
     lost = contacts[status == NONE]
     if len(lost) == 0:

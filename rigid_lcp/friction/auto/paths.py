@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigid_lcp.friction.attempts import heaviness, seem_loose, seem_to_stick, smoothed_path
+from rigid_lcp.friction.attempts import find_heaviness, follow_smoothed, seem_loose, seem_to_stick
 from rigid_lcp.friction.auto.sweeps import TURNS, take_turns
 from rigid_lcp.friction.auto.trial import LIMITS, Trial
 from rigid_lcp.friction.linear import SingularSystem
-from rigid_lcp.friction.methods import Path, PathStep, interior_point
-from rigid_lcp.friction.problem import FrictionSolution, length
+from rigid_lcp.friction.methods import Path, PathStep, solve_interior_point
+from rigid_lcp.friction.problem import FrictionSolution, norm
 
 CONVEX_PATH = Path(convex=True, compliance=1e-4)
 BENT_PATH = Path(compliance=1e-4, rounding=0.3)
@@ -95,7 +95,7 @@ def stick_all(trial: Trial) -> bool:
     trial.stuck = trial.stick()
     if not trial.best.solved:
         trial.loose = seem_loose(trial.problem, trial.stuck.r)
-        trial.heaviness = heaviness(trial.problem, trial.stuck.r)
+        trial.heaviness = find_heaviness(trial.problem, trial.stuck.r)
     return trial.best.solved
 
 
@@ -113,11 +113,11 @@ def follow_convex_path(trial: Trial) -> bool:
         return False
     found = follow(trial, path, CONVEX.until, CONVEX.steps)
     if found.residual < CONVEX.useful:
-        trial.newton(found.r, CONVEX.newton, found.method, CONVEX.patience)
+        trial.run_newton(found.r, CONVEX.newton, found.method, CONVEX.patience)
     if not trial.best.solved and seems_at_rest(trial):
         part = path.x, path.s
         rest = follow(trial, path, CONVEX.rest_until, CONVEX.rest_steps)
-        trial.newton(rest.r, CONVEX.newton, rest.method, CONVEX.patience)
+        trial.run_newton(rest.r, CONVEX.newton, rest.method, CONVEX.patience)
         path.x, path.s = part
     path.path = BENT_PATH
     steps = CONVEX.bent_steps
@@ -128,7 +128,7 @@ def follow_convex_path(trial: Trial) -> bool:
         if found.residual > CONVEX.bent_useful:
             break
         steps -= int(found.work["iterations"])
-        trial.newton(found.r, CONVEX.bent_newton, found.method, CONVEX.patience)
+        trial.run_newton(found.r, CONVEX.bent_newton, found.method, CONVEX.patience)
     return end_path(trial, path, found)
 
 
@@ -148,7 +148,7 @@ def follow_heavy_path(trial: Trial) -> bool:
         found = follow(trial, path, until / trial.heaviness, steps)
         if found.residual > CONVEX.useful or not trial.affordable:
             break
-        trial.newton(found.r, CONVEX.heavy_newton, found.method)
+        trial.run_newton(found.r, CONVEX.heavy_newton, found.method)
         if trial.best.solved:
             break
     return end_path(trial, path, found)
@@ -157,14 +157,14 @@ def follow_heavy_path(trial: Trial) -> bool:
 def seems_at_rest(trial: Trial) -> bool:
     """Whether the best point is near an answer, by its residual, with velocities of almost none."""
     best, offset = trial.best, trial.problem.offset
-    return best.residual <= CONVEX.until and length(best.u) <= CONVEX.rest * length(offset)
+    return best.residual <= CONVEX.until and norm(best.u) <= CONVEX.rest * norm(offset)
 
 
 def follow(trial: Trial, path: Path | PathStep, until: float, steps: int) -> FrictionSolution:
     """So many steps at most along a path, or on along one that is begun."""
     begun, kind = (path, path.path) if isinstance(path, PathStep) else (None, path)
     return trial.keep(
-        interior_point(
+        solve_interior_point(
             trial.problem, None, until, kind, linear=trial.factors, iterations=steps, begun=begun
         )
     )
@@ -182,7 +182,7 @@ def follow_sharp_path(trial: Trial) -> bool:
     steps = min(SHARP.steps, trial.affordable)
     found = follow(trial, SHARP_PATH, max(SHARP.until, trial.tolerance), steps)
     if found.residual <= SHARP.useful:
-        found = trial.newton(found.r, LIMITS.newton, found.method)
+        found = trial.run_newton(found.r, LIMITS.newton, found.method)
     if not trial.best.solved and found.residual <= SHARP.near:
         take_turns(trial, found.r, SHARP.turns)
     return trial.best.solved
@@ -194,10 +194,10 @@ def smooth_further(trial: Trial) -> bool:
     assert trial.path_point is not None
     trial.smoothed = True
     most = min(FURTHER.factorisations, trial.affordable)
-    found = trial.attempt(smoothed_path, trial.path_point, factorisations=most)
+    found = trial.attempt(follow_smoothed, trial.path_point, factorisations=most)
     if trial.best.solved or found.residual > FURTHER.useful:
         return trial.best.solved
-    trial.drift(FURTHER.points, FURTHER.points_flops, found)
+    trial.extrapolate(FURTHER.points, FURTHER.points_flops, found)
     return trial.best.solved
 
 

@@ -52,7 +52,7 @@ def run_plan(trial: Trial, plan: tuple[Stage, ...]) -> bool:
     return False
 
 
-def attempts(
+def run_attempts(
     problem: FrictionProblem, start: Floats | None, tolerance: float, accept: float = 0.0,
     plan: tuple[Stage, ...] | None = None,
 ) -> Trial:  # fmt: skip

@@ -17,9 +17,9 @@ from numpy.typing import ArrayLike
 
 from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import UsageError
-from rigid_lcp.friction.attempts import frictionless
-from rigid_lcp.friction.auto.islands import islands, solve_islands
-from rigid_lcp.friction.auto.plan import FIRST, attempts, is_proved_insoluble
+from rigid_lcp.friction.attempts import solve_frictionless
+from rigid_lcp.friction.auto.islands import find_islands, solve_islands
+from rigid_lcp.friction.auto.plan import FIRST, is_proved_insoluble, run_attempts
 from rigid_lcp.friction.auto.trial import LIMITS, Trial
 from rigid_lcp.friction.problem import (
     FORCE_ROUND_OFF,
@@ -27,11 +27,11 @@ from rigid_lcp.friction.problem import (
     BodySpace,
     FrictionProblem,
     FrictionSolution,
-    friction_problem,
-    in_range,
     judge_forces,
-    length,
+    make_problem,
+    norm,
     require_number,
+    require_range,
     require_start,
 )
 from trackbed.choices import find_choices
@@ -68,7 +68,7 @@ def solve_friction(
     an unknown method or a tolerance that is not positive.  Forces, and sometimes velocities, are
     not unique: compare residuals.
     """
-    problem: FrictionProblem = friction_problem(W, q, mu, dim)
+    problem: FrictionProblem = make_problem(W, q, mu, dim)
     if method != "auto" and method not in find_methods():
         raise UsageError(
             f"there is no method {method!r}", where="method",
@@ -79,7 +79,7 @@ def solve_friction(
     begin = None
     if start is not None:
         begin = require_start(start, len(problem.offset), problem.dim)
-        in_range(begin, "start", least=0.0)
+        require_range(begin, "start", least=0.0)
     if problem.contacts == 0:
         return judge_forces(problem, problem.offset.copy(), tolerance, method)
     largest = float(np.abs(problem.offset).max())
@@ -102,32 +102,34 @@ def solve_auto(
 ) -> FrictionSolution:  # fmt: skip
     """The default of `solve_friction` on a problem that is made already."""
     if not problem.friction.any():
-        exact = frictionless(problem, start, tolerance)
+        exact = solve_frictionless(problem, start, tolerance)
         if exact.solved:
             return exact
-    parts = islands(problem) if problem.contacts > LIMITS.few_contacts else []
+    parts = find_islands(problem) if problem.contacts > LIMITS.few_contacts else []
     larger = sum(len(part) > 1 for part in parts)
     split = len(parts) > 1 and larger <= LIMITS.few_islands
     if split:
         trial = Trial(problem, start, tolerance)
         trial.keep(solve_islands(problem, _solve_island, start, tolerance, accept=accept))
     else:
-        trial = attempts(problem, start, tolerance, accept)
+        trial = run_attempts(problem, start, tolerance, accept)
     finer = tolerance
     while trial.best.residual <= finer and not trial.best.solved and finer > FORCE_ROUND_OFF:
         # what leaves little of the error without forces: light bodies that still fall may leave
         # much beside the forces of heavy ones
-        enough = SHARE_LEFT * problem.error_without_forces / (length(trial.best.r) or 1.0)
+        enough = SHARE_LEFT * problem.error_without_forces / (norm(trial.best.r) or 1.0)
         finer = 0.5 * min(enough, finer)
-        trial.keep(attempts(problem, trial.best.r, finer, accept, FIRST).solution())
+        trial.keep(run_attempts(problem, trial.best.r, finer, accept, FIRST).solution())
     if trial.best.solved or (
         trial.best.residual <= accept and problem.contacts > LIMITS.few_contacts
     ):  # fmt: skip
         return trial.solution()
-    parts = parts or islands(problem)
+    parts = parts or find_islands(problem)
     if len(parts) > 1 and not split:
         apart = trial.keep(solve_islands(problem, _solve_island, trial.best.r, tolerance))
-        if _error(apart) < _error(trial.best):  # endless forces on one hide the errors of others
+        if _find_error(apart) < _find_error(
+            trial.best
+        ):  # endless forces on one hide the errors of others
             trial.best = apart
     if not trial.best.solved and (
         trial.best.status == "no solution" or is_proved_insoluble(problem)
@@ -146,7 +148,7 @@ def solve_auto(
     return trial.solution()
 
 
-def _error(found: FrictionSolution) -> float:
+def _find_error(found: FrictionSolution) -> float:
     """Size of the natural map in units of force, not over that of the forces."""
     return found.residual * float(np.linalg.norm(found.r))
 
@@ -154,7 +156,7 @@ def _error(found: FrictionSolution) -> float:
 def _solve_island(
     problem: FrictionProblem, start: Floats | None, tolerance: float, accept: float = 0.0
 ) -> FrictionSolution:
-    return attempts(problem, start, tolerance, accept).solution()
+    return run_attempts(problem, start, tolerance, accept).solution()
 
 
 def solve_alone(

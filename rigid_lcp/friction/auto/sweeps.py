@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigid_lcp.arrays import Floats
-from rigid_lcp.friction.attempts import proximal_newton
+from rigid_lcp.friction.attempts import solve_proximal
 from rigid_lcp.friction.auto.trial import LIMITS, Trial
 from rigid_lcp.friction.problem import FrictionSolution
 
@@ -64,7 +64,7 @@ BRIEF, LONG, TURNS = BriefSweeps(), LongSweeps(), Turns()
 def sweep_briefly(trial: Trial) -> bool:
     """A few sweeps, and more where they converge fast (`BriefSweeps`)."""
     for sweeps, slow in ((BRIEF.sweeps, BRIEF.creep), (BRIEF.fast_sweeps, (0, np.inf))):
-        found = trial.swept(trial.best.r, trial.tolerance, sweeps, slow=slow)
+        found = trial.run_sweeps(trial.best.r, trial.tolerance, sweeps, slow=slow)
         if trial.best.solved or found.residual > BRIEF.fast:
             break
     if trial.small:
@@ -96,7 +96,7 @@ def sweep_yielding(trial: Trial) -> bool:
         return True
     if not trial.dear:
         trial.attempt(
-            proximal_newton, trial.best.r, trial.best.method, factorisations=LONG.factorisations,
+            solve_proximal, trial.best.r, trial.best.method, factorisations=LONG.factorisations,
             first_shift=LONG.shift,
         )  # fmt: skip
     return trial.best.solved
@@ -122,14 +122,14 @@ def sweep_from_path(trial: Trial) -> bool:
 
 def sweep_turn(trial: Trial, start: Floats) -> FrictionSolution:
     """Sweeps of one turn from ``start``, and where they end."""
-    found = trial.swept(start, trial.tolerance, TURNS.sweeps, last=True)
+    found = trial.run_sweeps(start, trial.tolerance, TURNS.sweeps, last=True)
     trial.sharpen()
     return found
 
 
 def run_points(trial: Trial, most: int, flops: float) -> bool:
     """Extrapolated points from the best one (`Trial.drift`)."""
-    trial.drift(most, flops)
+    trial.extrapolate(most, flops)
     return trial.best.solved
 
 
@@ -140,10 +140,10 @@ def take_turns(trial: Trial, force: Floats, patience: int | None = None) -> bool
     most, mark, waited = trial.effort + TURNS.flops, np.inf, 0
     while waited < patience and trial.effort < most and trial.affordable:
         found = sweep_turn(trial, force)
-        if trial.endless(found.r):  # sweeps diverge where friction makes W no descent
+        if trial.is_endless(found.r):  # sweeps diverge where friction makes W no descent
             break
         if not trial.best.solved:
-            found = trial.drift(TURNS.points, np.inf, found, TURNS.points_patience)
+            found = trial.extrapolate(TURNS.points, np.inf, found, TURNS.points_patience)
         if trial.best.solved:
             break
         force, waited = found.r, waited + 1

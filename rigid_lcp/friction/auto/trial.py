@@ -13,13 +13,13 @@ from rigid_lcp.arrays import Floats
 from rigid_lcp.friction.attempts import (
     POINTS,
     PROXIMAL,
-    extrapolated_points,
-    proximal_newton,
-    refined,
-    sticking,
+    extrapolate_points,
+    refine_forces,
+    solve_proximal,
+    solve_sticking,
 )
-from rigid_lcp.friction.linear import Factorisation, factorisation
-from rigid_lcp.friction.methods import NEWTON, gauss_seidel, lay_out_sweeps, newton
+from rigid_lcp.friction.linear import Factorisation, choose_factorisation
+from rigid_lcp.friction.methods import NEWTON, lay_out_sweeps, solve_gauss_seidel, solve_newton
 from rigid_lcp.friction.problem import (
     FORCE_ROUND_OFF,
     FrictionProblem,
@@ -27,7 +27,7 @@ from rigid_lcp.friction.problem import (
     Status,
     gives_energy,
     judge_forces,
-    length,
+    norm,
 )
 from rigid_lcp.friction.sweeps import SweepBlocks
 
@@ -110,7 +110,7 @@ class Trial:
         """The forces given to start from; None where they mislead."""
         if start is not None:
             begun = judge_forces(problem, start, tolerance, "start")
-            if begun.residual * length(start) < LIMITS.misled * problem.error_without_forces:
+            if begun.residual * norm(start) < LIMITS.misled * problem.error_without_forces:
                 self.start = start
                 self.keep(begun)
         self.moving = not self.small and self.start is not None
@@ -135,7 +135,7 @@ class Trial:
     @property
     def factors(self) -> Factorisation:
         """The factorisations of this problem, made when they are first needed."""
-        self.linear = self.linear or factorisation(self.problem)
+        self.linear = self.linear or choose_factorisation(self.problem)
         return self.linear
 
     @cached_property
@@ -154,7 +154,7 @@ class Trial:
             status: Status = "not converged" if found.status == "solved" else found.status
             self.best = replace(found, method=name, status=status)
             if found.residual <= self.tolerance:  # whether it solves is for the tolerance here
-                if self.problem.mended(found.r, found.residual):
+                if self.problem.reduces_error(found.r, found.residual):
                     self.best = replace(self.best, status="solved", message="")
                 else:
                     self.best = judge_forces(
@@ -170,11 +170,11 @@ class Trial:
         if self.best.solved or not np.isfinite(found.residual):
             return self.best.solved
         if found.residual <= LIMITS.hand_over:
-            found = self.newton(found.r, LIMITS.newton, found.method)
+            found = self.run_newton(found.r, LIMITS.newton, found.method)
         if self.best.solved or factorisations == 0:
             return self.best.solved
         most = min(factorisations, self.affordable)
-        self.attempt(proximal_newton, found.r, found.method, factorisations=most)
+        self.attempt(solve_proximal, found.r, found.method, factorisations=most)
         return self.best.solved
 
     def attempt(
@@ -186,12 +186,12 @@ class Trial:
         self.sharpen()
         return found
 
-    def swept(
+    def run_sweeps(
         self, start: Floats | None, until: float, sweeps: int, **options: Any
     ) -> FrictionSolution:
         """What so many sweeps of Gauss-Seidel find, to a residual of ``until``."""
         return self.keep(
-            gauss_seidel(self.problem, start, until, sweeps, blocks=self.blocks, **options)
+            solve_gauss_seidel(self.problem, start, until, sweeps, blocks=self.blocks, **options)
         )
 
     def sweep(
@@ -199,10 +199,10 @@ class Trial:
         factorisations: int = PROXIMAL.factorisations,
     ) -> bool:  # fmt: skip
         """Gauss-Seidel to a residual of ``until``, and Newton; whether the tolerance is reached."""
-        found = self.swept(start, max(until, self.tolerance), sweeps)
+        found = self.run_sweeps(start, max(until, self.tolerance), sweeps)
         return self.best.solved or self.polish(found, factorisations)
 
-    def drift(
+    def extrapolate(
         self, most: int, flops: float, start: FrictionSolution | None = None,
         patience: int = POINTS.factorisations,
     ) -> FrictionSolution:  # fmt: skip
@@ -213,13 +213,13 @@ class Trial:
         if count < LIMITS.few_points:
             return start
         return self.attempt(
-            extrapolated_points, start.r, start.method, factorisations=count, patience=patience
+            extrapolate_points, start.r, start.method, factorisations=count, patience=patience
         )
 
     def stick(self) -> FrictionSolution:
         """Forces at which all contacts stick."""
         exact = FORCE_ROUND_OFF if self.tolerance <= LIMITS.last_word else self.tolerance
-        found = self.keep(sticking(self.problem, exact, linear=self.factors))
+        found = self.keep(solve_sticking(self.problem, exact, linear=self.factors))
         self.sharpen()
         return found
 
@@ -252,12 +252,12 @@ class Trial:
     @property
     def forces(self) -> float:
         """Size of the best forces over that of what makes the contacts approach, ``rho |q|``."""
-        offered = self.problem.rho * length(self.problem.offset)
-        return length(self.best.r) / offered if offered > 0.0 else 0.0
+        offered = self.problem.rho * norm(self.problem.offset)
+        return norm(self.best.r) / offered if offered > 0.0 else 0.0
 
-    def endless(self, force: Floats) -> bool:
+    def is_endless(self, force: Floats) -> bool:
         """Whether the greatest of forces r is so far above ``rho |q|`` that they look endless."""
-        offered = self.problem.rho * length(self.problem.offset)
+        offered = self.problem.rho * norm(self.problem.offset)
         return not float(np.abs(force).max(initial=0.0)) <= LIMITS.endless * offered
 
     def forget_endless(self) -> None:
@@ -265,12 +265,12 @@ class Trial:
         if self.forces > LIMITS.endless:
             self.best = Trial(self.problem, None, self.tolerance).best
 
-    def newton(
+    def run_newton(
         self, start: Floats, steps: int, after: str, patience: int = NEWTON.patience
     ) -> FrictionSolution:
         """So many steps of Newton, and one more where the answer is to be exact."""
         steps = min(steps, self.affordable)
-        return self.attempt(newton, start, after, iterations=steps, patience=patience)
+        return self.attempt(solve_newton, start, after, iterations=steps, patience=patience)
 
     def sharpen(self) -> None:
         """Newton without its shift, from a solution, where the tolerance asks for an exact one."""
@@ -279,7 +279,7 @@ class Trial:
         exact = FORCE_ROUND_OFF / max(1.0, self.forces / LIMITS.great_forces)
         if self.best.residual > exact:
             steps = LIMITS.refinements if self.problem.contacts <= LIMITS.few_contacts else 1
-            found = refined(self.problem, self.best.r, exact, linear=self.linear, steps=steps)
+            found = refine_forces(self.problem, self.best.r, exact, linear=self.linear, steps=steps)
             if not self.leaves_rest(found):
                 self.keep(found, self.best.method)
 
@@ -290,7 +290,7 @@ class Trial:
         cones' boundaries and, above the least friction that holds, into a motion that solves the
         problem as well.  Both are exact; bodies at rest stay so.
         """
-        error = max(self.best.residual, FORCE_ROUND_OFF) * length(self.best.r)
+        error = max(self.best.residual, FORCE_ROUND_OFF) * norm(self.best.r)
         before, after = (
             self.problem.rho * np.linalg.norm(each.u.reshape(-1, self.problem.dim), axis=1)
             <= LIMITS.rest * error
@@ -308,7 +308,7 @@ class Trial:
         ):
             return
         more = int(np.ceil(LIMITS.more_sweeps * self.work.get("sweeps", 0.0)))
-        self.swept(self.best.r, FORCE_ROUND_OFF, more)
+        self.run_sweeps(self.best.r, FORCE_ROUND_OFF, more)
 
     def solution(self, status: Status | None = None, message: str = "") -> FrictionSolution:
         """The best point, with the work of all attempts."""

@@ -26,8 +26,8 @@ from scipy.sparse.linalg import splu
 from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import LibraryMissing, ProblemError
 from rigid_lcp.friction.files.damaged import DAMAGED, describe_damage, name_missing_part
-from rigid_lcp.friction.problem import BODY_SIZE, BodySpace, FrictionProblem, friction_problem
-from rigid_lcp.sparse import csr_arrays, diagonal_blocks
+from rigid_lcp.friction.problem import BODY_SIZE, BodySpace, FrictionProblem, make_problem
+from rigid_lcp.sparse import find_diagonal_blocks, split_csr
 
 PARTS = {"fclib_local": (("W",), ("q", "mu")), "fclib_global": (("M", "H"), ("f", "w", "mu"))}
 """Matrices and vectors of a problem, by its group."""
@@ -48,7 +48,7 @@ def read_fclib_problem(path: Path) -> FrictionProblem:
                 "it has equality constraints (V, R or G) beside its contacts", where=str(path),
                 remedy="eliminate them first: W - V R^-1 V^T, q - V R^-1 s",
             )  # fmt: skip
-        dim = int(_numbers(group, "spacedim", path).ravel()[0])
+        dim = int(_read_numbers(group, "spacedim", path).ravel()[0])
         if dim == 5:
             raise ProblemError(
                 "it has rolling friction (spacedim 5)", where=str(path),
@@ -56,11 +56,11 @@ def read_fclib_problem(path: Path) -> FrictionProblem:
             )  # fmt: skip
         names, vectors = PARTS[kind]
         matrices = [_read_fclib_matrix(group, name, path) for name in names]
-        given = [_numbers(group, f"vectors/{name}", path).ravel() for name in vectors]
+        given = [_read_numbers(group, f"vectors/{name}", path).ravel() for name in vectors]
     with describe_damage(path):
         if kind == "fclib_global":
             return build_global_problem(matrices[0], matrices[1], given[0], given[1], given[2], dim)
-        problem: FrictionProblem = friction_problem(matrices[0], given[0], given[1], dim)
+        problem: FrictionProblem = make_problem(matrices[0], given[0], given[1], dim)
     return problem
 
 
@@ -68,10 +68,10 @@ def read_fclib_forces(path: Path) -> Floats:
     """Its solution, (1, nc * dim), or none (0, nc * dim).  Raises as `read_fclib_problem`."""
     with _open_fclib(path) as file:
         name = "fclib_global/vectors/w" if "fclib_global" in file else "fclib_local/vectors/q"
-        q = _numbers(file, name, path)
+        q = _read_numbers(file, name, path)
         if "solution" not in file:
             return np.zeros((0, q.size))
-        forces = _numbers(file, "solution/r", path)
+        forces = _read_numbers(file, "solution/r", path)
     if forces.size != q.size:
         raise ProblemError(
             f"it has {forces.size} numbers where q has {q.size}", where=f"{path}: solution/r",
@@ -105,7 +105,7 @@ def _open_fclib(path: Path) -> Iterator[Any]:
         ) from error
 
 
-def _numbers(group: Any, name: str, path: Path) -> NDArray[Any]:
+def _read_numbers(group: Any, name: str, path: Path) -> NDArray[Any]:
     """A data set as an array of numbers."""
     if name not in group:
         raise name_missing_part(path, f"{group.name.rstrip('/')}/{name}".lstrip("/"), sorted(group))
@@ -127,8 +127,8 @@ def _read_fclib_matrix(kind: Any, name: str, path: Path) -> sp.csr_array:
     if name not in kind:
         raise name_missing_part(path, f"{kind.name.strip('/')}/{name}", sorted(kind))
     group = kind[name]
-    m, n, nz = (int(_numbers(group, name, path).ravel()[0]) for name in ("m", "n", "nz"))
-    p, i, x = (_numbers(group, name, path).ravel() for name in ("p", "i", "x"))
+    m, n, nz = (int(_read_numbers(group, name, path).ravel()[0]) for name in ("m", "n", "nz"))
+    p, i, x = (_read_numbers(group, name, path).ravel() for name in ("p", "i", "x"))
     try:
         if nz == -2:
             matrix = sp.csr_array((x, i, p), shape=(m, n))
@@ -169,7 +169,7 @@ def build_global_problem(
             remedy="give a number for every column of H",
         )  # fmt: skip
     jacobian = sp.csr_array(directions.T)
-    size = BODY_SIZE[dim] if dim in BODY_SIZE and in_blocks(mass, BODY_SIZE[dim]) else 0
+    size = BODY_SIZE[dim] if dim in BODY_SIZE and is_block_diagonal(mass, BODY_SIZE[dim]) else 0
     try:
         if size:
             inverse = invert_masses(mass, size)
@@ -183,10 +183,10 @@ def build_global_problem(
             f"M can not be inverted: {error}", where="M",
             remedy="look for a body without mass or moment of inertia",
         ) from error  # fmt: skip
-    return friction_problem(matrix, velocity + jacobian @ moved, mu, dim)
+    return make_problem(matrix, velocity + jacobian @ moved, mu, dim)
 
 
-def in_blocks(mass: sp.csr_array, size: int) -> bool:
+def is_block_diagonal(mass: sp.csr_array, size: int) -> bool:
     """Whether M (ndof, ndof) has nothing beside one block of ``size`` freedoms a body."""
     places = mass.tocoo()
     row, column = places.row[places.data != 0.0], places.col[places.data != 0.0]
@@ -195,7 +195,7 @@ def in_blocks(mass: sp.csr_array, size: int) -> bool:
 
 def invert_masses(mass: sp.csr_array, size: int) -> sp.csr_array:
     """M^-1 block by block.  Raises LinAlgError where one is singular."""
-    blocks = diagonal_blocks(*csr_arrays(mass), size)
+    blocks = find_diagonal_blocks(*split_csr(mass), size)
     number = np.arange(len(blocks))
     rows = (np.linalg.inv(blocks), number, np.arange(len(blocks) + 1))
     inverse = sp.csr_array(sp.bsr_array(rows, shape=mass.shape))

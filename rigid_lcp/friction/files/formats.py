@@ -28,7 +28,7 @@ from rigid_lcp.errors import ProblemError
 from rigid_lcp.friction.files.damaged import DAMAGED, describe_damage, name_missing_part
 from rigid_lcp.friction.files.fclib import read_fclib_forces, read_fclib_problem
 from rigid_lcp.friction.files.siconos import read_siconos_problem
-from rigid_lcp.friction.problem import BODY_SIZE, BodySpace, FrictionProblem, friction_problem
+from rigid_lcp.friction.problem import BODY_SIZE, BodySpace, FrictionProblem, make_problem
 
 SAME_MATRIX = 1e-8
 """W and its factors, both stored, differ by less than this share of the largest entry of W."""
@@ -40,7 +40,7 @@ def read_problem(path: Path | str) -> FrictionProblem:
     Raises `ProblemError`, which names the file, the part of it and what is wrong with it, and
     `LibraryMissing` for HDF5 without h5py.
     """
-    return _reader(path)[0](Path(path))
+    return _choose_readers(path)[0](Path(path))
 
 
 def read_forces(path: Path | str) -> Floats:
@@ -49,10 +49,10 @@ def read_forces(path: Path | str) -> Floats:
     npz: array r, one solution or a row each; FCLIB: solution/r; text has none.  Raises as
     `read_problem`.
     """
-    return _reader(path)[1](Path(path))
+    return _choose_readers(path)[1](Path(path))
 
 
-def _reader(
+def _choose_readers(
     given: Path | str,
 ) -> tuple[Callable[[Path], FrictionProblem], Callable[[Path], Floats]]:
     if not isinstance(given, str | PathLike):
@@ -62,7 +62,7 @@ def _reader(
         ".npz": (_read_npz_problem, _read_npz_forces),
         ".hdf5": (read_fclib_problem, read_fclib_forces),
         ".h5": (read_fclib_problem, read_fclib_forces),
-        ".dat": (read_siconos_problem, _no_forces),
+        ".dat": (read_siconos_problem, _read_no_forces),
     }
     if path.suffix not in readers:
         raise ProblemError(
@@ -76,7 +76,7 @@ def _reader(
     return readers[path.suffix]
 
 
-def _no_forces(path: Path) -> Floats:
+def _read_no_forces(path: Path) -> Floats:
     return np.zeros((0, read_siconos_problem(path).offset.size))
 
 
@@ -96,10 +96,10 @@ def _read_npz_problem(path: Path) -> FrictionProblem:
     with describe_damage(path):
         if factor.is_file():
             bodies = _read_npz_bodies(path, parts, factor, dim)
-            problem: FrictionProblem = friction_problem(bodies, q, mu, dim)
-            _same(problem, path, parts)
+            problem: FrictionProblem = make_problem(bodies, q, mu, dim)
+            _check_same(problem, path, parts)
         else:
-            problem = friction_problem(_read_npz_matrix(path, parts), q, mu, dim)
+            problem = make_problem(_read_npz_matrix(path, parts), q, mu, dim)
     return problem
 
 
@@ -178,7 +178,7 @@ def _read_npz_bodies(
     return BodySpace(jacobian, sp.csr_array(sp.diags_array(inverse)), size)
 
 
-def _same(problem: FrictionProblem, path: Path, parts: dict[str, NDArray[Any]]) -> None:
+def _check_same(problem: FrictionProblem, path: Path, parts: dict[str, NDArray[Any]]) -> None:
     """W, where it is stored too, must be that of the factors."""
     if "W" not in parts and not path.with_name(f"{path.stem}_W.npz").is_file():
         return

@@ -24,7 +24,7 @@ import scipy.sparse as sp
 from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.errors import ProblemError
 from rigid_lcp.friction.files.damaged import describe_damage
-from rigid_lcp.friction.problem import FrictionProblem, friction_problem
+from rigid_lcp.friction.problem import FrictionProblem, make_problem
 
 DENSE, BLOCKS, SPARSE = 0, 1, 2
 """Kinds of storage of a ``NumericsMatrix``."""
@@ -49,7 +49,7 @@ class _Numbers:
         except ValueError as error:
             raise ValueError(f"{what}: {error}") from error
 
-    def whole(self, count: int, what: str) -> Ints:
+    def take_whole(self, count: int, what: str) -> Ints:
         """The next ``count`` whole numbers, none of them negative."""
         numbers = self.take(count, what)
         found = numbers.astype(np.int64) if np.isfinite(numbers).all() else np.full(count, -1)
@@ -63,7 +63,7 @@ def read_siconos_problem(path: Path) -> FrictionProblem:
     which part of the file is wrong."""
     try:
         text = path.read_text(encoding="utf-8")
-        matrix, q, mu, dim = _parts(text)
+        matrix, q, mu, dim = _read_parts(text)
     except (OSError, ValueError, OverflowError, MemoryError) as error:
         raise ProblemError(
             f"it can not be read as a friction problem of Siconos: {error}", where=str(path),
@@ -71,15 +71,15 @@ def read_siconos_problem(path: Path) -> FrictionProblem:
             "global (GFC3D) and rolling (RFC3D) problems are not known",
         ) from error  # fmt: skip
     with describe_damage(path):
-        problem: FrictionProblem = friction_problem(matrix, q, mu, dim)
+        problem: FrictionProblem = make_problem(matrix, q, mu, dim)
     return problem
 
 
-def _parts(text: str) -> tuple[sp.csr_array, Floats, Floats, int]:
+def _read_parts(text: str) -> tuple[sp.csr_array, Floats, Floats, int]:
     """W, q, mu and dim.  Raises ValueError."""
     begin = _Numbers(text[:200])
     dim, contacts, storage, rows, columns = (
-        int(each) for each in begin.whole(5, "dim, contacts, storage and size of W")
+        int(each) for each in begin.take_whole(5, "dim, contacts, storage and size of W")
     )
     if dim not in (2, 3):
         raise ValueError(f"dim is {dim}, not 2 or 3" + " (rolling friction)" * (dim == 5))
@@ -89,32 +89,33 @@ def _parts(text: str) -> tuple[sp.csr_array, Floats, Floats, int]:
             f"W is {rows} x {columns} where {contacts} contacts in {dim}D need {size} x {size}"
         )
     if storage == SPARSE:
-        matrix, rest = _sparse(text, size)
+        matrix, rest = _read_sparse(text, size)
     elif storage in (DENSE, BLOCKS):
         rest = _Numbers(text)
         rest.at = begin.at
-        matrix = _dense(rest, size) if storage == DENSE else _blocks(rest, size)
+        matrix = _read_dense(rest, size) if storage == DENSE else _read_blocks(rest, size)
     else:
         raise ValueError(f"storage of W is {storage}, not 0 (dense), 1 (blocks) or 2 (sparse)")
     return matrix, rest.take(size, "q"), rest.take(contacts, "mu"), dim
 
 
-def _dense(numbers: _Numbers, size: int) -> sp.csr_array:
+def _read_dense(numbers: _Numbers, size: int) -> sp.csr_array:
     """W by columns, its size before it once more."""
-    if numbers.whole(2, "size of W").tolist() != [size, size]:
+    if numbers.take_whole(2, "size of W").tolist() != [size, size]:
         raise ValueError("the two sizes of W differ")
     return sp.csr_array(numbers.take(size * size, "W").reshape(size, size).T)
 
 
-def _blocks(numbers: _Numbers, size: int) -> sp.csr_array:
+def _read_blocks(numbers: _Numbers, size: int) -> sp.csr_array:
     """W of blocks in rows."""
-    count, lines, across = (int(each) for each in numbers.whole(3, "numbers of blocks"))
+    count, lines, across = (int(each) for each in numbers.take_whole(3, "numbers of blocks"))
     ends = [
-        np.concatenate([[0], numbers.whole(each, "ends of the blocks")]) for each in (lines, across)
+        np.concatenate([[0], numbers.take_whole(each, "ends of the blocks")])
+        for each in (lines, across)
     ]
-    starts, filled = (int(each) for each in numbers.whole(2, "lengths of the lists of blocks"))
-    begin = numbers.whole(starts, "where rows of blocks begin")
-    column = numbers.whole(filled, "columns of the blocks")
+    starts, filled = (int(each) for each in numbers.take_whole(2, "lengths of the lists of blocks"))
+    begin = numbers.take_whole(starts, "where rows of blocks begin")
+    column = numbers.take_whole(filled, "columns of the blocks")
     sized = all(each[-1] == size and (np.diff(each) >= 0).all() for each in ends)
     listed = filled == count and starts >= 1 and (np.diff(begin) >= 0).all()
     if not (sized and listed and starts <= lines + 1 and begin[-1] == count):
@@ -135,7 +136,7 @@ def _blocks(numbers: _Numbers, size: int) -> sp.csr_array:
     return sp.csr_array(sp.coo_array((filling, (down, along)), shape=(size, size)))
 
 
-def _sparse(text: str, size: int) -> tuple[sp.csr_array, _Numbers]:
+def _read_sparse(text: str, size: int) -> tuple[sp.csr_array, _Numbers]:
     """W of columns as printed, and the numbers after it."""
     columns = list(COLUMN.finditer(text))
     if len(columns) != size or any(int(each[1]) != k for k, each in enumerate(columns)):

@@ -4,18 +4,18 @@ from rigid_lcp.friction.linear.factorisation import (
     Factorisation,
     SingularSystem,
     Solve,
-    factorisation,
+    choose_factorisation,
 )
 from rigid_lcp.friction.linear.lorentz_cones import (
-    cone_divide,
-    cone_product,
-    cone_scale,
-    cone_scaling,
-    cone_scaling_square,
-    cone_step,
+    divide_cones,
+    find_cone_step,
+    find_scaling,
+    multiply_cones,
+    scale_cones,
+    square_scaling,
 )
 
 __all__ = [
-    "Factorisation", "SingularSystem", "Solve", "cone_divide", "cone_product", "cone_scale",
-    "cone_scaling", "cone_scaling_square", "cone_step", "factorisation",
+    "Factorisation", "SingularSystem", "Solve", "choose_factorisation", "divide_cones",
+    "find_cone_step", "find_scaling", "multiply_cones", "scale_cones", "square_scaling",
 ]  # fmt: skip

@@ -31,15 +31,15 @@ from rigid_lcp.friction.problem import FrictionProblem
 from rigid_lcp.sparse import (
     EliminationTree,
     add_contacts,
-    body_pairs,
-    contact_stiffness,
-    csr_arrays,
-    dense_delassus,
-    elimination_tree,
+    build_dense_delassus,
+    build_tree,
     factor_fronts,
+    find_contact_stiffness,
+    list_body_pairs,
     multiply_blocks,
     push_bodies,
     solve_fronts,
+    split_csr,
     subtract_motion,
 )
 
@@ -71,7 +71,7 @@ class Factorisation(Protocol):
         """What solves ``(A + B W) x = right`` for x.  Raises `SingularSystem`."""
 
 
-def factorisation(problem: FrictionProblem) -> Factorisation:
+def choose_factorisation(problem: FrictionProblem) -> Factorisation:
     """The cheaper one: by way of the bodies where they are known, unless W is small."""
     size = problem.contacts * problem.dim
     if problem.bodies is not None and size > DENSE.rows:
@@ -88,8 +88,8 @@ class DenseFactorisation:
         self.contacts, self.dim = problem.contacts, problem.dim
         if problem.matrix is None and problem.bodies is not None:
             bodies = problem.bodies
-            self.matrix: Floats = dense_delassus(
-                *csr_arrays(bodies.jacobian), *csr_arrays(bodies.inverse_mass)
+            self.matrix: Floats = build_dense_delassus(
+                *split_csr(bodies.jacobian), *split_csr(bodies.inverse_mass)
             )
         else:
             self.matrix = problem.delassus.toarray()
@@ -112,7 +112,7 @@ class BlockSystem:
 
     def __init__(self, count: int, size: int, rows: Ints, columns: Ints) -> None:
         """``count`` block rows of ``size`` rows each; blocks at (rows, columns)."""
-        tree = self.tree = elimination_tree(count, size, rows, columns)
+        tree = self.tree = build_tree(count, size, rows, columns)
         self.space = np.empty(tree.rest_most), np.empty(tree.stack_most)
         self.spare: list[Floats] = []
 
@@ -125,17 +125,17 @@ class BlockSystem:
 
     def factor(self, blocks: Floats) -> Solve:
         """Factor the matrix with these blocks (entries, size, size).  Raises `SingularSystem`."""
-        factors = self.new_factors()
+        factors = self.allocate_factors()
         if not factor_fronts(self.tree, blocks, factors, *self.space):
             raise SingularSystem
-        return self.kept(lambda right: solve_fronts(self.tree, factors, right), factors)
+        return self.bind_factors(lambda right: solve_fronts(self.tree, factors, right), factors)
 
-    def new_factors(self) -> Floats:
+    def allocate_factors(self) -> Floats:
         """Memory for factors: of what no one needs any more, as new memory costs more than it
         takes to fill it."""
         return self.spare.pop() if self.spare else np.empty(self.tree.factor_start[-1])
 
-    def kept(self, solve: Solve, factors: Floats) -> Solve:
+    def bind_factors(self, solve: Solve, factors: Floats) -> Solve:
         """``solve``, whose factors are free when it is."""
         weakref.finalize(solve, self.spare.append, factors).atexit = False
         return solve
@@ -176,7 +176,7 @@ class BodyFactorisation:
         self.dim = problem.dim
         self.first, self.body, self.block = problem.body_jacobians
         own = np.arange(bodies) * (bodies + 1)
-        key = np.concatenate([own, body_pairs(self.first, self.body, bodies)])
+        key = np.concatenate([own, list_body_pairs(self.first, self.body, bodies)])
         found, places = np.unique(key, return_inverse=True)
         self.system = BlockSystem(bodies, size, found // bodies, found % bodies)
         self.flops = self.system.flops
@@ -186,7 +186,7 @@ class BodyFactorisation:
 
     def factor(self, a: Floats, b: Floats) -> Solve:
         """See `Factorisation`."""
-        tree, factors = self.system.tree, self.system.new_factors()
+        tree, factors = self.system.tree, self.system.allocate_factors()
         inverse, stiffness, regular = factor_contacts(
             tree, self.mass, self.first, self.block, self.places, a, b, self.matrix, factors,
             *self.system.space,
@@ -201,7 +201,7 @@ class BodyFactorisation:
             )  # fmt: skip
             return left
 
-        return self.system.kept(solve, factors)
+        return self.system.bind_factors(solve, factors)
 
 
 @njit(cache=True)
@@ -213,7 +213,7 @@ def factor_contacts(
 
     ``matrix``, ``rest``, ``stack``: space to work in.
     """
-    inverse, stiffness, regular = contact_stiffness(a, b)
+    inverse, stiffness, regular = find_contact_stiffness(a, b)
     if not regular:
         return inverse, stiffness, False
     matrix[:] = mass

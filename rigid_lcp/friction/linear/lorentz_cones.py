@@ -17,7 +17,7 @@ BOUNDARY = 1e-30
 
 
 @njit(cache=True)
-def cone_determinant(x: Floats) -> float:
+def find_determinant(x: Floats) -> float:
     """``x_0^2 - |x_1:|^2`` of one vector, positive inside."""
     squares = 0.0
     for k in range(1, len(x)):
@@ -27,7 +27,7 @@ def cone_determinant(x: Floats) -> float:
 
 
 @njit(cache=True)
-def cone_product(a: Floats, b: Floats) -> Floats:
+def multiply_cones(a: Floats, b: Floats) -> Floats:
     """Jordan product ``a o b = (a.b, a_0 b_1: + b_0 a_1:)`` of each row."""
     product = np.empty_like(a)
     for c in range(a.shape[0]):
@@ -40,21 +40,21 @@ def cone_product(a: Floats, b: Floats) -> Floats:
 
 
 @njit(cache=True)
-def cone_divide(a: Floats, b: Floats) -> Floats:
+def divide_cones(a: Floats, b: Floats) -> Floats:
     """The x with ``a o x = b`` of each row, a inside its cone."""
     quotient = np.empty_like(a)
     for c in range(a.shape[0]):
         inner = 0.0
         for k in range(1, a.shape[1]):
             inner += a[c, k] * b[c, k]
-        quotient[c, 0] = (a[c, 0] * b[c, 0] - inner) / cone_determinant(a[c])
+        quotient[c, 0] = (a[c, 0] * b[c, 0] - inner) / find_determinant(a[c])
         for k in range(1, a.shape[1]):
             quotient[c, k] = (b[c, k] - quotient[c, 0] * a[c, k]) / a[c, 0]
     return quotient
 
 
 @njit(cache=True)
-def cone_step(x: Floats, direction: Floats) -> float:
+def find_cone_step(x: Floats, direction: Floats) -> float:
     """Greatest t with every row of ``x + t direction`` in its cone; 1e30 if there is none."""
     step = 1e30
     for c in range(x.shape[0]):
@@ -63,7 +63,7 @@ def cone_step(x: Floats, direction: Floats) -> float:
         for k in range(1, x.shape[1]):
             a -= direction[c, k] ** 2
             b -= x[c, k] * direction[c, k]
-        inside = cone_determinant(x[c])
+        inside = find_determinant(x[c])
         if direction[c, 0] < 0.0:
             step = min(step, -x[c, 0] / direction[c, 0])
         discriminant = b * b - a * inside
@@ -77,7 +77,7 @@ def cone_step(x: Floats, direction: Floats) -> float:
 
 
 @njit(cache=True)
-def cone_scaling(x: Floats, s: Floats) -> tuple[Floats, Floats]:
+def find_scaling(x: Floats, s: Floats) -> tuple[Floats, Floats]:
     """Scale eta (nc,) and point w (nc, dim) of the scaling ``W = eta (2 v v^T - J)``.
 
     v is ``(w + e) / sqrt(2 (w_0 + 1))``, J is diag(1, -1, ...), and ``W^2 x = s``.
@@ -85,7 +85,7 @@ def cone_scaling(x: Floats, s: Floats) -> tuple[Floats, Floats]:
     nc, dim = x.shape
     eta, point = np.empty(nc), np.empty((nc, dim))
     for c in range(nc):
-        size_x, size_s = np.sqrt(cone_determinant(x[c])), np.sqrt(cone_determinant(s[c]))
+        size_x, size_s = np.sqrt(find_determinant(x[c])), np.sqrt(find_determinant(s[c]))
         eta[c] = np.sqrt(size_s / size_x)
         inner = 0.0
         for k in range(dim):
@@ -98,7 +98,7 @@ def cone_scaling(x: Floats, s: Floats) -> tuple[Floats, Floats]:
 
 
 @njit(cache=True)
-def cone_scale(eta: Floats, point: Floats, z: Floats, inverse: bool) -> Floats:
+def scale_cones(eta: Floats, point: Floats, z: Floats, inverse: bool) -> Floats:
     """``W z`` of each row, or ``W^-1 z``, which is ``J W J z / eta^2``."""
     scaled = np.empty_like(z)
     sign = -1.0 if inverse else 1.0
@@ -115,7 +115,7 @@ def cone_scale(eta: Floats, point: Floats, z: Floats, inverse: bool) -> Floats:
 
 
 @njit(cache=True)
-def cone_scaling_square(eta: Floats, point: Floats) -> Floats:
+def square_scaling(eta: Floats, point: Floats) -> Floats:
     """``W^2 = eta^2 (2 w w^T - J)`` of each row, (nc, dim, dim): maps x to s."""
     nc, dim = point.shape
     square = np.empty((nc, dim, dim))

@@ -1,17 +1,17 @@
 """Friction methods, one file each, found by being here."""
 
-from rigid_lcp.friction.methods.dantzig import dantzig
-from rigid_lcp.friction.methods.gauss_seidel import gauss_seidel, lay_out_sweeps
+from rigid_lcp.friction.methods.dantzig import solve_dantzig
+from rigid_lcp.friction.methods.gauss_seidel import lay_out_sweeps, solve_gauss_seidel
 from rigid_lcp.friction.methods.interior_point import (
     Path,
     PathStep,
-    interior_point,
-    spring_size,
+    find_spring_size,
+    solve_interior_point,
 )
-from rigid_lcp.friction.methods.newton import NEWTON, alart_curnier, newton
-from rigid_lcp.friction.methods.pivoting import pivoting
+from rigid_lcp.friction.methods.newton import NEWTON, find_alart_curnier, solve_newton
+from rigid_lcp.friction.methods.pivoting import solve_pivoting
 
 __all__ = [
-    "NEWTON", "Path", "PathStep", "alart_curnier", "dantzig", "gauss_seidel", "interior_point",
-    "lay_out_sweeps", "newton", "pivoting", "spring_size",
+    "NEWTON", "Path", "PathStep", "find_alart_curnier", "find_spring_size", "lay_out_sweeps",
+    "solve_dantzig", "solve_gauss_seidel", "solve_interior_point", "solve_newton", "solve_pivoting",
 ]  # fmt: skip

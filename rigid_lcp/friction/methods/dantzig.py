@@ -56,7 +56,7 @@ class DantzigNumbers:
 DANTZIG = DantzigNumbers()
 
 
-def dantzig(
+def solve_dantzig(
     problem: FrictionProblem,
     start: Floats | None = None,
     tolerance: float = 1e-12,
@@ -93,4 +93,4 @@ def dantzig(
     return judge_pivots(problem, state, force, tolerance, "dantzig", ended, where)
 
 
-METHOD = dantzig
+METHOD = solve_dantzig

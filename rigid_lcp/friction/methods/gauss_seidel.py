@@ -39,7 +39,7 @@ from rigid_lcp.friction.sweeps import (
 )
 
 
-def gauss_seidel(
+def solve_gauss_seidel(
     problem: FrictionProblem, start: Floats | None = None, tolerance: float = 1e-6,
     sweeps: int = 1000, *, blocks: SweepBlocks | None = None, last: bool = False,
     slow: tuple[int, float] = (0, np.inf),
@@ -100,4 +100,4 @@ def begin_sweeps(blocks: SweepBlocks, force: Floats) -> Momentum:
     return Momentum(force.copy(), velocity, velocity.copy(), np.array([0.0, 1.0, np.inf, np.inf]))
 
 
-METHOD = gauss_seidel
+METHOD = solve_gauss_seidel

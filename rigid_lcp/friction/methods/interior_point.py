@@ -36,13 +36,13 @@ from rigid_lcp.arrays import Floats
 from rigid_lcp.friction.linear import (
     Factorisation,
     SingularSystem,
-    cone_divide,
-    cone_product,
-    cone_scale,
-    cone_scaling,
-    cone_scaling_square,
-    cone_step,
-    factorisation,
+    choose_factorisation,
+    divide_cones,
+    find_cone_step,
+    find_scaling,
+    multiply_cones,
+    scale_cones,
+    square_scaling,
 )
 from rigid_lcp.friction.problem import (
     FrictionProblem,
@@ -89,7 +89,7 @@ class Path:
     convex problem and the path can not fold, but its end is only near the answer."""
 
 
-def interior_point(
+def solve_interior_point(
     problem: FrictionProblem, start: Floats | None = None, tolerance: float = 1e-8,
     path: Path = Path(), *, linear: Factorisation | None = None,
     iterations: int = INTERIOR.iterations, begun: PathStep | None = None,
@@ -108,7 +108,7 @@ def interior_point(
     contacts, dim = problem.contacts, problem.dim
     best, best_residual, done, short = np.zeros(contacts * dim), np.inf, 0, 0
     try:
-        step = begun or PathStep(problem, path, linear or factorisation(problem))
+        step = begun or PathStep(problem, path, linear or choose_factorisation(problem))
     except SingularSystem:
         return judge_forces(problem, best, tolerance, "interior-point", status="singular")
     while True:
@@ -144,7 +144,7 @@ class PathStep:
         self.unit[:, 0] = 1.0
         self.tangent = np.where(slides[:, None], 1.0, self.unit)  # r_T = 0 without friction
         speed = float(np.sqrt(np.mean(problem.offset**2))) or 1.0
-        size = size or spring_size(problem, linear, path.compliance)
+        size = size or find_spring_size(problem, linear, path.compliance)
         self.x = self.unit * (size or problem.rho * speed)
         self.s = self.unit * speed
         self.stretch = np.ones((contacts, dim))
@@ -157,39 +157,39 @@ class PathStep:
     def sigma(self) -> float:
         """The mean of ``x . s`` as the path of `rigid_lcp.friction.attempts.smoothed_path` measures
         it [N^2]."""
-        return float(np.mean(self.problem.contact_rho)) * float(path_gap(self.x, self.s))
+        return float(np.mean(self.problem.contact_rho)) * float(find_path_gap(self.x, self.s))
 
     def take(self) -> float:
         """One predictor-corrector step; returns its length.  Raises `SingularSystem`."""
         x, s, path = self.x, self.s, self.path
-        gap = path_gap(x, s)
+        gap = find_path_gap(x, s)
         if not gap > 0.0:  # round-off has put a point on the boundary of its cone, or beyond
             raise SingularSystem
         eps = path.rounding * np.sqrt(gap / self.problem.rho)
-        velocity, slope = coulomb_velocity(s, self.mu, eps, path.convex)
+        velocity, slope = find_coulomb_velocity(s, self.mu, eps, path.convex)
         if path.lagged:
             slope[:, 0, 1:] = 0.0
         at = self.problem.velocity(self.force()).reshape(x.shape)
-        eta, point = cone_scaling(x, s)
-        scaled = cone_scale(eta, point, x, False)
+        eta, point = find_scaling(x, s)
+        scaled = scale_cones(eta, point, x, False)
         solve = self.linear.factor(
             *build_path_blocks(eta, point, slope, self.tangent, self.stretch)
         )
 
-        def direction(target: Floats, share: float = 1.0) -> tuple[Floats, Floats]:
+        def find_direction(target: Floats, share: float = 1.0) -> tuple[Floats, Floats]:
             """dx, ds that bring ``x o s`` to the target and ``W r + q`` nearer to u(s)."""
             lack = share * (at - velocity)
             part, right = build_path_right(eta, point, scaled, slope, target, lack, self.tangent)
             force = solve(right.ravel()).reshape(x.shape)
             return find_path_direction(eta, point, part, force, self.tangent, self.stretch)
 
-        square = cone_product(scaled, scaled)
-        dx, ds = direction(-square)
-        dx, ds = direction(aim_corrector(x, s, dx, ds, eta, point, square))
-        length = INTERIOR.boundary_share * step_length(x, s, dx, ds)
+        square = multiply_cones(scaled, scaled)
+        dx, ds = find_direction(-square)
+        dx, ds = find_direction(aim_corrector(x, s, dx, ds, eta, point, square))
+        length = INTERIOR.boundary_share * find_step_length(x, s, dx, ds)
         if length < INTERIOR.back_off_step:  # off the path: back to its middle, higher up
-            dx, ds = direction(INTERIOR.back_off_gap * gap * self.unit - square, 0.0)
-            length = INTERIOR.boundary_share * step_length(x, s, dx, ds)
+            dx, ds = find_direction(INTERIOR.back_off_gap * gap * self.unit - square, 0.0)
+            length = INTERIOR.boundary_share * find_step_length(x, s, dx, ds)
         length = min(1.0, length)
         if not np.isfinite(length) or not (np.isfinite(dx).all() and np.isfinite(ds).all()):
             raise SingularSystem
@@ -197,7 +197,7 @@ class PathStep:
         return length
 
 
-def spring_size(problem: FrictionProblem, linear: Factorisation, compliance: float) -> float:
+def find_spring_size(problem: FrictionProblem, linear: Factorisation, compliance: float) -> float:
     """Size of what contacts would bear as springs, soft enough to share the load: the root of the
     mean square of r [N or N s] in ``(W + compliance / rho) r = -q``.  Raises `SingularSystem`."""
     contacts, dim = problem.contacts, problem.dim
@@ -207,7 +207,7 @@ def spring_size(problem: FrictionProblem, linear: Factorisation, compliance: flo
 
 
 @njit(cache=True)
-def path_gap(x: Floats, s: Floats) -> float:
+def find_path_gap(x: Floats, s: Floats) -> float:
     """``x . s`` of a contact, on average."""
     total = 0.0
     for c in range(x.shape[0]):
@@ -217,9 +217,9 @@ def path_gap(x: Floats, s: Floats) -> float:
 
 
 @njit(cache=True)
-def step_length(x: Floats, s: Floats, dx: Floats, ds: Floats) -> float:
+def find_step_length(x: Floats, s: Floats, dx: Floats, ds: Floats) -> float:
     """How far x and s may go before one leaves its cone."""
-    return min(cone_step(x, dx), cone_step(s, ds))
+    return min(find_cone_step(x, dx), find_cone_step(s, ds))
 
 
 @njit(cache=True)
@@ -228,10 +228,10 @@ def aim_corrector(
 ) -> Floats:
     """``sigma e - x o x - (W dx) o (W^-1 ds)`` in scaled x (Mehrotra), dx and ds the predictor's:
     sigma is the less the further that can go."""
-    gap, length = path_gap(x, s), min(1.0, step_length(x, s, dx, ds))
-    ahead = max(0.0, path_gap(x + length * dx, s + length * ds) / gap)
+    gap, length = find_path_gap(x, s), min(1.0, find_step_length(x, s, dx, ds))
+    ahead = max(0.0, find_path_gap(x + length * dx, s + length * ds) / gap)
     centring = max(LEAST_CENTRING, min(1.0, ahead**2))
-    second = cone_product(cone_scale(eta, point, dx, False), cone_scale(eta, point, ds, True))
+    second = multiply_cones(scale_cones(eta, point, dx, False), scale_cones(eta, point, ds, True))
     target = -square - second
     target[:, 0] += centring * gap
     return target
@@ -247,7 +247,7 @@ def build_path_blocks(
     """
     blocks = np.zeros(slope.shape)
     identity = np.zeros(slope.shape)
-    square = cone_scaling_square(eta, point)
+    square = square_scaling(eta, point)
     for c in range(len(eta)):
         for i in range(slope.shape[1]):
             identity[c, i, i] = tangent[c, i]
@@ -267,7 +267,7 @@ def build_path_right(
     tangent: Floats,
 ) -> tuple[Floats, Floats]:  # fmt: skip
     """What ds is at dx = 0 for ``x o s`` to reach the ``target``, and b of the system."""
-    part = cone_scale(eta, point, cone_divide(scaled, target), False)
+    part = scale_cones(eta, point, divide_cones(scaled, target), False)
     return part, (multiply_blocks(slope, part) - lack) * tangent
 
 
@@ -277,12 +277,12 @@ def find_path_direction(
 ) -> tuple[Floats, Floats]:
     """dx and ds of the change of the forces, dr (nc, dim)."""
     dx = force * stretch
-    there = cone_scale(eta, point, cone_scale(eta, point, dx, False), False)
+    there = scale_cones(eta, point, scale_cones(eta, point, dx, False), False)
     return dx, (part - there) * tangent
 
 
 @njit(cache=True)
-def coulomb_velocity(s: Floats, mu: Floats, eps: float, convex: bool) -> tuple[Floats, Floats]:
+def find_coulomb_velocity(s: Floats, mu: Floats, eps: float, convex: bool) -> tuple[Floats, Floats]:
     """u(s) = ``(mu (s_N - s_T^2 / sqrt(s_T^2 + eps^2)), s_T)`` and U = du/ds.
 
     ``s`` (nc, dim), ``mu`` (nc,), ``eps`` a velocity; ``convex`` leaves out the term in s_T.
@@ -307,6 +307,6 @@ def coulomb_velocity(s: Floats, mu: Floats, eps: float, convex: bool) -> tuple[F
     return velocity, slope
 
 
-METHOD = interior_point
+METHOD = solve_interior_point
 POLISHED = True
 """Newton's method is called from its end."""

@@ -20,12 +20,12 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rigid_lcp.arrays import Floats
-from rigid_lcp.friction.linear import Factorisation, SingularSystem, factorisation
+from rigid_lcp.friction.linear import Factorisation, SingularSystem, choose_factorisation
 from rigid_lcp.friction.problem import (
     FrictionProblem,
     FrictionSolution,
     judge_forces,
-    length,
+    norm,
     require_number,
     require_start,
     require_whole,
@@ -57,7 +57,7 @@ NEWTON = NewtonNumbers()
 
 
 @njit(cache=True)
-def alart_curnier(
+def find_alart_curnier(
     force: Floats, velocity: Floats, mu: Floats, rho: Floats
 ) -> tuple[Floats, Floats, Floats, Flags]:
     """F and its derivatives A = dF/dr, B = dF/du, and the status of each contact.
@@ -106,7 +106,7 @@ def alart_curnier(
     return f, a, b, status
 
 
-def newton(
+def solve_newton(
     problem: FrictionProblem, start: Floats | None = None, tolerance: float = 1e-12, *,
     linear: Factorisation | None = None, iterations: int = NEWTON.iterations,
     patience: int = NEWTON.patience,
@@ -124,22 +124,24 @@ def newton(
     tolerance = require_number(tolerance, "tolerance", zero=True)
     iterations = require_whole(iterations, "iterations")
     shape = (problem.contacts, problem.dim)
-    linear = linear or factorisation(problem)
+    linear = linear or choose_factorisation(problem)
     rho = problem.contact_rho
     best = np.zeros(problem.offset.shape)
     if start is not None:
         best = require_start(start, len(best), problem.dim)
     best_residual, done = problem.residual(best), 0
-    offered = problem.rho * length(problem.offset)
+    offered = problem.rho * norm(problem.offset)
     most, *others = NEWTON.first_shifts
-    first = min(most, NEWTON.bearable * offered / (length(best) or 1.0)) or most
+    first = min(most, NEWTON.bearable * offered / (norm(best) or 1.0)) or most
     least_shift = min(NEWTON.least_shift, NEWTON.quiet * first)
     for shift in (first, *others) if patience >= NEWTON.patience else (first,):
         force, waited, mark = best, 0, best_residual
         status = np.zeros(0, dtype=np.int8)
         while best_residual > tolerance and done < iterations and waited < patience:
             velocity, last = problem.velocity(force).reshape(shape), status
-            f, a, b, status = alart_curnier(force.reshape(shape), velocity, problem.friction, rho)
+            f, a, b, status = find_alart_curnier(
+                force.reshape(shape), velocity, problem.friction, rho
+            )
             if np.array_equal(status, last):
                 shift = max(least_shift, NEWTON.quiet * shift)
             done, waited = done + 1, waited + 1
@@ -157,7 +159,7 @@ def newton(
                 waited, mark = 0, best_residual
             if best_residual <= tolerance:  # once more by the same factors: nearly for nothing
                 velocity = problem.velocity(best).reshape(shape)
-                f = alart_curnier(best.reshape(shape), velocity, problem.friction, rho)[0]
+                f = find_alart_curnier(best.reshape(shape), velocity, problem.friction, rho)[0]
                 again = best - solve(f.ravel())
                 if problem.residual(again) < best_residual:
                     best = again
@@ -167,4 +169,4 @@ def newton(
     )  # fmt: skip
 
 
-METHOD = newton
+METHOD = solve_newton

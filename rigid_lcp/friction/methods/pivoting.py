@@ -31,7 +31,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigid_lcp.arrays import Floats
-from rigid_lcp.friction.methods.gauss_seidel import gauss_seidel
+from rigid_lcp.friction.methods.gauss_seidel import solve_gauss_seidel
 from rigid_lcp.friction.pivots import (
     DONE,
     SHIFT,
@@ -67,7 +67,7 @@ class PivotingNumbers:
 PIVOTING = PivotingNumbers()
 
 
-def pivoting(
+def solve_pivoting(
     problem: FrictionProblem, start: Floats | None = None, tolerance: float = 1e-12, *,
     sweeps: int = PIVOTING.sweeps, tangential_velocity: Floats | None = None,
 ) -> FrictionSolution:  # fmt: skip
@@ -99,7 +99,7 @@ def pivoting(
             if near is None or paths > 1:
                 count = sweeps if near is None else PIVOTING.more_sweeps
                 swept += count
-                near = gauss_seidel(problem, near, PIVOTING.swept, count).r
+                near = solve_gauss_seidel(problem, near, PIVOTING.swept, count).r
             if problem.residual(near) <= tolerance:
                 work = {"pivots": float(spent), "paths": paths - 1.0, "sweeps": float(swept)}
                 return judge_forces(problem, np.array(near), tolerance, "pivoting", work)
@@ -121,4 +121,4 @@ def pivoting(
     return solution
 
 
-METHOD = pivoting
+METHOD = solve_pivoting

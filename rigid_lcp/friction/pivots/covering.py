@@ -16,9 +16,9 @@ from rigid_lcp.friction.pivots.updates import (
     SLIDING_UP,
     STATIC,
     Geometry,
+    find_slide_sign,
     multiply_geometry,
     refresh_reduced,
-    slide_sign,
     solve_reduced,
 )
 from rigid_lcp.friction.problem import FrictionProblem
@@ -93,7 +93,7 @@ def make_consistent(
     """Move f and a, as little as need be, to where every contact obeys the rules of its list."""
     for c in range(len(kinds)):
         n, t, mu = geometry.normal[c], geometry.tangent[c], geometry.mu[c]
-        sign = slide_sign(kinds[c])
+        sign = find_slide_sign(kinds[c])
         if kinds[c] == BREAKING:
             f[n] = 0.0
         else:
@@ -106,7 +106,7 @@ def make_consistent(
     a[:] = b
     multiply_geometry(geometry, f, a)
     for c in range(len(kinds)):
-        n, t, sign = geometry.normal[c], geometry.tangent[c], slide_sign(kinds[c])
+        n, t, sign = geometry.normal[c], geometry.tangent[c], find_slide_sign(kinds[c])
         a[n] = max(a[n], little / rho * noise[c, 0]) if kinds[c] == BREAKING else 0.0
         if t >= 0 and kinds[c] == STATIC:
             a[t] = 0.0

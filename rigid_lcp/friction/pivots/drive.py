@@ -21,13 +21,13 @@ from rigid_lcp.friction.pivots.updates import (
     TURNING,
     Geometry,
     Reduced,
+    add_reduced,
     couple_reduced,
-    enter_reduced,
-    leave_reduced,
+    find_slide_sign,
     multiply_geometry,
     refresh_reduced,
+    remove_reduced,
     scatter_column,
-    slide_sign,
     solve_reduced,
 )
 
@@ -51,7 +51,7 @@ def find_force_change(
     for i in range(len(found)):
         force[reduced.members[i]] = found[i]
     for c in range(len(reduced.kind)):
-        sign = slide_sign(reduced.kind[c])
+        sign = find_slide_sign(reduced.kind[c])
         if sign != 0.0 and geometry.tangent[c] >= 0:
             force[geometry.tangent[c]] = sign * geometry.mu[c] * force[geometry.normal[c]]
     acceleration[:] = rate
@@ -66,7 +66,7 @@ def reach_zero(value: float, rate: float, ahead: float) -> float:
 
 
 @njit(cache=True)
-def first_event(
+def find_first_event(
     geometry: Geometry, reduced: Reduced, f: Floats, a: Floats, df: Floats, da: Floats, ahead: float
 ) -> tuple[float, int, int, int]:
     """Step 3: the first event (a) to (d) along ``ahead`` (1 or -1): step, contact, event, list.
@@ -80,19 +80,21 @@ def first_event(
             step = reach_zero(a[n], da[n], ahead)
             if step < first:
                 first, who, event = step, c, TOUCHES
-                to = list_of_touching(geometry, c, a[t] + step * ahead * da[t] if t >= 0 else 0.0)
+                to = choose_touching_list(
+                    geometry, c, a[t] + step * ahead * da[t] if t >= 0 else 0.0
+                )
         elif kind == STATIC:
             for sign in (1.0, -1.0):
                 step = reach_zero(mu * f[n] - sign * f[t], mu * df[n] - sign * df[t], ahead)
                 if step < first:
                     first, who, event = step, c, SLIDES
                     to = SLIDING_UP if sign > 0.0 else SLIDING_DOWN
-        elif slide_sign(kind) != 0.0:
+        elif find_slide_sign(kind) != 0.0:
             step = reach_zero(f[n], df[n], ahead)
             if step < first:
                 first, who, event, to = step, c, PARTS, BREAKING
             if t >= 0 and geometry.slip[c] == 0:
-                sign = slide_sign(kind)
+                sign = find_slide_sign(kind)
                 step = reach_zero(-sign * a[t], -sign * da[t], ahead)
                 if step < first:
                     first, who, event, to = step, c, STICKS, STATIC
@@ -100,7 +102,7 @@ def first_event(
 
 
 @njit(cache=True)
-def list_of_touching(geometry: Geometry, contact: int, tangential: float) -> int:
+def choose_touching_list(geometry: Geometry, contact: int, tangential: float) -> int:
     """List of a contact that becomes permanent, by its tangential acceleration (event a)."""
     if geometry.tangent[contact] < 0:
         return SLIDING_UP
@@ -113,26 +115,26 @@ def list_of_touching(geometry: Geometry, contact: int, tangential: float) -> int
 def move_contact(geometry: Geometry, reduced: Reduced, contact: int, to: int) -> bool:
     """Move a contact to another list, and the inverse with it; False where that is singular."""
     n, t, mu = geometry.normal[contact], geometry.tangent[contact], geometry.mu[contact]
-    sign = slide_sign(reduced.kind[contact])
+    sign = find_slide_sign(reduced.kind[contact])
     fine = True
     if to == BREAKING:
         if reduced.place[n] >= 0:
-            fine = leave_reduced(reduced, n)
+            fine = remove_reduced(reduced, n)
     elif to == STATIC:
-        fine = enter_reduced(geometry, reduced, t)
+        fine = add_reduced(geometry, reduced, t)
         if fine and sign != 0.0:
             couple_reduced(geometry, reduced, contact, -sign * mu)
     elif to == TURNING:
         reduced.kind[contact] = TURNING
-        fine = enter_reduced(geometry, reduced, n)
+        fine = add_reduced(geometry, reduced, n)
     elif reduced.kind[contact] == TURNING:
-        fine = enter_reduced(geometry, reduced, t)
+        fine = add_reduced(geometry, reduced, t)
     elif reduced.kind[contact] != STATIC:
         reduced.kind[contact] = to
-        fine = enter_reduced(geometry, reduced, n)
-    if fine and slide_sign(to) != 0.0 and t >= 0 and reduced.place[t] >= 0:
-        couple_reduced(geometry, reduced, contact, slide_sign(to) * mu)
-        fine = leave_reduced(reduced, t)
+        fine = add_reduced(geometry, reduced, n)
+    if fine and find_slide_sign(to) != 0.0 and t >= 0 and reduced.place[t] >= 0:
+        couple_reduced(geometry, reduced, contact, find_slide_sign(to) * mu)
+        fine = remove_reduced(reduced, t)
     reduced.kind[contact] = to
     return fine
 
@@ -166,7 +168,7 @@ def settle_values(
     find_force_change(geometry, reduced, a, change, ignored)
     f += change
     for c in range(len(reduced.kind)):
-        sign = slide_sign(reduced.kind[c])
+        sign = find_slide_sign(reduced.kind[c])
         if sign != 0.0 and geometry.tangent[c] >= 0:
             f[geometry.tangent[c]] = sign * geometry.mu[c] * f[geometry.normal[c]]
     a[:] = b + driven
@@ -210,7 +212,7 @@ def find_driven_end(
 
 
 @njit(cache=True)
-def lists_repeat(seen: Ints, repeats: int, signature: int) -> bool:
+def is_repeat(seen: Ints, repeats: int, signature: int) -> bool:
     """Whether the lists, by their ``signature``, were the same before; it is noted in ``seen``.
 
     ``repeats``: events at this place, of which ``seen`` keeps the last.
@@ -244,7 +246,7 @@ def drive(
         find_driven_change(geometry, contact, what, sense, df)
         if what == PATH and event != NO_EVENT:
             ahead = 1.0 if find_entering_rate(geometry, df, da, who, event, sign) >= 0.0 else -1.0
-        step, who, event, to = first_event(geometry, reduced, f, a, df, da, ahead)
+        step, who, event, to = find_first_event(geometry, reduced, f, a, df, da, ahead)
         done, end = find_driven_end(
             geometry, contact, what, sense, ahead, 1.0 - travelled, f, a, df, da
         )  # fmt: skip
@@ -268,10 +270,10 @@ def drive(
         signature ^= codes[who, reduced.kind[who]] ^ codes[who, to]
         scale = max(scale, abs(travelled))
         repeats = 0 if step > 1e-14 * scale else repeats
-        if lists_repeat(seen, repeats, signature):
+        if is_repeat(seen, repeats, signature):
             return CYCLED, who
         repeats += 1
-        sign = slide_sign(to) if event == SLIDES else slide_sign(reduced.kind[who])
+        sign = find_slide_sign(to) if event == SLIDES else find_slide_sign(reduced.kind[who])
         if not move_contact(geometry, reduced, who, to):
             return SINGULAR, who
         snap_event(geometry, f, a, who, event, to)
@@ -293,7 +295,7 @@ def snap_event(geometry: Geometry, f: Floats, a: Floats, who: int, event: int, t
     elif event == STICKS:
         a[t] = 0.0
     else:
-        f[t] = slide_sign(to) * geometry.mu[who] * f[n]
+        f[t] = find_slide_sign(to) * geometry.mu[who] * f[n]
 
 
 @njit(cache=True)

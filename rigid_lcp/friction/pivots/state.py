@@ -35,7 +35,7 @@ from rigid_lcp.friction.problem import (
     FrictionProblem,
     FrictionSolution,
     Status,
-    natural_map,
+    find_natural_map,
     prove_forces_insufficient,
     require_finite,
 )
@@ -169,7 +169,7 @@ def measure_pivots_residual(problem: FrictionProblem, state: Pivots, force: Floa
     far = 10.0 * (np.abs(velocity).max() + np.abs(force).max() / problem.rho)
     velocity[1::2][slip != 0] = -slip[slip != 0] * far
     shape = (problem.contacts, problem.dim)
-    error = natural_map(
+    error = find_natural_map(
         force.reshape(shape), velocity.reshape(shape), problem.friction, problem.rho
     )
     return float(np.linalg.norm(error)) / size if size > 0.0 else 0.0

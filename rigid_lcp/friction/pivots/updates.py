@@ -69,7 +69,7 @@ def start_reduced(contacts: int, rows: int) -> Reduced:
 
 
 @njit(cache=True)
-def slide_sign(kind: int) -> float:
+def find_slide_sign(kind: int) -> float:
     """Sign sigma of ``f_T = sigma mu f_N`` in a list; 0 where friction is not at its limit."""
     if kind == SLIDING_UP:
         return 1.0
@@ -77,7 +77,7 @@ def slide_sign(kind: int) -> float:
 
 
 @njit(cache=True)
-def border_inverse(inverse: Floats, size: int, column: Floats, row: Floats, corner: float) -> float:
+def extend_inverse(inverse: Floats, size: int, column: Floats, row: Floats, corner: float) -> float:
     """Inverse of ``[[B, column], [row, corner]]`` from that of B; returns its Schur complement.
 
     ``column``, ``row``: (size,), mostly zeros.  Nothing is changed where the complement is zero to
@@ -154,13 +154,13 @@ def scatter_reduced_column(geometry: Geometry, kind: Ints, row: int, into: Float
     """Column of the unknown ``row`` in eq. 28, over all rows: ``A_N + sigma mu A_T`` if sliding."""
     scatter_column(geometry, row, 1.0, into)
     c = geometry.contact[row]
-    sign = slide_sign(kind[c])
+    sign = find_slide_sign(kind[c])
     if sign != 0.0 and row == geometry.normal[c] and geometry.tangent[c] >= 0:
         scatter_column(geometry, geometry.tangent[c], sign * geometry.mu[c], into)
 
 
 @njit(cache=True)
-def enter_reduced(geometry: Geometry, reduced: Reduced, row: int) -> bool:
+def add_reduced(geometry: Geometry, reduced: Reduced, row: int) -> bool:
     """Add the unknown force and the equation ``a = 0`` of ``row``; False where that is singular."""
     size = reduced.size[0]
     full = np.zeros(len(reduced.place))
@@ -174,9 +174,9 @@ def enter_reduced(geometry: Geometry, reduced: Reduced, row: int) -> bool:
         if reduced.place[other] >= 0:
             across[reduced.place[other]] += value
         elif other == geometry.tangent[c] and reduced.place[geometry.normal[c]] >= 0:
-            share = slide_sign(reduced.kind[c]) * geometry.mu[c]
+            share = find_slide_sign(reduced.kind[c]) * geometry.mu[c]
             across[reduced.place[geometry.normal[c]]] += share * value
-    if border_inverse(reduced.inverse, size, column, across, full[row]) == 0.0:
+    if extend_inverse(reduced.inverse, size, column, across, full[row]) == 0.0:
         return False
     reduced.place[row] = size
     reduced.members[size] = row
@@ -185,7 +185,7 @@ def enter_reduced(geometry: Geometry, reduced: Reduced, row: int) -> bool:
 
 
 @njit(cache=True)
-def leave_reduced(reduced: Reduced, row: int) -> bool:
+def remove_reduced(reduced: Reduced, row: int) -> bool:
     """Take the unknown force and the equation of ``row`` out; False where that is singular."""
     size, place = reduced.size[0], reduced.place[row]
     if not shrink_inverse(reduced.inverse, size, place):

@@ -111,7 +111,7 @@ def require_start(start: ArrayLike, numbers: int, dim: int) -> Floats:
     return force
 
 
-def in_range(values: Floats, name: str, least: float = LEAST) -> None:
+def require_range(values: Floats, name: str, least: float = LEAST) -> None:
     """Raise `ProblemError` where the largest of the numbers can not be squared in floats."""
     largest = float(np.abs(values).max(initial=0.0))
     if largest and not least <= largest <= MOST:
@@ -157,7 +157,7 @@ def check_factors(jacobian: sp.csr_array, inverse: sp.csr_array, size: int) -> N
             raise ProblemError(
                 f"{name} holds numbers that are not finite", where=where, remedy=FROM_A_DIVISION,
             )  # fmt: skip
-        in_range(part.data, f"{where}, {name}")
+        require_range(part.data, f"{where}, {name}")
     freedoms = jacobian.shape[1]
     if inverse.shape != (freedoms, freedoms) or size not in (3, 6) or freedoms % size:
         raise ProblemError(

@@ -18,7 +18,7 @@ from rigid_lcp.arrays import Floats
 
 
 @njit(cache=True)
-def natural_map(force: Floats, velocity: Floats, mu: Floats, rho: float) -> Floats:
+def find_natural_map(force: Floats, velocity: Floats, mu: Floats, rho: float) -> Floats:
     """``r - P_K(r - rho (u + mu |u_T| n))``, (nc, dim): zero at a solution, in units of r.
 
     With ``a = r - rho u`` the point to project is ``(a_N - mu |rho u_T|, a_T)``.  Where it lies is
@@ -53,7 +53,7 @@ def natural_map(force: Floats, velocity: Floats, mu: Floats, rho: float) -> Floa
     return error
 
 
-def natural_residual(force: Floats, velocity: Floats, mu: Floats, rho: float) -> float:
+def find_natural_residual(force: Floats, velocity: Floats, mu: Floats, rho: float) -> float:
     """Scale-free error of a solution: the norm of the natural map over that of r [-].
 
     ``rho``: force over velocity that makes the two comparable, ``1 / mean(diag W)``.  Where all
@@ -63,14 +63,14 @@ def natural_residual(force: Floats, velocity: Floats, mu: Floats, rho: float) ->
     A contact that carries and approaches all the same shows ``rho |u_N| / (1 + mu^2)^(1/2)`` of
     it: at mu = 1000 a residual of 1e-12 means approach to 1e-9.
     """
-    found: float = _natural_residual(
+    found: float = _find_natural_residual(
         np.ascontiguousarray(force, float), np.ascontiguousarray(velocity, float), mu, rho
     )
     return found
 
 
 @njit(cache=True)
-def _natural_residual(force: Floats, velocity: Floats, mu: Floats, rho: float) -> float:
+def _find_natural_residual(force: Floats, velocity: Floats, mu: Floats, rho: float) -> float:
     push = rho * velocity
     largest = 0.0
     for c in range(force.shape[0]):
@@ -81,12 +81,12 @@ def _natural_residual(force: Floats, velocity: Floats, mu: Floats, rho: float) -
     if largest == 0.0:
         return 0.0
     scaled, push = force / largest, push / largest  # squares neither vanish nor overflow
-    error = np.sqrt(np.sum(natural_map(scaled, push, mu, 1.0) ** 2))
+    error = np.sqrt(np.sum(find_natural_map(scaled, push, mu, 1.0) ** 2))
     size = np.sqrt(np.sum(scaled**2))
     return error / (size if size > 0.0 else np.sqrt(np.sum(push**2)))
 
 
-def length(values: Floats) -> float:
+def norm(values: Floats) -> float:
     """Euclidean norm of all numbers of an array; their squares may vanish or overflow."""
     largest = float(np.abs(values).max(initial=0.0))
     if largest == 0.0 or not np.isfinite(largest):

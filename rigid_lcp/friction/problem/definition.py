@@ -18,18 +18,18 @@ from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.errors import ProblemError
 from rigid_lcp.friction.problem.checks import (
     check_factors,
-    in_range,
     require_by_contact,
     require_matrix,
     require_one_a_contact,
+    require_range,
 )
-from rigid_lcp.friction.problem.cones import length, natural_map, natural_residual
+from rigid_lcp.friction.problem.cones import find_natural_map, find_natural_residual, norm
 from rigid_lcp.sparse import (
-    csr_arrays,
-    diagonal_blocks,
+    find_diagonal_blocks,
     find_row_forms,
     multiply_csr,
     multiply_factors,
+    split_csr,
     split_jacobian,
 )
 
@@ -64,7 +64,7 @@ class BodySpace:
     @cached_property
     def mass_blocks(self) -> Floats:
         """M by its blocks, (bodies, size, size) [kg, kg m^2]."""
-        blocks = diagonal_blocks(*csr_arrays(self.inverse_mass), self.body_size)
+        blocks = find_diagonal_blocks(*split_csr(self.inverse_mass), self.body_size)
         return np.asarray(np.linalg.inv(blocks), dtype=float)
 
     @cached_property
@@ -81,11 +81,11 @@ class BodySpace:
     def diagonal(self) -> Floats:
         """The diagonal of W, without W."""
         found: Floats = find_row_forms(
-            *csr_arrays(self.jacobian), *csr_arrays(self.inverse_mass), self.jacobian.shape[1]
+            *split_csr(self.jacobian), *split_csr(self.inverse_mass), self.jacobian.shape[1]
         )
         return found
 
-    def of_contacts(self, taking: Ints) -> BodySpace:
+    def select_contacts(self, taking: Ints) -> BodySpace:
         """The same bodies and these contacts alone, by their numbers."""
         dim = 2 if self.body_size == 3 else 3
         rows = (dim * taking[:, None] + np.arange(dim)).ravel()
@@ -95,7 +95,7 @@ class BodySpace:
         """``W r``."""
         given = np.ascontiguousarray(force, dtype=float)
         made: Floats = multiply_factors(
-            *csr_arrays(self.jacobian), *csr_arrays(self.inverse_mass), given
+            *split_csr(self.jacobian), *split_csr(self.inverse_mass), given
         )
         return made
 
@@ -106,7 +106,7 @@ class FrictionProblem:
 
     ``matrix`` W (nc * dim, nc * dim) CSR, or None where ``bodies`` has its factors; it need be
     neither regular nor quite symmetric.  ``offset`` q (nc * dim,); ``friction`` mu (nc,).
-    Made by `friction_problem`, which checks all of it.
+    Made by `make_problem`, which checks all of it.
     """
 
     matrix: sp.csr_array | None
@@ -139,7 +139,7 @@ class FrictionProblem:
         (`rigid_lcp.sparse.body_matrix`)."""
         assert self.bodies is not None
         made: tuple[Ints, Ints, Floats] = split_jacobian(
-            *csr_arrays(self.bodies.jacobian), self.dim, self.bodies.body_size
+            *split_csr(self.bodies.jacobian), self.dim, self.bodies.body_size
         )
         return made
 
@@ -166,15 +166,15 @@ class FrictionProblem:
         shape = (self.contacts, self.dim)
         velocity = np.ascontiguousarray(self.offset).reshape(shape)
         none = np.zeros_like(velocity)
-        scale = length(velocity) or 1.0
-        return scale * length(natural_map(none, velocity / scale, self.friction, self.rho))
+        scale = norm(velocity) or 1.0
+        return scale * norm(find_natural_map(none, velocity / scale, self.friction, self.rho))
 
     def velocity(self, force: Floats) -> Floats:
         """``u = W r + q``, (nc * dim,)."""
         if self.matrix is None and self.bodies is not None:
             return self.bodies.product(force) + self.offset
         force = np.ascontiguousarray(force, dtype=float)
-        made: Floats = multiply_csr(*csr_arrays(self.delassus), force)
+        made: Floats = multiply_csr(*split_csr(self.delassus), force)
         return made + self.offset
 
     def residual(self, force: Floats, velocity: Floats | None = None) -> float:
@@ -185,31 +185,31 @@ class FrictionProblem:
         """
         shape = (self.contacts, self.dim)
         u = self.velocity(force) if velocity is None else velocity
-        return natural_residual(
+        return find_natural_residual(
             np.ascontiguousarray(force).reshape(shape), np.ascontiguousarray(u).reshape(shape),
             self.friction, self.rho,
         )  # fmt: skip
 
-    def mended(self, force: Floats, residual: float) -> bool:
+    def reduces_error(self, force: Floats, residual: float) -> bool:
         """Whether forces of this residual leave little of the error without forces.
 
         Or of the velocities, each contact by its own rho: where W of one is 1e15 times that of
         another, rho of the mean sees nothing of the latter's.
         """
-        left = max(residual, FORCE_ROUND_OFF) * length(force)
+        left = max(residual, FORCE_ROUND_OFF) * norm(force)
         if left <= SHARE_LEFT * self.error_without_forces:
             return True
-        none = self._approach(np.zeros_like(force))
-        return none > 0.0 and self._approach(force) <= SHARE_LEFT * none
+        none = self._find_approach(np.zeros_like(force))
+        return none > 0.0 and self._find_approach(force) <= SHARE_LEFT * none
 
-    def _approach(self, force: Floats) -> float:
+    def _find_approach(self, force: Floats) -> float:
         """Norm of the natural maps of all contacts over their own rho, what round-off of the forces
         may hide included."""
         shape = (self.contacts, self.dim)
         own, r = self.contact_rho[:, None], np.ascontiguousarray(force).reshape(shape)
         push = own * self.velocity(force).reshape(shape)
-        error = np.abs(natural_map(r, push, self.friction, 1.0))
-        return length(np.maximum(error, FORCE_ROUND_OFF * np.abs(r)) / own)
+        error = np.abs(find_natural_map(r, push, self.friction, 1.0))
+        return norm(np.maximum(error, FORCE_ROUND_OFF * np.abs(r)) / own)
 
 
 @dataclass(frozen=True)
@@ -245,12 +245,12 @@ def judge_forces(
 
     Forces that grow without bound in a problem that has no solution make the residual, which is
     relative to them, as small as one likes: they are not ``solved`` unless they also leave less
-    than `SHARE_LEFT` of the error that no forces have (`FrictionProblem.mended`).  ``velocity``:
-    ``W r + q``, where it is known already.
+    than `SHARE_LEFT` of the error that no forces have (`FrictionProblem.reduces_error`).
+    ``velocity``: ``W r + q``, where it is known already.
     """
     velocity = problem.velocity(force) if velocity is None else velocity
     residual = problem.residual(force, velocity)
-    solved = residual <= tolerance and problem.mended(force, residual)
+    solved = residual <= tolerance and problem.reduces_error(force, residual)
     if not solved and not message and residual <= tolerance:
         message = (
             f"{method}: the residual is small, but only beside forces of"
@@ -269,9 +269,7 @@ def judge_forces(
     )  # fmt: skip
 
 
-def friction_problem(
-    matrix: Any, offset: ArrayLike, friction: ArrayLike, dim: int
-) -> FrictionProblem:
+def make_problem(matrix: Any, offset: ArrayLike, friction: ArrayLike, dim: int) -> FrictionProblem:
     """Check W, q and mu and make a `FrictionProblem` of them; what was given is left as it is.
 
     ``matrix``: W (nc * dim, nc * dim) as a dense or sparse matrix, or as a `BodySpace`; ``offset``
@@ -281,7 +279,7 @@ def friction_problem(
     if not isinstance(dim, int | np.integer) or dim not in (2, 3):
         raise ProblemError(f"dim is {dim!r}", where="dim", remedy="give 2 or 3")
     q = require_by_contact(offset, "q", dim)
-    in_range(q, "q", least=0.0)  # bodies may come to rest as slowly as they like
+    require_range(q, "q", least=0.0)  # bodies may come to rest as slowly as they like
     if len(q) % dim:
         raise ProblemError(
             f"q has {len(q)} numbers, which are not {dim} a contact", where="q",
@@ -294,7 +292,7 @@ def friction_problem(
         check_factors(bodies.jacobian, bodies.inverse_mass, bodies.body_size)
     w = None if bodies is not None else require_matrix(matrix)
     if w is not None:
-        in_range(w.data, "W")
+        require_range(w.data, "W")
     shape = (bodies.jacobian.shape[0],) * 2 if bodies is not None else w.shape  # type: ignore[union-attr]
     if shape != (len(q), len(q)):
         raise ProblemError(

@@ -16,7 +16,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from rigid_lcp.arrays import Floats, Ints
-from rigid_lcp.friction.problem.cones import natural_map
+from rigid_lcp.friction.problem.cones import find_natural_map
 from rigid_lcp.friction.problem.definition import FrictionProblem
 
 DESCENT_STEPS = 3000
@@ -44,7 +44,7 @@ def find_least_energy(problem: FrictionProblem) -> tuple[float, Floats]:
     force[:: problem.dim] = problem.contacts**-0.5
     energy, ahead, momentum = float(force @ (form @ force)), force, 1.0
     for _ in range(DESCENT_STEPS):
-        step = _in_cones(ahead - (form @ ahead) / largest, problem)
+        step = _project_forces(ahead - (form @ ahead) / largest, problem)
         size = float(np.linalg.norm(step))
         if size == 0.0 or energy < -CERTAIN_ENERGY:
             break
@@ -70,10 +70,10 @@ def gives_energy(problem: FrictionProblem) -> bool:
     )
 
 
-def _in_cones(force: Floats, problem: FrictionProblem) -> Floats:
+def _project_forces(force: Floats, problem: FrictionProblem) -> Floats:
     """``P_K(r)``: r less its natural map without velocity."""
     rows = force.reshape(problem.contacts, problem.dim)
-    nearest = rows - natural_map(rows, np.zeros_like(rows), problem.friction, 1.0)
+    nearest = rows - find_natural_map(rows, np.zeros_like(rows), problem.friction, 1.0)
     return np.asarray(nearest.ravel())
 
 

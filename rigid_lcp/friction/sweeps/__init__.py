@@ -9,14 +9,14 @@ from rigid_lcp.friction.sweeps.contact_kernel import (
 )
 from rigid_lcp.friction.sweeps.local_contact import NONE, solve_contacts_apart
 from rigid_lcp.friction.sweeps.normal_matrices import (
-    face_band,
-    face_bandwidth,
-    normal_products,
-    normal_sweeps,
+    build_band,
+    find_bandwidth,
+    multiply_normals,
+    sweep_normals,
 )
 
 __all__ = [
-    "NONE", "Momentum", "SweepBlocks", "add_impulses", "face_band",
-    "face_bandwidth", "lay_out_bodies", "lay_out_matrix", "normal_products", "normal_sweeps",
-    "pack_contacts", "solve_contacts_apart", "sweep_until_small",
+    "NONE", "Momentum", "SweepBlocks", "add_impulses", "build_band", "find_bandwidth",
+    "lay_out_bodies", "lay_out_matrix", "multiply_normals", "pack_contacts", "solve_contacts_apart",
+    "sweep_normals", "sweep_until_small",
 ]  # fmt: skip

@@ -13,7 +13,7 @@ from numba import njit
 
 from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.friction.problem import BodySpace, FrictionProblem
-from rigid_lcp.sparse import csr_arrays, diagonal_blocks
+from rigid_lcp.sparse import find_diagonal_blocks, split_csr
 
 
 @njit(cache=True)
@@ -53,7 +53,7 @@ def lay_out_bodies(problem: FrictionProblem) -> tuple[Ints, Floats, Floats] | No
     size, contacts = 3 * problem.dim - 3, problem.contacts
     if space is None or space.body_size != size or space.jacobian.shape[1] % size or not contacts:
         return None
-    root = root_inverse_mass(space)
+    root = factor_inverse_mass(space)
     if root is None:
         return None
     made: tuple[Ints, Floats, Floats] | None = pair_blocks(*problem.body_jacobians, root)
@@ -111,12 +111,12 @@ def moves(part: Floats) -> bool:
     return False
 
 
-def root_inverse_mass(space: BodySpace) -> Floats | None:
+def factor_inverse_mass(space: BodySpace) -> Floats | None:
     """L of every body with ``M^-1 = L L^T``, (bodies, size, size); None if M^-1 is no such thing.
 
     By eigenvectors, as a body that is held has zeros there.
     """
-    mass = diagonal_blocks(*csr_arrays(space.inverse_mass), space.body_size)
+    mass = find_diagonal_blocks(*split_csr(space.inverse_mass), space.body_size)
     if np.count_nonzero(mass) != np.count_nonzero(space.inverse_mass.data):
         return None
     diagonal = np.einsum("bii->bi", mass)

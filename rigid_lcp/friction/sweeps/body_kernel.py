@@ -6,7 +6,7 @@ solves its contact exactly and changes them.  A sweep with momentum begins at
 and y itself is made contact by contact when it is needed; what a visit reads lies in one row: so a
 sweep goes through the memory once, not four times.
 
-Where W_cc can be inverted safely (`inverses`), what sticks is ``r = y - W_cc^-1 u``, and what
+Where W_cc can be inverted safely (`invert_blocks`), what sticks is ``r = y - W_cc^-1 u``, and what
 slides in the plane has one sign only: with ``mu |W_NT| < W_NN`` the contact alone has one answer
 (its matrix is a P-matrix for both signs), so it slides as it would without friction.  All else is
 left to `rigid_lcp.friction.sweeps.local_contact`.
@@ -24,7 +24,7 @@ LEAST_DETERMINANT, MOST_COUPLING = LOCAL.least_determinant, LOCAL.most_coupling
 
 
 @njit(cache=True)
-def inverses(local: Floats, friction: Floats) -> Floats:
+def invert_blocks(local: Floats, friction: Floats) -> Floats:
     """W_cc^-1 of every block (nc, dim, dim); zeros where the general solution has to be used."""
     found = np.zeros_like(local)
     for c in range(len(local)):
@@ -60,7 +60,7 @@ def pack_contacts(block: Floats, local: Floats, offset: Floats, friction: Floats
     """
     contacts, dim = offset.shape
     size, upper = block.shape[3], dim * (dim + 1) // 2
-    inverse = inverses(local, friction)
+    inverse = invert_blocks(local, friction)
     packed = np.empty((contacts, 2 * dim * size + dim + 2 * upper + 1))
     for c in range(contacts):
         at = 0

@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 
 from rigid_lcp.arrays import Floats, Ints
-from rigid_lcp.friction.problem import natural_map
+from rigid_lcp.friction.problem import find_natural_map
 from rigid_lcp.friction.sweeps.blocks import add_impulses, find_relative_velocities
 from rigid_lcp.friction.sweeps.body_kernel import sweep_bodies_2d, sweep_bodies_3d
 from rigid_lcp.friction.sweeps.local_contact import NONE, solve_contact_2d, solve_contact_3d
@@ -145,7 +145,7 @@ def sweep_until_small(
     over all.
     """
     best, stuck, enough = force.copy(), 0, 0.0
-    best_residual = residual_of(blocks, force)
+    best_residual = find_residual(blocks, force)
     mark, marked = best_residual, 0.0
     visit = np.arange(len(force))
     some = len(visit) >= MANY_CONTACTS
@@ -159,7 +159,7 @@ def sweep_until_small(
             else:
                 stuck = sweep_once(blocks, state, force, visit)
                 if some:
-                    carry = carrying(force, state.last, visit)
+                    carry = list_carrying(force, state.last, visit)
             count += 1
             if state.tally[3] <= enough:
                 break
@@ -168,7 +168,7 @@ def sweep_until_small(
                 visit, count = visit[::-1].copy(), 0
                 state.tally[1], state.tally[2] = 1.0, np.inf
             mark, marked = best_residual, state.tally[0]
-        residual = residual_of(blocks, force)
+        residual = find_residual(blocks, force)
         if not np.isfinite(residual):
             break
         if residual < best_residual:
@@ -182,7 +182,7 @@ def sweep_until_small(
 
 
 @njit(cache=True)
-def carrying(force: Floats, last: Floats, visit: Ints) -> Ints:
+def list_carrying(force: Floats, last: Floats, visit: Ints) -> Ints:
     """Those of the contacts ``visit`` that bear, or did before the last sweep, in their order."""
     found, count = np.empty_like(visit), 0
     for c in visit:
@@ -196,8 +196,8 @@ def carrying(force: Floats, last: Floats, visit: Ints) -> Ints:
 
 
 @njit(cache=True)
-def residual_of(blocks: SweepBlocks, force: Floats) -> float:
-    """`rigid_lcp.friction.problem.natural_residual` of forces (nc, dim), by the blocks."""
+def find_residual(blocks: SweepBlocks, force: Floats) -> float:
+    """`rigid_lcp.friction.problem.find_natural_residual` of forces (nc, dim), by the blocks."""
     if len(blocks.body) > 0:
         motion = np.zeros((blocks.bodies + 1, blocks.block.shape[3]))
         add_impulses(blocks.body, blocks.block, force, motion)
@@ -210,17 +210,17 @@ def residual_of(blocks: SweepBlocks, force: Floats) -> float:
                 for i in range(force.shape[1]):
                     for j in range(force.shape[1]):
                         velocity[c, i] += blocks.entry[entry, i, j] * other[j]
-    error = size(natural_map(force, velocity, blocks.friction, blocks.rho))
+    error = find_norm(find_natural_map(force, velocity, blocks.friction, blocks.rho))
     if error == 0.0:
         return 0.0
-    scale = size(force)
+    scale = find_norm(force)
     if scale == 0.0:
-        scale = blocks.rho * size(velocity)
+        scale = blocks.rho * find_norm(velocity)
     return error / scale if scale > 0.0 else np.inf
 
 
 @njit(cache=True)
-def size(values: Floats) -> float:
+def find_norm(values: Floats) -> float:
     """Euclidean norm of (n, k) numbers."""
     total = 0.0
     for i in range(values.shape[0]):

@@ -80,7 +80,7 @@ def find_all_directions(
 
     With ``d = (c, s)`` in axes turned so that the function is far from zero at their back, and
     ``t = tan(angle / 2)``, it is a quartic in t.  Of a function that is zero everywhere any d will
-    do: the axes themselves are returned.  ``size``: see `force_sliding`.
+    do: the axes themselves are returned.  ``size``: see `find_sliding_force`.
     """
     found = np.zeros((9, 2))
     best, e_1, e_2 = 0.0, 1.0, 0.0
@@ -133,8 +133,8 @@ def find_real_roots(quartic: Floats) -> tuple[Floats, int]:
         found, number, low = np.zeros(9), 0, -bound
         for k in range(count + 1):
             high = bound if k == count else roots[k]
-            at_low, at_high = polynomial(p, low), polynomial(p, high)
-            if k < count and abs(at_high) <= 1e-15 * polynomial(np.abs(p), abs(high)):
+            at_low, at_high = evaluate_polynomial(p, low), evaluate_polynomial(p, high)
+            if k < count and abs(at_high) <= 1e-15 * evaluate_polynomial(np.abs(p), abs(high)):
                 found[number], number = high, number + 1
             elif at_low * at_high < 0.0:
                 found[number], number = find_root_between(p, low, high), number + 1
@@ -144,7 +144,7 @@ def find_real_roots(quartic: Floats) -> tuple[Floats, int]:
 
 
 @njit(cache=True)
-def polynomial(p: Floats, t: float) -> float:
+def evaluate_polynomial(p: Floats, t: float) -> float:
     """``sum p[k] t^k`` by Horner's rule."""
     value = 0.0
     for k in range(len(p) - 1, -1, -1):
@@ -155,12 +155,12 @@ def polynomial(p: Floats, t: float) -> float:
 @njit(cache=True)
 def find_root_between(p: Floats, low: float, high: float) -> float:
     """The root of a polynomial that changes sign in ``(low, high)``, by bisection."""
-    sign = polynomial(p, low)
+    sign = evaluate_polynomial(p, low)
     for _ in range(200):
         middle = 0.5 * (low + high)
         if middle in (low, high):
             break
-        if polynomial(p, middle) * sign > 0.0:
+        if evaluate_polynomial(p, middle) * sign > 0.0:
             low = middle
         else:
             high = middle
@@ -226,7 +226,7 @@ def solve_contact_3d(
         return 0.0, 0.0, 0.0, OPEN
     if mu == 0.0:
         return (-q_n / w[0, 0], 0.0, 0.0, SLIDE) if w[0, 0] > 0.0 else (0.0, 0.0, 0.0, NONE)
-    r_n, r_1, r_2, found = force_sticking(w, q_n, q_1, q_2)
+    r_n, r_1, r_2, found = find_sticking_force(w, q_n, q_1, q_2)
     if found and r_n >= 0.0 and r_1 * r_1 + r_2 * r_2 <= (mu * r_n) ** 2:
         return r_n, r_1, r_2, STICK
     g_1 = w[0, 0] * q_1 - q_n * w[1, 0]
@@ -244,20 +244,20 @@ def solve_contact_3d(
             d_1, d_2 = g_1, g_2
         d_1, d_2, found = find_direction_near(g_1, g_2, b_11, b_12, b_21, b_22, d_1, d_2)
         if found:
-            r_n = force_sliding(w, q_n, mu, g_1, g_2, b_11, b_12, b_21, b_22, d_1, d_2, size)
+            r_n = find_sliding_force(w, q_n, mu, g_1, g_2, b_11, b_12, b_21, b_22, d_1, d_2, size)
             if r_n > 0.0:
                 return r_n, -mu * r_n * d_1, -mu * r_n * d_2, SLIDE
     directions, count = find_all_directions(g_1, g_2, b_11, b_12, b_21, b_22, size)
     for k in range(count):
         d_1, d_2 = directions[k, 0], directions[k, 1]
-        r_n = force_sliding(w, q_n, mu, g_1, g_2, b_11, b_12, b_21, b_22, d_1, d_2, size)
+        r_n = find_sliding_force(w, q_n, mu, g_1, g_2, b_11, b_12, b_21, b_22, d_1, d_2, size)
         if r_n > 0.0:
             return r_n, -mu * r_n * d_1, -mu * r_n * d_2, SLIDE
     return 0.0, 0.0, 0.0, NONE
 
 
 @njit(cache=True)
-def force_sticking(
+def find_sticking_force(
     w: Floats, q_n: float, q_1: float, q_2: float
 ) -> tuple[float, float, float, bool]:
     """Solve ``W r = -q`` by elimination with the greatest pivots; False if there is no solution.
@@ -271,7 +271,7 @@ def force_sticking(
     determinant = w[0, 0] * c_00 + w[0, 1] * c_01 + w[0, 2] * c_02
     trace = abs(w[0, 0]) + abs(w[1, 1]) + abs(w[2, 2])
     if abs(determinant) <= 1e-8 * trace * trace * trace:
-        return force_sticking_pivoted(w, q_n, q_1, q_2)
+        return find_sticking_force_pivoted(w, q_n, q_1, q_2)
     c_10 = w[0, 2] * w[2, 1] - w[0, 1] * w[2, 2]
     c_11 = w[0, 0] * w[2, 2] - w[0, 2] * w[2, 0]
     c_12 = w[0, 1] * w[2, 0] - w[0, 0] * w[2, 1]
@@ -286,10 +286,10 @@ def force_sticking(
 
 
 @njit(cache=True)
-def force_sticking_pivoted(
+def find_sticking_force_pivoted(
     w: Floats, q_n: float, q_1: float, q_2: float
 ) -> tuple[float, float, float, bool]:
-    """`force_sticking` for blocks that are nearly or quite singular."""
+    """`find_sticking_force` for blocks that are nearly or quite singular."""
     a = w.copy()
     b = np.array([-q_n, -q_1, -q_2])
     columns = np.array([0, 1, 2])
@@ -329,7 +329,7 @@ def force_sticking_pivoted(
 
 
 @njit(cache=True)
-def force_sliding(
+def find_sliding_force(
     w: Floats, q_n: float, mu: float, g_1: float, g_2: float,
     b_11: float, b_12: float, b_21: float, b_22: float, d_1: float, d_2: float, size: float,
 ) -> float:  # fmt: skip

@@ -21,7 +21,7 @@ MIRROR_ROUND_OFF = 1e-13
 
 
 @njit(cache=True)
-def normal_products(
+def multiply_normals(
     start: Indices, index: Indices, value: Floats, mass_start: Indices, mass_index: Indices,
     inverse_mass: Floats, freedoms: int,
 ) -> tuple[Indices, Indices, Floats]:  # fmt: skip
@@ -58,7 +58,7 @@ def normal_products(
 
 
 @njit(cache=True)
-def face_bandwidth(start: Indices, index: Indices, inside: Indices) -> int:
+def find_bandwidth(start: Indices, index: Indices, inside: Indices) -> int:
     """Greatest distance from the diagonal of an entry of the matrix with these rows, in order."""
     rank = np.full(len(start) - 1, -1, np.int64)
     for k in range(len(inside)):
@@ -72,7 +72,7 @@ def face_bandwidth(start: Indices, index: Indices, inside: Indices) -> int:
 
 
 @njit(cache=True)
-def face_band(
+def build_band(
     start: Indices, index: Indices, value: Floats, inside: Indices, shift: float, width: int
 ) -> tuple[Floats, bool]:
     """Rows and columns ``inside`` of a matrix, in order, with ``shift`` on the diagonal.
@@ -103,7 +103,7 @@ def face_band(
 
 
 @njit(cache=True)
-def normal_sweeps(
+def sweep_normals(
     start: Indices, index: Indices, value: Floats, b: Floats, f: Floats, sweeps: int,
     at_once: int, few: int,
 ) -> int:  # fmt: skip

@@ -17,28 +17,28 @@ RANGE = re.compile(r"(\S+) to (\S+)")
 WITHIN = re.compile(r"= (\S+) within (\S+) %")
 
 
-def below(name: str, value: float, bar: float, unit: str = "") -> Check:
+def check_below(name: str, value: float, bar: float, unit: str = "") -> Check:
     """A value that must stay below its bar."""
     return Check(name, float(value), f"< {bar:g}", bool(value < bar), unit)
 
 
-def near(name: str, value: float, target: float, share: float, unit: str = "") -> Check:
+def check_near(name: str, value: float, target: float, share: float, unit: str = "") -> Check:
     """A value that must be within a share of its target."""
     good = abs(value / target - 1) < share
     return Check(name, float(value), f"= {target:.6g} within {100 * share:g} %", bool(good), unit)
 
 
-def between(name: str, value: float, low: float, high: float, unit: str = "") -> Check:
+def check_between(name: str, value: float, low: float, high: float, unit: str = "") -> Check:
     """A value that must lie between two bars."""
     return Check(name, float(value), f"{low:g} to {high:g}", bool(low <= value <= high), unit)
 
 
-def reported(name: str, value: float, unit: str = "") -> Check:
+def report(name: str, value: float, unit: str = "") -> Check:
     """A value without a bar."""
     return Check(name, float(value), "reported", True, unit)
 
 
-def orders(sizes: Sequence[float], errors: Sequence[float]) -> float:
+def fit_order(sizes: Sequence[float], errors: Sequence[float]) -> float:
     """Order of convergence: slope of log error over log size, by least squares."""
     return float(np.polyfit(np.log(sizes), np.log(np.abs(errors)), 1)[0])
 
@@ -62,7 +62,7 @@ def meets(value: float, bar: str) -> bool:
 # --- rows of a record ---------------------------------------------------------------------------
 
 
-def figures_row(checks: Sequence[Check], **more: Any) -> Row:
+def make_row(checks: Sequence[Check], **more: Any) -> Row:
     """A row of a record: figures as ``[name, value, bar, unit]``, no finite number as null."""
     return {
         "figures": [[c.name, c.value if isfinite(c.value) else None, c.bar, c.unit] for c in checks]

@@ -67,26 +67,26 @@ class Beam:
 CONCRETE_BEAM = Beam()
 
 
-def euler_bernoulli_tip(load: float, beam: Beam = CONCRETE_BEAM) -> float:
+def find_euler_bernoulli_tip(load: float, beam: Beam = CONCRETE_BEAM) -> float:
     """Tip displacement P L^3 / 3 E I [m] under an end load P [N] along z, eq. 12.
 
     Without shear: 0.6 % low for the paper's beam (L/h = 11), so no solution in three dimensions
-    converges to it.  Judge by `timoshenko_tip`, or by a second-order solution.
+    converges to it.  Judge by `find_timoshenko_tip`, or by a second-order solution.
     """
     return load * beam.length**3 / (3 * beam.young * beam.second_moment())
 
 
-def timoshenko_tip(load: float, beam: Beam = CONCRETE_BEAM) -> float:
+def find_timoshenko_tip(load: float, beam: Beam = CONCRETE_BEAM) -> float:
     """Tip displacement [m] with shear, P L^3 / 3 E I + P L / kappa G A.
 
     Neglects that the clamp hinders lateral contraction (0.2 % for the paper's beam).  Not for
     beams shorter than five heights.
     """
     shear = beam.shear_coefficient * beam.shear_modulus * beam.area
-    return euler_bernoulli_tip(load, beam) + load * beam.length / shear
+    return find_euler_bernoulli_tip(load, beam) + load * beam.length / shear
 
 
-def bending_frequency(
+def find_bending(
     order: int = 1, beam: Beam = CONCRETE_BEAM, plane: str = "z", shear: bool = False
 ) -> float:
     """Bending frequency [Hz] of the given ``order`` (1, 2, ...), clamped at x = 0.
@@ -97,7 +97,7 @@ def bending_frequency(
     Not for orders whose half wave is shorter than five heights.
     """
     bending = beam.young * beam.second_moment(plane)
-    root = _bending_root(order)
+    root = _find_bending_root(order)
     slender = root**2 / (2 * math.pi * beam.length**2)
     slender *= math.sqrt(bending / beam.density / beam.area)
     if not shear:
@@ -105,7 +105,7 @@ def bending_frequency(
     inertia = (beam.second_moment(plane) / beam.area) / beam.length**2
     flexible = bending / (beam.shear_coefficient * beam.shear_modulus * beam.area * beam.length**2)
 
-    def moment_free(scale: float) -> float:
+    def find_end_moment(scale: float) -> float:
         omega2 = (scale * root**2) ** 2  # in units of E I / rho A L^4
         slope = np.array(
             [
@@ -120,18 +120,18 @@ def bending_frequency(
     # shear and rotary inertia only lower a frequency: the roots below the slender one are all
     # those of lower orders and this one, which is the last of them
     grid = np.linspace(0.05 / order**2, 1.0, 40 * order)
-    value = [moment_free(scale) for scale in grid]
+    value = [find_end_moment(scale) for scale in grid]
     crossing = [k for k in range(len(grid) - 1) if value[k] * value[k + 1] < 0][order - 1]
-    return slender * float(brentq(moment_free, grid[crossing], grid[crossing + 1], xtol=1e-13))
+    return slender * float(brentq(find_end_moment, grid[crossing], grid[crossing + 1], xtol=1e-13))
 
 
-def _bending_root(order: int) -> float:
+def _find_bending_root(order: int) -> float:
     """The root beta L of cos x cosh x = -1 of the given order."""
     middle = (order - 0.5) * math.pi
     return float(brentq(lambda x: math.cos(x) + 1 / math.cosh(x), middle - 0.5, middle + 0.5))
 
 
-def torsion_frequency(order: int = 1, beam: Beam = CONCRETE_BEAM) -> float:
+def find_torsion(order: int = 1, beam: Beam = CONCRETE_BEAM) -> float:
     """Torsion frequency (2 order - 1)/4L sqrt(G J / rho I_p) [Hz].
 
     Neglects that the clamp hinders warping, which raises it a little.
@@ -141,34 +141,34 @@ def torsion_frequency(order: int = 1, beam: Beam = CONCRETE_BEAM) -> float:
     return (2 * order - 1) / (4 * beam.length) * math.sqrt(stiffness / (beam.density * polar))
 
 
-def axial_frequency(order: int = 1, beam: Beam = CONCRETE_BEAM) -> float:
+def find_axial(order: int = 1, beam: Beam = CONCRETE_BEAM) -> float:
     """Axial frequency (2 order - 1)/4L sqrt(E / rho) [Hz]; neglects lateral inertia."""
-    return (2 * order - 1) / (4 * beam.length) * bar_speed(beam.young, beam.density)
+    return (2 * order - 1) / (4 * beam.length) * find_bar_speed(beam.young, beam.density)
 
 
-def cantilever_frequencies(beam: Beam = CONCRETE_BEAM, shear: bool = True) -> dict[str, float]:
+def list_beam_frequencies(beam: Beam = CONCRETE_BEAM, shear: bool = True) -> dict[str, float]:
     """Six modes [Hz] by name: two bending modes in each plane, the first torsion and axial one."""
     bending = {
-        f"bending {plane} {order}": bending_frequency(order, beam, plane, shear)
+        f"bending {plane} {order}": find_bending(order, beam, plane, shear)
         for order in (1, 2)
         for plane in ("z", "y")
     }
-    return bending | {"torsion 1": torsion_frequency(1, beam), "axial 1": axial_frequency(1, beam)}
+    return bending | {"torsion 1": find_torsion(1, beam), "axial 1": find_axial(1, beam)}
 
 
-def _shear_and_bulk(young: float, poisson: float) -> tuple[float, float]:
+def _find_moduli(young: float, poisson: float) -> tuple[float, float]:
     return young / 2 / (1 + poisson), young / 3 / (1 - 2 * poisson)
 
 
 # --- waves ---------------------------------------------------------------
 
 
-def bar_speed(young: float, density: float) -> float:
+def find_bar_speed(young: float, density: float) -> float:
     """sqrt(E / rho) [m/s]: long waves in a thin bar; not in a solid wider than its wave length."""
     return math.sqrt(young / density)
 
 
-def dilatational_speed(young: float, poisson: float, density: float) -> float:
+def find_dilatational_speed(young: float, poisson: float, density: float) -> float:
     """c_P = sqrt((lam + 2 mu) / rho) [m/s], plane waves; the fastest signal, so the time step's."""
-    shear, bulk = _shear_and_bulk(young, poisson)
+    shear, bulk = _find_moduli(young, poisson)
     return math.sqrt((bulk + 4 / 3 * shear) / density)

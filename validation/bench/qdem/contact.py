@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 import qdem_fem as q
 from qdem_fem.files.errors import StepWarning
 from qdem_fem.mesh.generation import make_box_mesh
-from validation.bench.qdem.grains import grain_mesh
+from validation.bench.qdem.grains import mesh_grain
 
 Floats = NDArray[np.float64]
 SIDE = 0.03
@@ -27,7 +27,7 @@ GRAVITY = 9.81
 MODELS = ("spheres", "surface")
 
 
-def cube(
+def make_cube(
     cells: int, place: Any = (0, 0, 0), material: q.Material = STONE, name: str = "cube"
 ) -> q.Body:
     """A cube of ``cells**3 * 5`` tetrahedra with its least corner at ``place`` [m]."""
@@ -40,7 +40,7 @@ Case = Callable[[str], tuple[q.Simulation, float]]
 EDGE, RADIUS = SIDE / 2, 0.006
 
 
-def contact(
+def make_contact(
     model: str, friction: float = 0.5, stiffness: float = 1e7, edge: float = EDGE, **words: Any
 ) -> q.SphereContact | q.SurfaceContact:
     """A contact of ``stiffness`` [N/m] of a vertex, for faces with edges of ``edge`` [m]."""
@@ -50,88 +50,91 @@ def contact(
     return q.SurfaceContact(modulus, friction, depth=0.2 * edge, **words)
 
 
-def reach(model: str, *shift: float) -> float:
+def find_reach(model: str, *shift: float) -> float:
     """Height at which two cubes touch whose vertices are aside by ``shift`` [m]."""
     return float(np.sqrt((0.8 * EDGE) ** 2 - np.dot(shift, shift))) if model == "spheres" else 0.0
 
 
-def thrown(body: q.Body, velocity: Any, spin: Any = (0, 0, 0)) -> None:
+def throw_body(body: q.Body, velocity: Any, spin: Any = (0, 0, 0)) -> None:
     """Give a body a velocity [m/s] and a spin [rad/s]."""
     arm = body.nodes - body.nodes.mean(axis=0)
     body.velocity = np.asarray(velocity, float) + np.cross(spin, arm)
 
 
-def deep_start(model: str) -> tuple[q.Simulation, float]:
+def overlap_cubes(model: str) -> tuple[q.Simulation, float]:
     """Two cubes that begin 1 mm in each other, and are driven apart."""
     bodies = [
-        cube(2),
-        cube(2, (0.004, 0.002, SIDE + reach(model, 0.004, 0.002) - 1e-3), name="above"),
+        make_cube(2),
+        make_cube(2, (0.004, 0.002, SIDE + find_reach(model, 0.004, 0.002) - 1e-3), name="above"),
     ]
-    return q.Simulation(bodies, threads=1, contact=contact(model, stiffness=1e5)), 1e-3
+    return q.Simulation(bodies, threads=1, contact=make_contact(model, stiffness=1e5)), 1e-3
 
 
-def between_blocks(model: str) -> tuple[q.Simulation, float]:
+def throw_grain(model: str) -> tuple[q.Simulation, float]:
     """A grain thrown between two blocks, one 1000 times as stiff as the other."""
-    first, second = reach(model, 0.003, 0.004) + 1e-5, reach(model, 0.001, 0.003) + 1e-5
+    first, second = find_reach(model, 0.003, 0.004) + 1e-5, find_reach(model, 0.001, 0.003) + 1e-5
     soft = q.Material(30e6, 0.2, 2700.0)
     bodies = [
-        cube(2),
-        cube(2, (0.003, 0.004, SIDE + first), name="grain"),
-        cube(2, (0.002, 0.001, 2 * SIDE + first + second), soft, "soft"),
+        make_cube(2),
+        make_cube(2, (0.003, 0.004, SIDE + first), name="grain"),
+        make_cube(2, (0.002, 0.001, 2 * SIDE + first + second), soft, "soft"),
     ]
-    thrown(bodies[1], (0.02, 0, -0.05))
-    thrown(bodies[2], (0, 0.02, -0.1))
-    touch = contact(model, stiffness=1e6)
+    throw_body(bodies[1], (0.02, 0, -0.05))
+    throw_body(bodies[2], (0, 0.02, -0.1))
+    touch = make_contact(model, stiffness=1e6)
     return q.Simulation(bodies, threads=1, contact=touch), 2e-3
 
 
-def sizes(model: str, safety: float = 0.5) -> tuple[q.Simulation, float]:
+def drop_chip(model: str, safety: float = 0.5) -> tuple[q.Simulation, float]:
     """A chip of cells of 0.3 mm on a block of one cell of 30 mm, at that share of the step."""
     edge = SIDE / 100
     size = 4 * edge
-    block, lift = cube(1), 0.8 * edge / 2 if model == "spheres" else 0.0
+    block, lift = make_cube(1), 0.8 * edge / 2 if model == "spheres" else 0.0
     chip = q.Body(
         make_box_mesh((size,) * 3, (4, 4, 4), "kuhn", (0.012, 0.009, SIDE + lift + 1e-7)), STONE,
         name="chip",
     )  # fmt: skip
-    touch = contact(model, stiffness=1e6, edge=edge)
+    touch = make_contact(model, stiffness=1e6, edge=edge)
     if isinstance(touch, q.SphereContact):  # a vertex of the block for the chip to fall on
         chip.nodes[:] += np.array([-0.012, -0.009, lift]) - [size / 2, size / 2, 0]
-    thrown(chip, (0.05, 0, -0.2))
+    throw_body(chip, (0.05, 0, -0.2))
     return q.Simulation([block, chip], threads=1, contact=touch, safety=safety), 4e-5
 
 
-def spinning(model: str) -> tuple[q.Simulation, float]:
+def spin_grain(model: str) -> tuple[q.Simulation, float]:
     """A round grain that spins at 300 rad/s and meets a resting one without friction."""
-    nodes, elements = grain_mesh(1)
-    other, others = grain_mesh(2)
+    nodes, elements = mesh_grain(1)
+    other, others = mesh_grain(2)
     edge = 0.01
     low = other[:, 2].max() - nodes[:, 2].min() + (2 * 0.4 * edge if model == "spheres" else 0.0)
     bodies = [
         q.Body((other, others), STONE, name="resting"),
         q.Body((nodes + np.array([0.002, 0.001, low]), elements), STONE, name="spinning"),
     ]
-    thrown(bodies[1], (0, 0, -0.5), (50.0, 0, 300.0))
-    return q.Simulation(bodies, threads=1, contact=contact(model, 0.0, 1e6, edge)), 4e-3
+    throw_body(bodies[1], (0, 0, -0.5), (50.0, 0, 300.0))
+    return q.Simulation(bodies, threads=1, contact=make_contact(model, 0.0, 1e6, edge)), 4e-3
 
 
-def stacked(model: str) -> tuple[q.Simulation, float]:
+def stack_plates(model: str) -> tuple[q.Simulation, float]:
     """Four plates that fall on a wall as a stack: more contacts than freedoms of rigid plates."""
-    gap, bodies = reach(model, 0.001, 0.001) + 1e-6, []
+    gap, bodies = find_reach(model, 0.001, 0.001) + 1e-6, []
     for k in range(4):
         place = (0.001 * k, -0.001 * k, k * (SIDE / 2 + gap))
         plate = make_box_mesh((2 * SIDE, 2 * SIDE, SIDE / 2), (4, 4, 1), "five", place)
         bodies.append(q.Body(plate, STONE, name=f"plate {k}"))
-        thrown(bodies[-1], (0.02, 0, -0.1))
+        throw_body(bodies[-1], (0.02, 0, -0.1))
     wall = q.ContactPlane((0, 0, -(gap if model != "spheres" else 0.5 * gap)), (0, 0, 1))
-    touch = contact(model, stiffness=1e6, planes=[wall])
+    touch = make_contact(model, stiffness=1e6, planes=[wall])
     return q.Simulation(bodies, threads=1, contact=touch, gravity=(0, 0, -9.81)), 3e-3
 
 
-def released(model: str) -> tuple[q.Simulation, float]:
+def release_cube(model: str) -> tuple[q.Simulation, float]:
     """A cube pressed on another one until both rest, nearly; then the load is gone in one step."""
-    bodies = [cube(2), cube(2, (0.004, 0.002, SIDE + reach(model, 0.004, 0.002)), name="above")]
-    run = q.Simulation(bodies, threads=1, contact=contact(model))
+    bodies = [
+        make_cube(2),
+        make_cube(2, (0.004, 0.002, SIDE + find_reach(model, 0.004, 0.002)), name="above"),
+    ]
+    run = q.Simulation(bodies, threads=1, contact=make_contact(model))
     run.fix(bodies[0], bodies[0].nodes[:, 2] == 0)
     top = bodies[1].nodes[:, 2] > bodies[1].nodes[:, 2].max() - 1e-9
     gone = 1e-3 + run.step / 2
@@ -142,16 +145,16 @@ def released(model: str) -> tuple[q.Simulation, float]:
 
 
 CASES: dict[str, Case] = {
-    "1 mm deep at the start": deep_start,
-    "between blocks of 1 : 1000": between_blocks,
-    "meshes of 1 : 100": sizes,
-    "spinning grain": spinning,
-    "stack of four plates": stacked,
-    "load gone in one step": released,
+    "1 mm deep at the start": overlap_cubes,
+    "between blocks of 1 : 1000": throw_grain,
+    "meshes of 1 : 100": drop_chip,
+    "spinning grain": spin_grain,
+    "stack of four plates": stack_plates,
+    "load gone in one step": release_cube,
 }
 
 
-def momenta(run: q.Simulation) -> Floats:
+def sum_momenta(run: q.Simulation) -> Floats:
     """Momentum and angular momentum of all bodies, (6,)."""
     velocity = np.concatenate([body.velocity for body in run.bodies])
     place = np.concatenate([body.nodes + body.displacement for body in run.bodies])
@@ -159,7 +162,7 @@ def momenta(run: q.Simulation) -> Floats:
     return np.concatenate([carried.sum(axis=0), np.cross(place, carried).sum(axis=0)])
 
 
-def account(run: q.Simulation, duration: float, parts: int = 20) -> tuple[float, float, float]:
+def audit_energy(run: q.Simulation, duration: float, parts: int = 20) -> tuple[float, float, float]:
     """Gap in the energy balance, energy of contact, loss by friction, over the greatest energy."""
     e = run.energy()
     start = e.kinetic + e.elastic + e.contact
@@ -173,21 +176,21 @@ def account(run: q.Simulation, duration: float, parts: int = 20) -> tuple[float,
     return worst / greatest, stored / greatest, e.friction / greatest
 
 
-def near_critical(model: str, share: float) -> tuple[float, bool]:
+def collide_cubes(model: str, share: float) -> tuple[float, bool]:
     """A collision at a share of the critical step with contact: what energies lack; was it said."""
     bodies = [
-        cube(2),
-        cube(2, (0.004, 0.002, SIDE + reach(model, 0.004, 0.002) + 1e-7), name="above"),
+        make_cube(2),
+        make_cube(2, (0.004, 0.002, SIDE + find_reach(model, 0.004, 0.002) + 1e-7), name="above"),
     ]
-    touch = contact(model, stiffness=1e9)
+    touch = make_contact(model, stiffness=1e9)
     step = share * q.Simulation(bodies, threads=1, contact=touch).critical_step.value
     bodies = [
-        cube(2),
-        cube(2, (0.004, 0.002, SIDE + reach(model, 0.004, 0.002) + 1e-7), name="above"),
+        make_cube(2),
+        make_cube(2, (0.004, 0.002, SIDE + find_reach(model, 0.004, 0.002) + 1e-7), name="above"),
     ]
     run = q.Simulation(bodies, threads=1, contact=touch, step=step)
-    thrown(bodies[1], (0, 0, -0.05))
+    throw_body(bodies[1], (0, 0, -0.05))
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", StepWarning)
-        gap = account(run, 400 * step)[0]
+        gap = audit_energy(run, 400 * step)[0]
     return gap, any("times the critical" in str(w.message) for w in caught)

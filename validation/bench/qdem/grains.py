@@ -29,7 +29,7 @@ GRAIN = 0.0125
 """Radius of the mesh of a grain [m]: then edges are 10 mm long on average."""
 
 
-def grain_mesh(seed: int) -> tuple[Floats, NDArray[np.int64]]:
+def mesh_grain(seed: int) -> tuple[Floats, NDArray[np.int64]]:
     """Vertices (35, 3) [m] on a sphere and within it, evenly, and the tetrahedra between them."""
     random = np.random.default_rng(seed)
     k = np.arange(SHELL) + 0.5
@@ -45,11 +45,11 @@ def grain_mesh(seed: int) -> tuple[Floats, NDArray[np.int64]]:
     return nodes, Delaunay(nodes).simplices.astype(np.int64)
 
 
-def lattice(side: int, distance: float) -> list[q.Body]:
+def lay_lattice(side: int, distance: float) -> list[q.Body]:
     """``side**3`` grains on a cubic lattice, neighbours ``distance`` apart [m]."""
     meshes = {}
     for i, place in enumerate(np.ndindex(side, side, side)):
-        meshes[place] = grain_mesh(i)
+        meshes[place] = mesh_grain(i)
     bodies = []
     for place, (nodes, elements) in meshes.items():
         centre = distance * np.array(place)
@@ -57,7 +57,7 @@ def lattice(side: int, distance: float) -> list[q.Body]:
     return bodies
 
 
-def seconds_a_step(runs: list[q.Simulation], steps: int, rounds: int) -> list[float]:
+def time_steps(runs: list[q.Simulation], steps: int, rounds: int) -> list[float]:
     """Least CPU time of a step of each in some rounds, one after the other in each [s]."""
     least = [np.inf] * len(runs)
     for run in runs:

@@ -6,7 +6,7 @@ node-major, 3*i + c for component c of node i, so a field is an array (n, 3) or 
     K = stiffness(nodes, elements, young=45e9, poisson=0.167)
     answer = static_solve(K, nodes[:, 0] > 0, load, nodes)        answer.displacement (n, 3) m
 
-Modes are in `modes`, problems in `problem`.
+Modes are in `find_modes`, problems in `problem`.
 """
 
 from __future__ import annotations
@@ -50,20 +50,20 @@ class Static:
 # --- matrices ---------------------------------------------------------------------------------
 
 
-def lame(young: ArrayLike, poisson: ArrayLike) -> tuple[FloatArray, FloatArray]:
+def find_lame(young: ArrayLike, poisson: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Lame's lam and mu [Pa] of E [Pa] and nu, below eq. 2."""
     young, poisson = np.asarray(young, float), np.asarray(poisson, float)
     return young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / 2 / (1 + poisson)
 
 
-def stiffness(
+def build_stiffness(
     nodes: FloatArray, elements: IntArray, young: ArrayLike, poisson: ArrayLike
 ) -> sparse.csr_matrix:
     """K [N/m], (3n, 3n), of linear tetrahedra; E [Pa] and nu are numbers or arrays (m,)."""
-    return stiffness_lame(nodes, elements, *lame(young, poisson))
+    return build_from_lame(nodes, elements, *find_lame(young, poisson))
 
 
-def stiffness_lame(
+def build_from_lame(
     nodes: FloatArray, elements: IntArray, lam: ArrayLike, mu: ArrayLike
 ) -> sparse.csr_matrix:
     """The same from Lame's moduli [Pa], numbers or arrays (m,).
@@ -79,7 +79,7 @@ def stiffness_lame(
     total = sparse.csr_matrix((size, size))
     for first in range(0, count, BATCH):
         part = slice(first, first + BATCH)
-        basis, used = _basis(nodes, elements[part])
+        basis, used = _build_basis(nodes, elements[part])
         # scikit-fem wants coefficients per element and quadrature point
         form = linear_elasticity(*(value[part, None] for value in moduli))
         block = asm(form, basis).tocoo()
@@ -90,7 +90,7 @@ def stiffness_lame(
     return total
 
 
-def _basis(nodes: FloatArray, elements: IntArray) -> tuple[Any, IntArray]:
+def _build_basis(nodes: FloatArray, elements: IntArray) -> tuple[Any, IntArray]:
     """scikit-fem's basis on some elements, one quadrature point each, and the nodes they use."""
     import skfem
 
@@ -106,7 +106,7 @@ def _basis(nodes: FloatArray, elements: IntArray) -> tuple[Any, IntArray]:
     return basis, used
 
 
-def lumped_mass(nodes: FloatArray, elements: IntArray, density: ArrayLike) -> FloatArray:
+def lump_mass(nodes: FloatArray, elements: IntArray, density: ArrayLike) -> FloatArray:
     """Mass of every node [kg], (n,): rho V / 4 to each vertex, eq. 11; rho a number or (m,)."""
     edge = nodes[elements[:, 1:]] - nodes[elements[:, :1]]
     volume = np.abs(np.linalg.det(edge)) / 6
@@ -114,7 +114,7 @@ def lumped_mass(nodes: FloatArray, elements: IntArray, density: ArrayLike) -> Fl
     return np.asarray(np.bincount(elements.ravel(), np.repeat(share, 4), len(nodes)), float)
 
 
-def free_dof(free: ArrayLike, size: int) -> IntArray:
+def list_free(free: ArrayLike, size: int) -> IntArray:
     """Numbers of the free degrees of freedom from a mask of nodes (n,), or of components (n, 3)."""
     mask = np.asarray(free)
     if mask.dtype != bool or mask.size not in (size // 3, size):
@@ -128,7 +128,7 @@ def free_dof(free: ArrayLike, size: int) -> IntArray:
 # --- statics ----------------------------------------------------------------------------------
 
 
-def rigid_motions(nodes: FloatArray) -> FloatArray:
+def make_rigid_motions(nodes: FloatArray) -> FloatArray:
     """Three translations and three small rotations, (3n, 6), about the centre of the nodes."""
     x = nodes - nodes.mean(axis=0)
     modes = np.zeros((len(nodes), 3, 6))
@@ -138,7 +138,7 @@ def rigid_motions(nodes: FloatArray) -> FloatArray:
     return modes.reshape(-1, 6)
 
 
-def multigrid(matrix: sparse.csr_matrix, near_kernel: FloatArray) -> Any:
+def build_multigrid(matrix: sparse.csr_matrix, near_kernel: FloatArray) -> Any:
     """pyamg's smoothed aggregation of an elastic matrix; ``near_kernel`` its rigid motions.
 
     Raises `LibraryMissing` without pyamg.
@@ -156,7 +156,7 @@ def multigrid(matrix: sparse.csr_matrix, near_kernel: FloatArray) -> Any:
     )
 
 
-def factorised(matrix: Any) -> Callable[[FloatArray], FloatArray]:
+def factorise(matrix: Any) -> Callable[[FloatArray], FloatArray]:
     """Solution operator of a symmetric positive definite matrix by SuperLU; to 60,000 unknowns."""
     return splu(
         sparse.csc_matrix(matrix),
@@ -166,7 +166,7 @@ def factorised(matrix: Any) -> Callable[[FloatArray], FloatArray]:
     ).solve
 
 
-def static_solve(
+def solve_static(
     matrix: sparse.csr_matrix,
     free: ArrayLike,
     load: FloatArray,
@@ -186,13 +186,13 @@ def static_solve(
     (a body that is not held), `LibraryMissing` without pyamg.
     """
     size = matrix.shape[0]
-    dof = free_dof(free, size)
+    dof = list_free(free, size)
     if method == "amg" and nodes is None:
         raise UsageError('method="amg" needs the nodes', remedy='pass nodes, or method="direct"')
     inner = matrix[dof][:, dof].tocsr()
     solve: Callable[[FloatArray], FloatArray]
     if nodes is not None and method == "amg":
-        hierarchy = multigrid(inner, rigid_motions(nodes)[dof])
+        hierarchy = build_multigrid(inner, make_rigid_motions(nodes)[dof])
         solve = partial(
             hierarchy.solve,
             tol=PASS_TOLERANCE,
@@ -200,7 +200,7 @@ def static_solve(
             accel="cg",
         )
     else:
-        solve = factorised(inner)
+        solve = factorise(inner)
     force = load.reshape(-1)[dof].astype(np.longdouble)
     extended = inner.astype(np.longdouble)
     u = np.zeros(len(dof), np.longdouble)
@@ -229,7 +229,7 @@ def static_solve(
     return Static(field.reshape(-1, 3), correction, share)
 
 
-def von_mises(
+def find_von_mises(
     nodes: FloatArray,
     elements: IntArray,
     young: ArrayLike,
@@ -240,11 +240,11 @@ def von_mises(
 
     sqrt(3/2 s:s) of the deviator s of lam tr(eps) I + 2 mu eps.  Figure 3 of the paper.
     """
-    mu = np.broadcast_to(lame(young, poisson)[1], len(elements))
+    mu = np.broadcast_to(find_lame(young, poisson)[1], len(elements))
     answer = np.empty(len(elements))
     for first in range(0, len(elements), BATCH):
         part = slice(first, first + BATCH)
-        basis, used = _basis(nodes, elements[part])
+        basis, used = _build_basis(nodes, elements[part])
         gradient = basis.interpolate(displacement[used].ravel()).grad[..., 0]
         strain = (gradient + gradient.transpose(1, 0, 2)) / 2
         deviator = 2 * mu[part] * (strain - np.eye(3)[:, :, None] * np.trace(strain) / 3)
@@ -255,7 +255,7 @@ def von_mises(
 # --- the reference of second order ------------------------------------------------------------
 
 
-def cantilever_p2(
+def find_tip_p2(
     cells: tuple[int, int, int] = (48, 6, 6),
     load: float = 200.0,
     beam: Beam = CONCRETE_BEAM,
@@ -275,7 +275,7 @@ def cantilever_p2(
     mesh = skfem.MeshTet.init_tensor(*(np.linspace(0, side, n + 1) for side, n in sides))
     element = skfem.ElementVector(skfem.ElementTetP2())
     basis = skfem.Basis(mesh, element, intorder=2)
-    moduli = (float(value) for value in lame(beam.young, beam.poisson))
+    moduli = (float(value) for value in find_lame(beam.young, beam.poisson))
     matrix = skfem.asm(linear_elasticity(*moduli), basis).tocsr()
     end = mesh.facets_satisfying(lambda x: np.isclose(x[0], beam.length))
     traction = skfem.LinearForm(lambda v, w: load / beam.area * v[2])
@@ -283,7 +283,7 @@ def cantilever_p2(
     # scikit-fem puts the edges' middles after the nodes, three numbers each: again 3*i + c
     places = basis.doflocs[:, ::3].T
     held = places[:, 0] < 1e-9 * beam.length
-    answer = static_solve(matrix, ~held, force, places, method, tolerance=1e-8)
+    answer = solve_static(matrix, ~held, force, places, method, tolerance=1e-8)
     middle = [beam.length, beam.width / 2, beam.height / 2]
     tip = np.argmin(np.linalg.norm(places - middle, axis=1))
     return float(answer.displacement[tip, 2])

@@ -14,14 +14,14 @@ Integers = NDArray[np.int64]
 EDGES = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)])
 
 
-def longest_edges(nodes: Floats, elements: Integers) -> Floats:
+def measure_edges(nodes: Floats, elements: Integers) -> Floats:
     """Longest edge of each element [m], (m,)."""
     corner = nodes[elements]
     edges = corner[:, EDGES[:, 0]] - corner[:, EDGES[:, 1]]
     return np.asarray(np.linalg.norm(edges, axis=2).max(axis=1))
 
 
-def delaunay_mesh(count: int, seed: int, shape: float = 0.02) -> tuple[Floats, Integers]:
+def make_delaunay(count: int, seed: int, shape: float = 0.02) -> tuple[Floats, Integers]:
     """Delaunay tetrahedra of random points in the unit cube: nodes (n, 3) [m], elements (m, 4).
 
     Elements whose ``6 V / longest edge^3`` is below ``shape`` are left out, so the body has
@@ -33,10 +33,10 @@ def delaunay_mesh(count: int, seed: int, shape: float = 0.02) -> tuple[Floats, I
     six_volumes = np.linalg.det(corner[:, 1:] - corner[:, :1])
     left = six_volumes < 0
     elements[left] = elements[left][:, [0, 1, 3, 2]]
-    return nodes, elements[abs(six_volumes) > shape * longest_edges(nodes, elements) ** 3]
+    return nodes, elements[abs(six_volumes) > shape * measure_edges(nodes, elements) ** 3]
 
 
-def box_with_sliver(altitude: float, cells: int = 4) -> tuple[Floats, Integers]:
+def make_sliver_box(altitude: float, cells: int = 4) -> tuple[Floats, Integers]:
     """A unit cube of Kuhn tetrahedra, some of them flattened to ``altitude`` times their own [-].
 
     The middle node is pushed towards the face opposite to it in one of its elements; four of
@@ -58,7 +58,7 @@ SLIVER_STEP = {0.3: 0.83, 0.1: 0.51, 0.03: 0.28, 0.01: 0.16}
 """Critical step of `box_with_sliver` over that of the undisturbed mesh, by altitude."""
 
 
-def box_graded(ratio: float, cells: int = 12) -> tuple[Floats, Integers]:
+def make_graded_box(ratio: float, cells: int = 12) -> tuple[Floats, Integers]:
     """A unit cube whose cells shrink towards the corner at the origin.
 
     Shells ``max(x, y, z) = s`` of a regular mesh are moved to ``ratio^((s - 1)/(1 - 1/cells))``:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from scipy.sparse.linalg import eigsh, lobpcg
 
 from qdem_fem.files.errors import NotConverged, UsageError
-from validation.bench.qdem.judge import FloatArray, free_dof, multigrid, rigid_motions
+from validation.bench.qdem.judge import FloatArray, build_multigrid, list_free, make_rigid_motions
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Modes:
     cpu_s: float
 
 
-def modes(
+def find_modes(
     stiffness: sparse.csr_matrix,
     mass: FloatArray,
     free: ArrayLike,
@@ -49,7 +49,7 @@ def modes(
     """
     started = time.process_time()
     size = stiffness.shape[0]
-    dof = free_dof(free, size)
+    dof = list_free(free, size)
     root = np.sqrt(np.repeat(mass, 3)[dof])
     # with y = sqrt(M) phi the mass is the identity, and the matrix stays symmetric
     scaled = sparse.diags(1 / root) @ stiffness[dof][:, dof] @ sparse.diags(1 / root)
@@ -59,8 +59,8 @@ def modes(
     else:
         if nodes is None:
             raise UsageError('method="amg" needs the nodes', remedy="pass nodes")
-        value, vector = _modes_by_multigrid(
-            scaled, root[:, None] * rigid_motions(nodes)[dof], count, tolerance, iterations_max
+        value, vector = _find_by_multigrid(
+            scaled, root[:, None] * make_rigid_motions(nodes)[dof], count, tolerance, iterations_max
         )
     order = np.argsort(value)
     value, vector = value[order], vector[:, order]
@@ -77,7 +77,7 @@ def modes(
     return Modes(frequency, shape.reshape(count, -1, 3), rest, time.process_time() - started)
 
 
-def _modes_by_multigrid(
+def _find_by_multigrid(
     scaled: sparse.csr_matrix,
     near_kernel: FloatArray,
     count: int,
@@ -88,12 +88,12 @@ def _modes_by_multigrid(
 
     Of the extra ones nothing is asked, so LOBPCG runs in short turns until the others are there.
     """
-    precondition = multigrid(scaled, near_kernel).aspreconditioner(cycle="V")
+    precondition = build_multigrid(scaled, near_kernel).aspreconditioner(cycle="V")
     start = np.random.default_rng(0).standard_normal((scaled.shape[0], count + 2))
     vector = np.column_stack([precondition @ column for column in start.T])
     value = np.full(count + 2, np.nan)
     for _ in range(max(1, iterations_max // 20)):
-        value, vector = _lobpcg_turn(scaled, vector, precondition)
+        value, vector = _run_lobpcg(scaled, vector, precondition)
         kept = slice(0, count)
         rest = scaled @ vector[:, kept] - value[kept] * vector[:, kept]
         if np.all(np.linalg.norm(rest, axis=0) <= tolerance * value[kept]):
@@ -101,7 +101,7 @@ def _modes_by_multigrid(
     return value[:count], vector[:, :count]
 
 
-def _lobpcg_turn(
+def _run_lobpcg(
     scaled: sparse.csr_matrix, vector: FloatArray, precondition: Any
 ) -> tuple[FloatArray, FloatArray]:
     """20 iterations; scipy's warning that it has not converged is what a turn expects."""

@@ -21,7 +21,7 @@ from qdem_fem.mesh.tetrahedra import TetMesh
 from validation.bench.qdem import judge as qdem_judge
 from validation.bench.qdem.closed_forms import CONCRETE_BEAM
 from validation.bench.qdem.judge import BoolArray, FloatArray, IntArray
-from validation.bench.qdem.modes import Modes, modes
+from validation.bench.qdem.modes import Modes, find_modes
 
 DIRECT_NODES = 6000
 """Nodes up to which the judge factorises; above, multigrid."""
@@ -60,29 +60,29 @@ class Problem:
     def stiffness(self) -> sparse.csr_matrix:
         """K [N/m] by scikit-fem."""
         material = self.material
-        return qdem_judge.stiffness(
+        return qdem_judge.build_stiffness(
             self.mesh.nodes, self.mesh.elements, material.young, material.poisson
         )
 
     @cached_property
     def mass(self) -> FloatArray:
         """Lumped masses [kg], (n,)."""
-        return qdem_judge.lumped_mass(self.mesh.nodes, self.mesh.elements, self.material.density)
+        return qdem_judge.lump_mass(self.mesh.nodes, self.mesh.elements, self.material.density)
 
     @cached_property
     def static(self) -> FloatArray:
         """Static displacement under the force [m], (n, 3), by scikit-fem."""
-        return self.static_under(self.load)
+        return self.solve_static(self.load)
 
-    def static_under(self, load: FloatArray) -> FloatArray:
+    def solve_static(self, load: FloatArray) -> FloatArray:
         """Static displacement [m], (n, 3), under forces on the nodes [N], (n, 3)."""
-        return qdem_judge.static_solve(
+        return qdem_judge.solve_static(
             self.stiffness, self.free, load, self.mesh.nodes, self.method
         ).displacement
 
     def modes(self, count: int = 1) -> Modes:
         """Lowest modes of (K, lumped M) by scikit-fem and ARPACK or LOBPCG."""
-        return modes(
+        return find_modes(
             self.stiffness, self.mass, self.free, count, self.method, self.mesh.nodes
         )  # fmt: skip
 
@@ -107,29 +107,29 @@ class Problem:
         return body, run
 
 
-def cantilever(cells: tuple[int, int, int], pattern: Pattern = "kuhn") -> Problem:
+def make_cantilever(cells: tuple[int, int, int], pattern: Pattern = "kuhn") -> Problem:
     """Section 3.1: the concrete beam, clamped at x = 0, 200 N on the nodes of the free end."""
     beam = CONCRETE_BEAM
     mesh = make_box_mesh((beam.length, beam.width, beam.height), cells, pattern)
     material = Material(beam.young, beam.poisson, beam.density)
-    return clamped(mesh, material)
+    return clamp_mesh(mesh, material)
 
 
-def clamped(mesh: TetMesh, material: Material) -> Problem:
+def clamp_mesh(mesh: TetMesh, material: Material) -> Problem:
     """A body clamped where x is smallest, with the end load where x is largest."""
     x = mesh.nodes[:, 0]
     free = np.repeat((x > x.min() + 1e-9 * np.ptp(x))[:, None], 3, axis=1)
     return Problem(mesh, material, free, np.flatnonzero(x > x.max() - 1e-9 * np.ptp(x)))
 
 
-def tip_node(mesh: TetMesh) -> int:
+def find_tip_node(mesh: TetMesh) -> int:
     """The node nearest to the middle of the face where x is largest."""
     low, high = mesh.nodes.min(axis=0), mesh.nodes.max(axis=0)
     middle = np.array([high[0], (low[1] + high[1]) / 2, (low[2] + high[2]) / 2])
     return int(np.argmin(np.linalg.norm(mesh.nodes - middle, axis=1)))
 
 
-def smooth_step(duration: float, start: float = 0.0, back: float | None = None) -> Series:
+def make_smooth_step(duration: float, start: float = 0.0, back: float | None = None) -> Series:
     """From 0 to 1 within ``duration`` [s] as t/T - sin(2 pi t/T)/2 pi; ``back`` [s]: to 0 again.
 
     Its rate is a Hann window: a mode with two or more whole periods within T is left at rest, and

@@ -15,10 +15,10 @@ import numpy as np
 
 from qdem_fem import Body
 from validation.bench.qdem import judge as qdem_judge
-from validation.bench.qdem.checks import below, between, near, orders, reported
-from validation.bench.qdem.closed_forms import euler_bernoulli_tip, timoshenko_tip
+from validation.bench.qdem.checks import check_below, check_between, check_near, fit_order, report
+from validation.bench.qdem.closed_forms import find_euler_bernoulli_tip, find_timoshenko_tip
 from validation.bench.qdem.judge import FloatArray
-from validation.bench.qdem.problem import Problem, smooth_step, tip_node
+from validation.bench.qdem.problem import Problem, find_tip_node, make_smooth_step
 from validation.case import Check
 
 TIP_P2 = 92.655e-6
@@ -44,12 +44,12 @@ class StaticAnswer:
     @property
     def tip(self) -> float:
         """Deflection of the tip by QDEM [m]."""
-        return -float(self.displacement[tip_node(self.problem.mesh), 2])
+        return -float(self.displacement[find_tip_node(self.problem.mesh), 2])
 
     @property
     def tip_judge(self) -> float:
         """Deflection of the tip by scikit-fem [m]."""
-        return -float(self.problem.static[tip_node(self.problem.mesh), 2])
+        return -float(self.problem.static[find_tip_node(self.problem.mesh), 2])
 
     @property
     def difference(self) -> float:
@@ -59,7 +59,7 @@ class StaticAnswer:
     def von_mises_differences(self) -> FloatArray:
         """Relative difference of the von Mises stress of every element, (m,)."""
         mesh, material = self.problem.mesh, self.problem.material
-        expected = qdem_judge.von_mises(
+        expected = qdem_judge.find_von_mises(
             mesh.nodes, mesh.elements, material.young, material.poisson, self.problem.static
         )
         body = Body(mesh, material)
@@ -67,11 +67,11 @@ class StaticAnswer:
         return np.abs(body.von_mises() / expected - 1)
 
 
-def settled(problem: Problem, ramped: int = 2, averaged: int = 2) -> StaticAnswer:
+def settle(problem: Problem, ramped: int = 2, averaged: int = 2) -> StaticAnswer:
     """Static answer from whole first periods: a smooth step, then a mean under a Hann window."""
     period = 1 / problem.modes().frequency[0]
     started = time.process_time()
-    body, run = problem.simulation(smooth_step(ramped * period))
+    body, run = problem.simulation(make_smooth_step(ramped * period))
     run.advance(ramped * period)
     stride = max(1, round(averaged * period / SAMPLES / run.step))
     weight = 1 - np.cos(2 * np.pi * np.arange(SAMPLES) / SAMPLES)
@@ -82,7 +82,7 @@ def settled(problem: Problem, ramped: int = 2, averaged: int = 2) -> StaticAnswe
     return StaticAnswer(problem, total, run.steps_done, time.process_time() - started)
 
 
-def relaxed(problem: Problem, tolerance: float = 1e-8) -> StaticAnswer:
+def relax(problem: Problem, tolerance: float = 1e-8) -> StaticAnswer:
     """Static answer by dynamic relaxation with conjugate directions."""
     started = time.process_time()
     body, run = problem.simulation(1.0)
@@ -90,36 +90,36 @@ def relaxed(problem: Problem, tolerance: float = 1e-8) -> StaticAnswer:
     return StaticAnswer(problem, body.displacement, found.steps, time.process_time() - started)
 
 
-def answer_checks(name: str, answer: StaticAnswer) -> list[Check]:
+def check_answer(name: str, answer: StaticAnswer) -> list[Check]:
     """Same-mesh agreement: tip 1e-5, von Mises 0.04 % in the mean and 0.12 % at most."""
     stress = answer.von_mises_differences()
     return [
-        below(f"{name}: tip, QDEM to scikit-fem", answer.difference, 1e-5),
-        below(f"{name}: von Mises, mean difference", 100 * stress.mean(), 0.04, "%"),
-        below(f"{name}: von Mises, greatest difference", 100 * stress.max(), 0.12, "%"),
-        reported(f"{name}: tip", 1e6 * answer.tip, "um"),
-        reported(f"{name}: steps", answer.steps),
-        reported(f"{name}: processor time of QDEM", answer.cpu_s, "s"),
+        check_below(f"{name}: tip, QDEM to scikit-fem", answer.difference, 1e-5),
+        check_below(f"{name}: von Mises, mean difference", 100 * stress.mean(), 0.04, "%"),
+        check_below(f"{name}: von Mises, greatest difference", 100 * stress.max(), 0.12, "%"),
+        report(f"{name}: tip", 1e6 * answer.tip, "um"),
+        report(f"{name}: steps", answer.steps),
+        report(f"{name}: processor time of QDEM", answer.cpu_s, "s"),
     ]
 
 
-def convergence_checks(name: str, answers: list[StaticAnswer], reference: float) -> list[Check]:
+def check_convergence(name: str, answers: list[StaticAnswer], reference: float) -> list[Check]:
     """Order of the excess stiffness, reference over tip less 1, in the size of the cells."""
     sizes = [len(answer.problem.mesh.elements) ** (-1 / 3) for answer in answers]
     excess = [reference / answer.tip - 1 for answer in answers]
     agree = max(answer.difference for answer in answers)
     return [
-        between(f"{name}: order of the excess stiffness", orders(sizes, excess), 1.9, 2.1),
-        below(f"{name}: tips, QDEM to scikit-fem, worst", agree, 1e-5),
-        reported(f"{name}: excess stiffness, finest", 100 * excess[-1], "%"),
+        check_between(f"{name}: order of the excess stiffness", fit_order(sizes, excess), 1.9, 2.1),
+        check_below(f"{name}: tips, QDEM to scikit-fem, worst", agree, 1e-5),
+        report(f"{name}: excess stiffness, finest", 100 * excess[-1], "%"),
     ]
 
 
-def closed_form_checks() -> list[Check]:
+def check_closed_forms() -> list[Check]:
     """Beam theory, for the reader: no solution in three dimensions converges to either."""
-    slender, with_shear = euler_bernoulli_tip(200), timoshenko_tip(200)
+    slender, with_shear = find_euler_bernoulli_tip(200), find_timoshenko_tip(200)
     return [
-        near("tip by Euler-Bernoulli, eq. 12", 1e6 * slender, TIP_EQ_12, 1e-6, "um"),
-        reported("tip by Timoshenko", 1e6 * with_shear, "um"),
-        reported("tip by quadratic tetrahedra", 1e6 * TIP_P2, "um"),
+        check_near("tip by Euler-Bernoulli, eq. 12", 1e6 * slender, TIP_EQ_12, 1e-6, "um"),
+        report("tip by Timoshenko", 1e6 * with_shear, "um"),
+        report("tip by quadratic tetrahedra", 1e6 * TIP_P2, "um"),
     ]

@@ -14,9 +14,9 @@ import numpy as np
 from scipy.linalg import eigh
 
 from qdem_fem.report.spectra import Mode, find_peak_frequencies
-from validation.bench.qdem.checks import below, between, orders, reported
-from validation.bench.qdem.judge import FloatArray, IntArray, free_dof
-from validation.bench.qdem.problem import Problem, tip_node
+from validation.bench.qdem.checks import check_below, check_between, fit_order, report
+from validation.bench.qdem.judge import FloatArray, IntArray, list_free
+from validation.bench.qdem.problem import Problem, find_tip_node
 from validation.case import Check
 
 SAFETIES = (0.8, 0.4, 0.2)
@@ -33,7 +33,7 @@ class Record:
     """[m], (k, 3)."""
 
 
-def let_go(
+def release(
     problem: Problem,
     duration: float,
     start: FloatArray,
@@ -55,25 +55,25 @@ def let_go(
 
 def unload(problem: Problem, frequency: float, periods: float) -> Record:
     """The tip after the end load is taken off; ``frequency`` of the first mode [Hz]."""
-    return let_go(
+    return release(
         problem,
         periods / frequency,
         problem.static,
-        tip_node(problem.mesh),
+        find_tip_node(problem.mesh),
         sampling=0.02 / frequency,
     )
 
 
-def first_mode(record: Record) -> Mode:
+def find_first_mode(record: Record) -> Mode:
     """The strongest cosine of u_z."""
     # a mesh without mirror symmetry mixes in the other bending mode, so one cosine is not enough
     return find_peak_frequencies(record.time, record.value[:, 2], count=4, floor=1e-5)[0]
 
 
-def first_frequency(problem: Problem, periods: float = 6.0) -> tuple[Mode, float]:
+def find_first_frequency(problem: Problem, periods: float = 6.0) -> tuple[Mode, float]:
     """First mode after unloading, fitted, and the judge's frequency [Hz]."""
     expected = float(problem.modes().frequency[0])
-    return first_mode(unload(problem, expected, periods)), expected
+    return find_first_mode(unload(problem, expected, periods)), expected
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class Frequencies:
     record: Record
 
 
-def five_frequencies(problem: Problem, periods: float = 15.0) -> Frequencies:
+def find_frequencies(problem: Problem, periods: float = 15.0) -> Frequencies:
     """The five lowest frequencies from one motion.
 
     The shape under a skew force on one corner of the free end is let go, and each component of the
@@ -95,10 +95,10 @@ def five_frequencies(problem: Problem, periods: float = 15.0) -> Frequencies:
     corner = problem.loaded[np.argmax(problem.mesh.nodes[problem.loaded] @ [0.0, 1.0, 1.0])]
     load = np.zeros_like(problem.mesh.nodes)
     load[corner] = [0.0, 200.0, -60.0]
-    record = let_go(
+    record = release(
         problem,
         periods / judge[0],
-        problem.static_under(load),
+        problem.solve_static(load),
         int(corner),
         sampling=0.15 / judge[-1],
     )
@@ -111,17 +111,19 @@ def five_frequencies(problem: Problem, periods: float = 15.0) -> Frequencies:
     return Frequencies(judge, np.array(found), record)
 
 
-def frequency_checks(name: str, problem: Problem, five: Frequencies) -> list[Check]:
+def check_frequencies(name: str, problem: Problem, five: Frequencies) -> list[Check]:
     """First frequency within 0.1 %, and all five."""
-    mode, expected = first_frequency(problem)
+    mode, expected = find_first_frequency(problem)
     rows = [
-        below(f"{name}: first frequency to same mesh", abs(mode.frequency / expected - 1), 1e-3),
-        reported(f"{name}: first frequency", mode.frequency, "Hz"),
-        below(f"{name}: decay of an elastic motion", abs(mode.decay) / expected, 1e-4),
+        check_below(
+            f"{name}: first frequency to same mesh", abs(mode.frequency / expected - 1), 1e-3
+        ),
+        report(f"{name}: first frequency", mode.frequency, "Hz"),
+        check_below(f"{name}: decay of an elastic motion", abs(mode.decay) / expected, 1e-4),
     ]
     for number, (judge, found) in enumerate(zip(five.judge, five.found, strict=True), 1):
         label = f"{name}: mode {number}, {judge:.2f} Hz, to same mesh"
-        rows.append(below(label, abs(found / judge - 1), 1e-3))
+        rows.append(check_below(label, abs(found / judge - 1), 1e-3))
     return rows
 
 
@@ -137,14 +139,14 @@ class Exact:
     weight: FloatArray
     """Displacement of the recorded node in each mode at the start [m], (modes, 3)."""
 
-    def at(self, time: FloatArray) -> FloatArray:
+    def displacement(self, time: FloatArray) -> FloatArray:
         """Displacement of the node [m], (k, 3)."""
         return np.asarray(np.cos(np.outer(time, self.omega)) @ self.weight)
 
 
-def exact_motion(problem: Problem, start: FloatArray, node: int) -> Exact:
+def find_exact_motion(problem: Problem, start: FloatArray, node: int) -> Exact:
     """All modes by LAPACK; for meshes of up to about 1,000 nodes."""
-    dof = free_dof(problem.free, problem.stiffness.shape[0])
+    dof = list_free(problem.free, problem.stiffness.shape[0])
     root = np.sqrt(np.repeat(problem.mass, 3)[dof])
     matrix = problem.stiffness[dof][:, dof].toarray() / np.outer(root, root)
     value, vector = eigh(matrix)
@@ -154,36 +156,36 @@ def exact_motion(problem: Problem, start: FloatArray, node: int) -> Exact:
     return Exact(np.sqrt(value), (shape * share).T)
 
 
-def error_norm(found: FloatArray, expected: FloatArray) -> float:
+def find_error(found: FloatArray, expected: FloatArray) -> float:
     """|found - expected| / |expected| over the record, Euclidean."""
     return float(np.linalg.norm(found - expected) / np.linalg.norm(expected))
 
 
-def motion_checks(problem: Problem) -> list[Check]:
+def check_exact_motion(problem: Problem) -> list[Check]:
     """QDEM against the exact motion over two first periods, and its order.
 
     The start is smooth, equal shares of the five lowest modes: the static shape
     under forces on single nodes holds modes that no step of these resolves.
     """
-    node = tip_node(problem.mesh)
+    node = find_tip_node(problem.mesh)
     lowest = problem.modes(5)
     peaks = np.abs(lowest.shape).max(axis=(1, 2))
     start = 1e-6 * np.tensordot(1 / peaks, lowest.shape, axes=1)
     period = 1 / lowest.frequency[0]
     duration = 2 * period
-    exact = exact_motion(problem, start, node)
+    exact = find_exact_motion(problem, start, node)
     of_qdem, steps = [], []
     for safety in SAFETIES:
-        record = let_go(
+        record = release(
             problem, duration, start, node, strain="small", safety=safety,
             sampling=period / 200,
         )  # fmt: skip
-        of_qdem.append(error_norm(record.value, exact.at(record.time)))
+        of_qdem.append(find_error(record.value, exact.displacement(record.time)))
         steps.append(safety)
     return [
         *(
-            reported(f"motion, QDEM small strain at {safety:g} of the critical step", error)
+            report(f"motion, QDEM small strain at {safety:g} of the critical step", error)
             for safety, error in zip(SAFETIES, of_qdem, strict=True)
         ),
-        between("motion, QDEM: order in its step", orders(steps, of_qdem), 1.9, 2.1),
+        check_between("motion, QDEM: order in its step", fit_order(steps, of_qdem), 1.9, 2.1),
     ]

@@ -13,7 +13,7 @@ import qdem_fem as q
 from qdem_fem.contact.sphere_state import SphereContacts
 from qdem_fem.files.errors import ContactTooDeep
 from qdem_fem.mesh.generation import make_box_mesh
-from validation.bench.qdem_gpu.search import searches_compare
+from validation.bench.qdem_gpu.search import compare_searches
 
 SIDE, RADIUS = 0.03, 0.006
 STONE = q.Material(1e9, 0.2, 2700.0)
@@ -26,7 +26,7 @@ SLIDES = 0.5, -0.3, -0.2
 """Velocity of the upper cube [m/s]."""
 
 
-def two_cubes(
+def stack_cubes(
     device: Any, periodic: bool = False, velocity: Any = SLIDES, **contact: Any
 ) -> q.Simulation:
     """A cube that slides fast on another, which stands on a wall; or across a periodic side."""
@@ -49,7 +49,7 @@ def two_cubes(
     return run
 
 
-def state_of(run: q.Simulation) -> dict[str, Any]:
+def collect_state(run: q.Simulation) -> dict[str, Any]:
     """What steps have changed, by name."""
     contacts, energy = run.contacts, run.energy()
     assert isinstance(contacts, SphereContacts)
@@ -59,7 +59,7 @@ def state_of(run: q.Simulation) -> dict[str, Any]:
         "velocity": np.concatenate([body.velocity for body in run.bodies]),
         "force": kernel.force, "spring": touching.spring, "pull": touching.force,
         "wall spring": kernel.planes.spring, "slid": kernel.slid,
-        "sums": np.append(run.assembly.kinetic(), run.assembly.moment()),
+        "sums": np.append(run.assembly.kinetic_energy(), run.assembly.moment()),
         "gravity": np.array([run.motion.gravity_work]),
         "energies": np.array([energy.contact, energy.friction, energy.kinetic, energy.elastic]),
         "counts": np.array([contacts.renewals, contacts.lasted, len(touching.first)]),
@@ -69,7 +69,7 @@ def state_of(run: q.Simulation) -> dict[str, Any]:
 
 
 @contextmanager
-def processor_idle(run: q.Simulation) -> Iterator[list[str]]:
+def guard_processor(run: q.Simulation) -> Iterator[list[str]]:
     """What steps on a GPU should leave alone: the processor's search and step raise, and copies of
     contact or of a field to the host are listed."""
     if run.device == "cpu":
@@ -99,23 +99,23 @@ def processor_idle(run: q.Simulation) -> Iterator[list[str]]:
         yield copies
 
 
-def contact_apart(moved: float = 0.0, restored: bool = False, **asked: Any) -> float:
+def compare_marches(moved: float = 0.0, restored: bool = False, **asked: Any) -> float:
     """Greatest difference after `STEPS` in marches of unequal length, over its bar.
 
-    ``asked``: of `two_cubes`; behind the first march the upper cube is set ``moved`` [m] higher, or
-    springs are let go and ``restored`` from what was stored.  The list has to be made in the same
-    steps, and within a march no array comes to the host.
+    ``asked``: of `stack_cubes`; behind the first march the upper cube is set ``moved`` [m] higher,
+    or springs are let go and ``restored`` from what was stored.  The list has to be made in the
+    same steps, and within a march no array comes to the host.
     """
     states = []
     for device in ("cpu", "cuda"):
-        run = two_cubes(device, **asked)
-        with processor_idle(run) as copies:
+        run = stack_cubes(device, **asked)
+        with guard_processor(run) as copies:
             run.advance(round(0.35 * STEPS) * run.step)
             if moved:
                 run.bodies[1].displacement += np.array([0.0, 0.0, moved])
             if restored:
                 assert run.contacts is not None
-                kept = {name: array.copy() for name, array in run.contacts.stored().items()}
+                kept = {name: array.copy() for name, array in run.contacts.pack_state().items()}
                 run.contacts.forget()
                 run.contacts.restore(kept)
             run.advance(round(0.15 * STEPS) * run.step)
@@ -123,7 +123,7 @@ def contact_apart(moved: float = 0.0, restored: bool = False, **asked: Any) -> f
             run.advance(round(0.5 * STEPS) * run.step)
             if len(copies) > before:
                 return float("inf")
-        states.append(state_of(run))
+        states.append(collect_state(run))
     one, other = states
     if not np.array_equal(one["counts"], other["counts"]) or not one["energies"][:2].all():
         return float("inf")
@@ -135,11 +135,11 @@ def contact_apart(moved: float = 0.0, restored: bool = False, **asked: Any) -> f
     )
 
 
-def too_deep_apart() -> float:
+def compare_too_deep() -> float:
     """Two that are driven into each other: both stop at the same step with the same words."""
     said = []
     for device in ("cpu", "cuda"):
-        run = two_cubes(device)
+        run = stack_cubes(device)
         run.bodies[1].velocity = np.tile([0.0, 0.0, -400.0], (len(run.bodies[1].nodes), 1))
         try:
             run.advance(3 * STEPS * run.step)
@@ -164,7 +164,7 @@ MARCHES: dict[str, dict[str, Any]] = {
 """What `contact_apart` is asked, by name."""
 
 
-def contacts_compare() -> dict[str, float]:
+def compare_contacts() -> dict[str, float]:
     """Differences over their bars, by name."""
-    found = {f"contact: {name}": contact_apart(**asked) for name, asked in MARCHES.items()}
-    return found | {"contact: too deep": too_deep_apart()} | searches_compare()
+    found = {f"contact: {name}": compare_marches(**asked) for name, asked in MARCHES.items()}
+    return found | {"contact: too deep": compare_too_deep()} | compare_searches()

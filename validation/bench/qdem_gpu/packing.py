@@ -13,8 +13,8 @@ import numpy as np
 
 import qdem_fem as q
 from qdem_fem.contact.sphere_state import SphereContacts
-from validation.bench.qdem.grains import FRICTION, GRAIN, RADIUS, STIFFNESS, lattice
-from validation.bench.qdem_gpu.search import differing
+from validation.bench.qdem.grains import FRICTION, GRAIN, RADIUS, STIFFNESS, lay_lattice
+from validation.bench.qdem_gpu.search import compare_lists
 from validation.case import Check
 
 NEAR = 0.95
@@ -25,16 +25,16 @@ STEP = 1e-8
 """[s], in which nothing moves far"""
 
 
-def packing(side: int, device: Literal["cpu", "cuda"]) -> tuple[q.Simulation, SphereContacts]:
+def build_packing(side: int, device: Literal["cpu", "cuda"]) -> tuple[q.Simulation, SphereContacts]:
     """``side**3`` grains, each of which touches its neighbours."""
     contact = q.SphereContact(RADIUS, STIFFNESS, FRICTION)
-    bodies = lattice(side, 2 * NEAR * (GRAIN + RADIUS))
+    bodies = lay_lattice(side, 2 * NEAR * (GRAIN + RADIUS))
     run = q.Simulation(bodies, threads=1, step=STEP, device=device, contact=contact)
     assert isinstance(run.contacts, SphereContacts)
     return run, run.contacts
 
 
-def seconds_of(action: Callable[[], object], repeats: int) -> float:
+def time_action(action: Callable[[], object], repeats: int) -> float:
     """Median wall time of an action that has been done once before [s]."""
     action()
     seconds = []
@@ -45,16 +45,16 @@ def seconds_of(action: Callable[[], object], repeats: int) -> float:
     return float(np.median(seconds))
 
 
-def packing_checks(side: int, steps: int = 200, repeats: int = 5) -> list[Check]:
+def check_packing(side: int, steps: int = 200, repeats: int = 5) -> list[Check]:
     """Milliseconds of a step and of a look for pairs; the first list against the processor's."""
-    _, expected = packing(side, "cpu")
-    run, contacts = packing(side, "cuda")
+    _, expected = build_packing(side, "cpu")
+    run, contacts = build_packing(side, "cuda")
     for each in (expected, contacts):
         each.refresh()
-    apart = [name for name in differing(expected.pairs, contacts.pairs) if name in LISTS]
+    apart = [name for name in compare_lists(expected.pairs, contacts.pairs) if name in LISTS]
     pairs = len(contacts.pairs.second)
-    step = seconds_of(lambda: run.advance(steps * run.step, sampling=1.0), repeats) / steps
-    look = seconds_of(contacts.find_pairs, repeats)
+    step = time_action(lambda: run.advance(steps * run.step, sampling=1.0), repeats) / steps
+    look = time_action(contacts.find_pairs, repeats)
     name = f"GPU, packing of {side**3:,} grains, {len(contacts.nodes):,} spheres"
     return [
         Check(

@@ -35,7 +35,7 @@ class Cloud(NamedTuple):
     side: PeriodicWidth | None = None
 
 
-def cloud(
+def draw_cloud(
     seed: int, count: int, *, room: float = 3.0, ratio: float = 2.0, bodies: int = 4,
     walls: int = 2, skin: float = 0.3, axis: str = "", same: float = 0.0,
 ) -> Cloud:  # fmt: skip
@@ -66,7 +66,7 @@ def cloud(
     )
 
 
-def contact_of(given: Cloud, seed: int) -> Contact:
+def make_contact(given: Cloud, seed: int) -> Contact:
     """Contact of a cloud where it was; some pairs and walls touch, and hold springs at random."""
     random, count, walls = np.random.default_rng(seed), len(given.radius), len(given.point)
     number, stiffness = np.arange(count), 1 + given.radius
@@ -83,28 +83,28 @@ def contact_of(given: Cloud, seed: int) -> Contact:
     )  # fmt: skip
 
 
-def lists_processor(given: Cloud, seed: int) -> Pairs:
+def find_pairs_cpu(given: Cloud, seed: int) -> Pairs:
     """The list of a cloud where it is, with the history of the old one."""
     near = find_near_walls(given.position, given.radius, given.point, given.normal, given.skin)
     return renew_pairs(
-        contact_of(given, seed).pairs, given.position, given.radius, given.body, given.skin, near,
+        make_contact(given, seed).pairs, given.position, given.radius, given.body, given.skin, near,
         given.side,
     )  # fmt: skip
 
 
-def lists_gpu(given: Cloud, seed: int) -> Pairs:
-    """`lists_processor`, found on a GPU."""
+def find_pairs_gpu(given: Cloud, seed: int) -> Pairs:
+    """`find_pairs_cpu`, found on a GPU."""
     from qdem_fem.contact.cuda.arrays import DeviceContact
     from qdem_fem.kernel.cuda.step import cuda
 
-    contact = contact_of(given, seed)
+    contact = make_contact(given, seed)
     there = DeviceContact(contact, given.side)
     there.renew_lists(cuda.to_device(given.position), given.skin, given.skin / 2)
     found: Pairs = there.fetch(contact).pairs
     return found
 
 
-def differing(one: Pairs, other: Pairs) -> list[str]:
+def compare_lists(one: Pairs, other: Pairs) -> list[str]:
     """Names of the arrays of two lists that are not the same, number by number."""
     return [
         name
@@ -128,11 +128,11 @@ CLOUDS: dict[str, dict[str, Any]] = {
 """Clouds by name, as `cloud` takes them."""
 
 
-def searches_compare() -> dict[str, float]:
+def compare_searches() -> dict[str, float]:
     """For every cloud zero where the lists are the same, infinity where they are not."""
     found = {}
     for seed, (name, asked) in enumerate(CLOUDS.items()):
-        given = cloud(seed, **asked)
-        apart = differing(lists_processor(given, seed), lists_gpu(given, seed))
+        given = draw_cloud(seed, **asked)
+        apart = compare_lists(find_pairs_cpu(given, seed), find_pairs_gpu(given, seed))
         found[f"pairs: {name}"] = float("inf") if apart else 0.0
     return found

@@ -17,7 +17,7 @@ Integers = NDArray[np.int64]
 
 
 @njit(cache=True)
-def bed_poured(radius: Floats, width: float, drop: Floats) -> Floats:
+def pour_grains(radius: Floats, width: float, drop: Floats) -> Floats:
     """Centres (n, 3) [m] of grains poured in order into a box; a planar bed has y = 0.
 
     ``radius`` (n,) [m]; ``drop`` (n, 2): where each is dropped, as parts of the free width, the
@@ -42,21 +42,21 @@ def bed_poured(radius: Floats, width: float, drop: Floats) -> Floats:
         stride = 0.5 * r
         while stride > 1e-6 * r:
             reach = r + 2.0 * stride
-            found = neighbours_near(point, reach, radius, centre, head, following, cell, near)
+            found = find_pairs(point, reach, radius, centre, head, following, cell, near)
             trial = point.copy()
             trial[2] -= stride
-            pushed_out(trial, r, radius, centre, near, found, width, planar, stride)
+            push_out(trial, r, radius, centre, near, found, width, planar, stride)
             way = trial - point  # down the slope; as long as a stride even where it is gentle
             length = np.sqrt(np.sum(way**2))
             if length > 0.0:
                 trial = point + way * (stride / length)
-                pushed_out(trial, r, radius, centre, near, found, width, planar, stride)
+                push_out(trial, r, radius, centre, near, found, width, planar, stride)
             moved = np.sqrt(np.sum((trial - point) ** 2))
             if (
                 length > 1e-3 * stride
                 and moved < 2.0 * stride
                 and trial[2] < point[2] - 1e-3 * stride
-                and free(trial, r, radius, centre, near, found, 0.01 * stride)
+                and is_free(trial, r, radius, centre, near, found, 0.01 * stride)
             ):
                 point = trial
                 stride = min(1.5 * stride, 0.5 * r)
@@ -64,14 +64,14 @@ def bed_poured(radius: Floats, width: float, drop: Floats) -> Floats:
                 stride *= 0.5
         centre[i] = point
         top = max(top, point[2] + r)
-        x, y, z = cell_of(point, cell, head.shape)
+        x, y, z = find_cell(point, cell, head.shape)
         following[i] = head[x, y, z]
         head[x, y, z] = i
     return centre
 
 
 @njit(cache=True)
-def cell_of(point: Floats, cell: float, shape: tuple[int, int, int]) -> tuple[int, int, int]:
+def find_cell(point: Floats, cell: float, shape: tuple[int, int, int]) -> tuple[int, int, int]:
     """Cell of the grid that holds a point; beyond its rim, the cell at the rim."""
     return (
         max(0, min(int(point[0] / cell), shape[0] - 1)),
@@ -81,12 +81,12 @@ def cell_of(point: Floats, cell: float, shape: tuple[int, int, int]) -> tuple[in
 
 
 @njit(cache=True)
-def neighbours_near(
+def find_pairs(
     point: Floats, reach: float, radius: Floats, centre: Floats, head: Integers,
     following: Integers, cell: float, near: Integers,
 ) -> int:  # fmt: skip
     """Grains whose surface is within ``reach`` of a point: written to ``near``, their count."""
-    x, y, z = cell_of(point, cell, head.shape)
+    x, y, z = find_cell(point, cell, head.shape)
     found = 0
     for a in range(max(0, x - 1), min(head.shape[0], x + 2)):
         for b in range(max(0, y - 1), min(head.shape[1], y + 2)):
@@ -104,7 +104,7 @@ def neighbours_near(
 
 
 @njit(cache=True)
-def pushed_out(
+def push_out(
     point: Floats, r: float, radius: Floats, centre: Floats, near: Integers, found: int,
     width: float, planar: bool, stride: float,
 ) -> None:  # fmt: skip
@@ -129,7 +129,7 @@ def pushed_out(
 
 
 @njit(cache=True)
-def free(
+def is_free(
     point: Floats, r: float, radius: Floats, centre: Floats, near: Integers, found: int,
     allowed: float,
 ) -> bool:  # fmt: skip
@@ -145,7 +145,7 @@ def free(
 
 
 @njit(cache=True)
-def pairs_touching(
+def find_touching(
     centre: Floats, radius: Floats, width: float, planar: bool, margin: float
 ) -> Integers:
     """Grains nearer than ``margin`` [m] to each other or to a wall, (nc, 2), in order of the first.
@@ -165,7 +165,7 @@ def pairs_touching(
     found = 0
     near = np.zeros(512, dtype=np.int64)
     for i in range(count):
-        number = neighbours_near(
+        number = find_pairs(
             centre[i], radius[i] + margin, radius, centre, head, following, cell, near
         )
         for index in range(number):
@@ -181,7 +181,7 @@ def pairs_touching(
             if width - centre[i, axis] - radius[i] < margin:
                 pairs[found, 0], pairs[found, 1] = i, -3 - 2 * axis
                 found += 1
-        x, y, z = cell_of(centre[i], cell, head.shape)
+        x, y, z = find_cell(centre[i], cell, head.shape)
         following[i] = head[x, y, z]
         head[x, y, z] = i
     return pairs[:found]

@@ -38,32 +38,32 @@ class Family:
     needs: str = ""
     """Variable that names a folder without which there is none."""
 
-    def posed(self, seed: int, index: int) -> Posed:
+    def pose(self, seed: int, index: int) -> Posed:
         """Problem ``index`` of a seed, the same whenever and wherever it is made."""
         return self.make(np.random.default_rng([seed, index, *self.name.encode()]), index)
 
 
 DATA, SICONOS = "TRACKBED_DATA", "TRACKBED_SICONOS"
 FAMILIES = (
-    Family("stored, changed", SAME, 63, problems.stored_changed, False, DATA),
-    Family("test suite, changed", SAME, 66, problems.suite_changed, False, SICONOS),
-    Family("beds at rest", SAME, 60, beds.beds_settled),
-    Family("beds kicked", SAME, 50, beds.beds_kicked),
-    Family("beds tilted", SAME, 40, beds.beds_tilted),
-    Family("crystals", SAME, 24, beds.regular),
-    Family("towers", SAME, 24, problems.towers),
-    Family("walls", SAME, 36, problems.walls),
-    Family("warm starts", SAME, 30, problems.warm, False),
-    Family("wrong starts", SAME, 28, problems.misled, False),
-    Family("W with noise", SAME, 36, problems.noisy, False),
-    Family("large packings", SAME, 24, beds.beds_large),
-    Family("friction 0 and 1000", BEYOND, 20, problems.mixed_friction, False),
-    Family("friction x 3", BEYOND, 20, problems.thrice_friction, False),
-    Family("contacts twice", BEYOND, 12, problems.contacts_twice),
-    Family("random assemblies", BEYOND, 20, problems.assembled, False),
+    Family("stored, changed", SAME, 63, problems.pose_stored, False, DATA),
+    Family("test suite, changed", SAME, 66, problems.pose_suite, False, SICONOS),
+    Family("beds at rest", SAME, 60, beds.pose_resting),
+    Family("beds kicked", SAME, 50, beds.pose_kicked),
+    Family("beds tilted", SAME, 40, beds.pose_tilted),
+    Family("crystals", SAME, 24, beds.pose_crystal),
+    Family("towers", SAME, 24, problems.pose_tower),
+    Family("walls", SAME, 36, problems.pose_wall),
+    Family("warm starts", SAME, 30, problems.pose_warm_start, False),
+    Family("wrong starts", SAME, 28, problems.pose_wrong_start, False),
+    Family("W with noise", SAME, 36, problems.pose_noisy, False),
+    Family("large packings", SAME, 24, beds.pose_large),
+    Family("friction 0 and 1000", BEYOND, 20, problems.pose_mixed_friction, False),
+    Family("friction x 3", BEYOND, 20, problems.pose_triple_friction, False),
+    Family("contacts twice", BEYOND, 12, problems.pose_double_contacts),
+    Family("random assemblies", BEYOND, 20, problems.pose_assembly, False),
 )
 
 
-def family_named(name: str) -> Family:
+def find_family(name: str) -> Family:
     """A family by its name.  Raises KeyError."""
     return {family.name: family for family in FAMILIES}[name]

@@ -19,11 +19,11 @@ from validation.bench.rigid.packings import (
     RADII,
     TOUCH,
     Bed,
-    bed_of,
-    bed_pairs,
-    bed_problem,
-    crystal,
-    free_fall,
+    build_crystal,
+    fall_freely,
+    pose_bed,
+    pour_radii,
+    update_pairs,
 )
 
 Floats = NDArray[np.float64]
@@ -52,7 +52,7 @@ class Posed:
     """The residual to be reached."""
 
 
-def between(generator: Generator, least: float, most: float) -> float:
+def draw_between(generator: Generator, least: float, most: float) -> float:
     """A number whose logarithm is drawn evenly."""
     return float(np.exp(generator.uniform(np.log(least), np.log(most))))
 
@@ -60,7 +60,7 @@ def between(generator: Generator, least: float, most: float) -> float:
 # --- beds -------------------------------------------------------------------------------------
 
 
-def radii(generator: Generator, count: int) -> tuple[Floats, str]:
+def draw_radii(generator: Generator, count: int) -> tuple[Floats, str]:
     """Radii (count,) [m], and their kind: even in a range of 1:1.9, nearly equal, or 1:5."""
     kind = str(generator.choice(("uniform", "nearly equal", "1:5")))
     mean = float(np.mean(RADII))
@@ -71,17 +71,17 @@ def radii(generator: Generator, count: int) -> tuple[Floats, str]:
     return 0.4 * mean * 5.0 ** generator.random(count), kind
 
 
-def settled(generator: Generator, dim: int, sizes: tuple[int, int] = SIZES) -> Posed:
+def draw_bed(generator: Generator, dim: int, sizes: tuple[int, int] = SIZES) -> Posed:
     """A bed at rest."""
-    grains = max(2, round(between(generator, *sizes) / CONTACTS_A_GRAIN[dim]))
-    radius, kind = radii(generator, grains)
-    friction = between(generator, *FRICTIONS)
-    made = bed_of(radius, dim, generator, friction=friction)
+    grains = max(2, round(draw_between(generator, *sizes) / CONTACTS_A_GRAIN[dim]))
+    radius, kind = draw_radii(generator, grains)
+    friction = draw_between(generator, *FRICTIONS)
+    made = pour_radii(radius, dim, generator, friction=friction)
     words = f"{grains} {GRAINS[dim]}, radii {kind}, friction {friction:.2g}"
-    return Posed(bed_problem(made, STEP), words)
+    return Posed(pose_bed(made, STEP), words)
 
 
-def hexagonal(rows: int, friction: float) -> FrictionProblem:
+def build_hexagonal(rows: int, friction: float) -> FrictionProblem:
     """Equal discs in rows, each in the hollows of the one below, between two walls."""
     radius, place = float(np.mean(RADII)), []
     for k in range(rows):
@@ -92,36 +92,36 @@ def hexagonal(rows: int, friction: float) -> FrictionProblem:
         centre, np.full(len(centre), radius), 2.0 * radius * rows, 2, friction,
         np.zeros((0, 2), int), np.zeros((0, 3)), 1.0,
     )  # fmt: skip
-    return bed_problem(bed_pairs(made, TOUCH * radius), STEP)
+    return pose_bed(update_pairs(made, TOUCH * radius), STEP)
 
 
-def regular(generator: Generator, index: int) -> Posed:
+def pose_crystal(generator: Generator, index: int) -> Posed:
     """A crystal of discs or of spheres, at rest, kicked, or tilted."""
-    friction = between(generator, *FRICTIONS)
+    friction = draw_between(generator, *FRICTIONS)
     if index % 2:
         layers = int(generator.integers(2, 7))
-        posed = Posed(crystal(layers, friction=friction), f"{layers} layers of equal spheres")
+        posed = Posed(build_crystal(layers, friction=friction), f"{layers} layers of equal spheres")
     else:
         layers = int(generator.integers(2, 22))
-        posed = Posed(hexagonal(layers, friction), f"{layers} rows of equal discs")
+        posed = Posed(build_hexagonal(layers, friction), f"{layers} rows of equal discs")
     posed = replace(posed, recipe=f"{posed.recipe}, friction {friction:.2g}")
-    return (posed, kicked(posed, generator), tilted(posed, generator))[index // 2 % 3]
+    return (posed, kick_posed(posed, generator), tilt_posed(posed, generator))[index // 2 % 3]
 
 
 # --- loads ------------------------------------------------------------------------------------
 
 
-def bodies_of(posed: Posed) -> BodySpace:
+def require_bodies(posed: Posed) -> BodySpace:
     """The bodies, which only problems in contact space lack."""
     assert posed.problem.bodies is not None
     return posed.problem.bodies
 
 
-def kicked(posed: Posed, generator: Generator) -> Posed:
+def kick_posed(posed: Posed, generator: Generator) -> Posed:
     """Velocities of all bodies at random, of one, of all to one side, or of the last ones down."""
-    problem, space = posed.problem, bodies_of(posed)
+    problem, space = posed.problem, require_bodies(posed)
     count = space.jacobian.shape[1] // space.body_size
-    kind, size = str(generator.choice(KICKS)), between(generator, *KICK_SIZES)
+    kind, size = str(generator.choice(KICKS)), draw_between(generator, *KICK_SIZES)
     velocity = np.zeros((count, space.body_size))
     linear = velocity[:, : problem.dim]
     if kind == "all bodies":
@@ -137,46 +137,46 @@ def kicked(posed: Posed, generator: Generator) -> Posed:
     return replace(posed, problem=replace(problem, offset=problem.offset + push), recipe=words)
 
 
-def tilted(posed: Posed, generator: Generator, most: float | None = None) -> Posed:
+def tilt_posed(posed: Posed, generator: Generator, most: float | None = None) -> Posed:
     """Gravity turned: every other time near the angle of friction, else up to 120 degrees."""
-    problem, space = posed.problem, bodies_of(posed)
+    problem, space = posed.problem, require_bodies(posed)
     angle, way = np.radians(generator.uniform(0.0, 120.0)), generator.uniform(0.0, 2.0 * np.pi)
     if most is not None:
         angle = generator.uniform(0.0, most)
     elif generator.random() < 0.5:
         angle = np.arctan(problem.friction.max()) * generator.uniform(0.8, 1.2)
-    fall = free_fall(space, STEP, problem.dim).reshape(-1, space.body_size)
+    fall = fall_freely(space, STEP, problem.dim).reshape(-1, space.body_size)
     down = fall[:, problem.dim - 1].copy()
     fall[:, problem.dim - 1] = down * np.cos(angle)
     fall[:, 0] = -down * np.sin(angle) * (np.cos(way) if problem.dim == 3 else 1.0)
     if problem.dim == 3:
         fall[:, 1] = -down * np.sin(angle) * np.sin(way)
-    before = space.jacobian @ free_fall(space, STEP, problem.dim)
+    before = space.jacobian @ fall_freely(space, STEP, problem.dim)
     offset = problem.offset + space.jacobian @ fall.ravel() - before
     words = f"{posed.recipe}, tilted by {np.degrees(angle):.3g} degrees"
     return replace(posed, problem=replace(problem, offset=offset), recipe=words)
 
 
-def loaded(posed: Posed, generator: Generator) -> Posed:
+def vary_load(posed: Posed, generator: Generator) -> Posed:
     """At rest, kicked, or tilted."""
-    return (lambda each, _: each, kicked, tilted)[generator.integers(3)](posed, generator)
+    return (lambda each, _: each, kick_posed, tilt_posed)[generator.integers(3)](posed, generator)
 
 
-def beds_settled(generator: Generator, index: int) -> Posed:
+def pose_resting(generator: Generator, index: int) -> Posed:
     """Discs and spheres by turns."""
-    return settled(generator, 2 + index % 2)
+    return draw_bed(generator, 2 + index % 2)
 
 
-def beds_kicked(generator: Generator, index: int) -> Posed:
+def pose_kicked(generator: Generator, index: int) -> Posed:
     """The same with velocities."""
-    return kicked(settled(generator, 2 + index % 2), generator)
+    return kick_posed(draw_bed(generator, 2 + index % 2), generator)
 
 
-def beds_tilted(generator: Generator, index: int) -> Posed:
+def pose_tilted(generator: Generator, index: int) -> Posed:
     """The same with gravity turned."""
-    return tilted(settled(generator, 2 + index % 2), generator)
+    return tilt_posed(draw_bed(generator, 2 + index % 2), generator)
 
 
-def beds_large(generator: Generator, index: int) -> Posed:
+def pose_large(generator: Generator, index: int) -> Posed:
     """The same with more contacts, under any load."""
-    return loaded(settled(generator, 2 + index % 2, LARGE_SIZES), generator)
+    return vary_load(draw_bed(generator, 2 + index % 2, LARGE_SIZES), generator)

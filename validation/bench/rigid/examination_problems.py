@@ -14,27 +14,27 @@ import numpy as np
 import scipy.sparse as sp
 
 from rigid_lcp.friction.auto.solve import solve_friction
-from rigid_lcp.friction.problem.definition import BODY_SIZE, BodySpace, friction_problem
+from rigid_lcp.friction.problem.definition import BODY_SIZE, BodySpace, make_problem
 from validation.bench.rigid.examination_beds import (
     FRICTIONS,
     SIZES,
     STEP,
     Generator,
     Posed,
-    beds_settled,
-    between,
-    bodies_of,
-    loaded,
-    settled,
+    draw_bed,
+    draw_between,
+    pose_resting,
+    require_bodies,
+    vary_load,
 )
 from validation.bench.rigid.friction_problems import (
     NamedProblem,
-    changed,
-    stored_problems,
-    suite_problems,
+    change_problem,
+    list_stored,
+    list_suite,
 )
-from validation.bench.rigid.packings import step_problem
-from validation.bench.rigid.walls import MASSES, wall_bodies, wall_count, wall_masses
+from validation.bench.rigid.packings import pose_step
+from validation.bench.rigid.walls import MASSES, build_wall, count_bricks, draw_masses
 
 MASS_RATIOS = (1.0, 1e4)
 NOISE_OF_W = 1e-3
@@ -45,95 +45,95 @@ MIXED_FRICTION = (0.0, 1000.0)
 # --- towers and walls -------------------------------------------------------------------------
 
 
-def masonry(generator: Generator, index: int, columns: int) -> Posed:
+def pose_masonry(generator: Generator, index: int, columns: int) -> Posed:
     """Bricks of many masses under any load, ``columns`` in a row."""
     dim, joined = 2 + index % 2, bool(generator.random() < 0.5) and columns > 1
     room = SIZES[1] / (2 * dim - 2) ** 2 / (columns * (2 + joined) if columns > 1 else 1)
-    rows = round(between(generator, 2, max(3.0, room)))
-    kind, ratio = str(generator.choice(MASSES)), between(generator, *MASS_RATIOS)
-    mass = wall_masses(wall_count(rows, columns), kind, ratio, generator)
+    rows = round(draw_between(generator, 2, max(3.0, room)))
+    kind, ratio = str(generator.choice(MASSES)), draw_between(generator, *MASS_RATIOS)
+    mass = draw_masses(count_bricks(rows, columns), kind, ratio, generator)
     length = 2.0 if columns > 1 else 1.0
-    space = wall_bodies(rows, columns, dim, mass, length=length, joined=joined)
-    friction = between(generator, *FRICTIONS)
+    space = build_wall(rows, columns, dim, mass, length=length, joined=joined)
+    friction = draw_between(generator, *FRICTIONS)
     words = f"{rows} rows of {columns} in {dim}D, masses {kind}"
     words += f" to {ratio:.2g}" * (kind != "equal") + ", joined" * joined
-    posed = Posed(step_problem(space, STEP, friction, dim), f"{words}, friction {friction:.2g}")
-    return loaded(posed, generator)
+    posed = Posed(pose_step(space, STEP, friction, dim), f"{words}, friction {friction:.2g}")
+    return vary_load(posed, generator)
 
 
-def towers(generator: Generator, index: int) -> Posed:
+def pose_tower(generator: Generator, index: int) -> Posed:
     """Cubes on each other."""
-    return masonry(generator, index, 1)
+    return pose_masonry(generator, index, 1)
 
 
-def walls(generator: Generator, index: int) -> Posed:
+def pose_wall(generator: Generator, index: int) -> Posed:
     """Bricks in running bond, 2 to 12 in a row."""
-    return masonry(generator, index, int(generator.integers(2, 13)))
+    return pose_masonry(generator, index, int(generator.integers(2, 13)))
 
 
 # --- problems of others -----------------------------------------------------------------------
 
 
 @cache
-def stored() -> tuple[NamedProblem, ...]:
+def load_stored() -> tuple[NamedProblem, ...]:
     """The stored problems."""
-    return tuple(stored_problems())
+    return tuple(list_stored())
 
 
 @cache
-def suite() -> tuple[NamedProblem, ...]:
+def load_suite() -> tuple[NamedProblem, ...]:
     """Those of Siconos's test suite that are not stored."""
-    return tuple(suite_problems())
+    return tuple(list_suite())
 
 
-def named(each: NamedProblem) -> Posed:
+def pose(each: NamedProblem) -> Posed:
     """A problem as it is."""
     return Posed(each.make(), each.name, bar=each.bar)
 
 
-def stored_changed(generator: Generator, index: int) -> Posed:
-    """The stored problems by turns, `altered`."""
-    return altered(named(stored()[index % len(stored())]), generator)
+def pose_stored(generator: Generator, index: int) -> Posed:
+    """The stored problems by turns, `change`."""
+    return change(pose(load_stored()[index % len(load_stored())]), generator)
 
 
-def suite_changed(generator: Generator, index: int) -> Posed:
+def pose_suite(generator: Generator, index: int) -> Posed:
     """Those of the test suite by turns, changed in the same way."""
-    return altered(named(suite()[index % len(suite())]), generator)
+    return change(pose(load_suite()[index % len(load_suite())]), generator)
 
 
-def altered(posed: Posed, generator: Generator) -> Posed:
+def change(posed: Posed, generator: Generator) -> Posed:
     """Another order, q and friction."""
-    made = changed(posed.problem, generator)
+    made = change_problem(posed.problem, generator)
     return replace(posed, problem=made, recipe=f"{posed.recipe}, changed")
 
 
-def any_problem(generator: Generator, index: int) -> Posed:
+def pose_any(generator: Generator, index: int) -> Posed:
     """A stored problem changed, or a bed under any load, by turns; a bed where none is stored."""
-    if index % 2 and stored():
-        return altered(named(stored()[generator.integers(len(stored()))]), generator)
-    return loaded(settled(generator, 2 + index // 2 % 2), generator)
+    if index % 2 and load_stored():
+        return change(pose(load_stored()[generator.integers(len(load_stored()))]), generator)
+    return vary_load(draw_bed(generator, 2 + index // 2 % 2), generator)
 
 
 # --- W, starts --------------------------------------------------------------------------------
 
 
-def noisy(generator: Generator, index: int) -> Posed:
+def pose_noisy(generator: Generator, index: int) -> Posed:
     """W as a matrix that is not symmetric.  It may be the W of a problem without solution."""
-    posed = any_problem(generator, index)
+    posed = pose_any(generator, index)
     w = posed.problem.delassus.copy()
     w.data *= 1.0 + NOISE_OF_W * generator.standard_normal(len(w.data))
-    made = friction_problem(w, posed.problem.offset, posed.problem.friction, posed.problem.dim)
+    made = make_problem(w, posed.problem.offset, posed.problem.friction, posed.problem.dim)
     return replace(posed, problem=made, recipe=f"{posed.recipe}, W with noise of {NOISE_OF_W:g}")
 
 
-def warm(generator: Generator, index: int) -> Posed:
+def pose_warm_start(generator: Generator, index: int) -> Posed:
     """From the solution of the problem before a small change of load or friction."""
-    posed = any_problem(generator, index)
+    posed = pose_any(generator, index)
     problem = posed.problem
     before = solve_friction(
         problem.bodies or problem.delassus, problem.offset, problem.friction, problem.dim
     )
-    size = between(generator, 1e-3, 1e-1)
+    size = draw_between(generator, 1e-3, 1e-1)
     friction, offset = problem.friction, problem.offset
     kind = str(generator.choice(("friction", "load")))
     if kind == "friction":
@@ -149,9 +149,9 @@ def warm(generator: Generator, index: int) -> Posed:
     return replace(posed, problem=changed_a_little, recipe=words, start=before.r)
 
 
-def misled(generator: Generator, index: int) -> Posed:
+def pose_wrong_start(generator: Generator, index: int) -> Posed:
     """From forces that are none: too large, pulling, outside of the cones, or another problem's."""
-    posed = any_problem(generator, index)
+    posed = pose_any(generator, index)
     problem = posed.problem
     scale = problem.rho * (float(np.abs(problem.offset).max()) or 1.0)
     force = np.abs(generator.standard_normal((problem.contacts, problem.dim)))
@@ -168,39 +168,39 @@ def misled(generator: Generator, index: int) -> Posed:
 # --- beyond -----------------------------------------------------------------------------------
 
 
-def mixed_friction(generator: Generator, index: int) -> Posed:
+def pose_mixed_friction(generator: Generator, index: int) -> Posed:
     """Friction of 0 and of 1000, contact by contact."""
-    posed = any_problem(generator, index)
+    posed = pose_any(generator, index)
     friction = generator.choice(MIXED_FRICTION, posed.problem.contacts)
     made = replace(posed.problem, friction=friction)
     return replace(posed, problem=made, recipe=f"{posed.recipe}, friction 0 and 1000")
 
 
-def thrice_friction(generator: Generator, index: int) -> Posed:
+def pose_triple_friction(generator: Generator, index: int) -> Posed:
     """Three times the friction under which the problem came about."""
-    posed = any_problem(generator, index)
+    posed = pose_any(generator, index)
     made = replace(posed.problem, friction=3.0 * posed.problem.friction)
     return replace(posed, problem=made, recipe=f"{posed.recipe}, friction x 3")
 
 
-def contacts_twice(generator: Generator, index: int) -> Posed:
+def pose_double_contacts(generator: Generator, index: int) -> Posed:
     """Every contact of a bed or wall a second time: forces are free to be shared at will."""
-    make: Callable[[Generator, int], Posed] = walls if index % 2 else beds_settled
+    make: Callable[[Generator, int], Posed] = pose_wall if index % 2 else pose_resting
     posed = make(generator, index // 2)
-    problem, space = posed.problem, bodies_of(posed)
+    problem, space = posed.problem, require_bodies(posed)
     jacobian = sp.csr_array(sp.vstack([space.jacobian, space.jacobian]))
-    made = friction_problem(
+    made = make_problem(
         BodySpace(jacobian, space.inverse_mass, space.body_size),
         np.tile(problem.offset, 2), np.tile(problem.friction, 2), problem.dim,
     )  # fmt: skip
     return replace(posed, problem=made, recipe=f"{posed.recipe}, contacts twice")
 
 
-def assembled(generator: Generator, index: int) -> Posed:
+def pose_assembly(generator: Generator, index: int) -> Posed:
     """Contacts of random directions between random pairs of bodies; every other one with a q that
     no velocities of the bodies make, which need not have a solution."""
     dim = 2 + index % 2
-    contacts, size = round(between(generator, 2, 300)), BODY_SIZE[dim]
+    contacts, size = round(draw_between(generator, 2, 300)), BODY_SIZE[dim]
     bodies = max(1, round(contacts * generator.uniform(0.2, 1.0)))
     blocks = np.zeros((contacts, dim, bodies, size))
     for c in range(contacts):
@@ -208,13 +208,13 @@ def assembled(generator: Generator, index: int) -> Posed:
             blocks[c, :, body] += sign * generator.standard_normal((dim, size))
     jacobian = sp.csr_array(blocks.reshape(contacts * dim, bodies * size))
     inverse = sp.csr_array(
-        sp.diags_array(between(generator, 1.0, 1e3) ** generator.random(bodies * size))
+        sp.diags_array(draw_between(generator, 1.0, 1e3) ** generator.random(bodies * size))
     )
     kept = index // 2 % 2 == 0
     offset = jacobian @ generator.standard_normal(bodies * size)
     if not kept:
         offset = generator.standard_normal(contacts * dim)
     friction = generator.uniform(0.0, 1.5, contacts)
-    made = friction_problem(BodySpace(jacobian, inverse, size), offset, friction, dim)
+    made = make_problem(BodySpace(jacobian, inverse, size), offset, friction, dim)
     words = f"{contacts} contacts of {bodies} bodies in {dim}D, q {'of J' if kept else 'any'}"
     return Posed(made, words)

@@ -22,8 +22,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from rigid_lcp.friction.files.formats import read_problem
-from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, friction_problem
-from validation.bench.rigid.packings import crystal, packing, tower
+from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, make_problem
+from validation.bench.rigid.packings import build_crystal, build_packing, build_tower
 
 NONUNIQUE = "nonunique_discs_125"
 """The stored problem that comes with several solutions; not raced."""
@@ -55,16 +55,16 @@ class NamedProblem:
         return self.name.startswith(tuple(GRAINS.values()))
 
 
-def data_folder() -> Path | None:
+def find_data_folder() -> Path | None:
     """The folder of the stored problems, or None."""
     named = os.environ.get("TRACKBED_DATA")
     folder = Path(named) / "friction_problems" if named else None
     return folder if folder is not None and folder.is_dir() else None
 
 
-def stored_problems() -> list[NamedProblem]:
+def list_stored() -> list[NamedProblem]:
     """The stored problems, small ones first; none without the folder."""
-    folder = data_folder()
+    folder = find_data_folder()
     if folder is None:
         return []
     paths = [
@@ -72,49 +72,49 @@ def stored_problems() -> list[NamedProblem]:
         if not path.stem.endswith(("_W", "_H")) and path.stem != NONUNIQUE
     ]  # fmt: skip
     problems = [
-        NamedProblem(stored_name(path.stem), "stored", partial(read_problem, path))
+        NamedProblem(shorten_name(path.stem), "stored", partial(read_problem, path))
         for path in paths
     ]
     return sorted(problems, key=lambda each: (each.make().contacts, each.name))
 
 
-def stored_name(stem: str) -> str:
+def shorten_name(stem: str) -> str:
     """``KaplasTower-i1061-4.hdf5.dat`` without its endings."""
     return stem.removesuffix(".dat").removesuffix(".hdf5")
 
 
-def suite_problems() -> list[NamedProblem]:
+def list_suite() -> list[NamedProblem]:
     """Siconos's problems in contact space, and those by masses of FCLIB, that are not stored."""
     named = os.environ.get("TRACKBED_SICONOS")
     if named is None or not Path(named).is_dir():
         return []
-    stored = {each.name for each in stored_problems()}
+    stored = {each.name for each in list_stored()}
     paths = [
         path for path in Path(named).iterdir()
         if path.suffix in (".dat", ".hdf5") and not path.name.startswith(OTHER_KINDS)
-        and stored_name(path.name) not in stored
+        and shorten_name(path.name) not in stored
     ]  # fmt: skip
     problems = [
-        NamedProblem(stored_name(path.name), "test suite", partial(read_problem, path))
+        NamedProblem(shorten_name(path.name), "test suite", partial(read_problem, path))
         for path in paths
     ]
     return sorted(problems, key=lambda each: (each.make().contacts, each.name))
 
 
-def unseen_problems(seeds: Iterable[int] = (1, 2)) -> list[NamedProblem]:
+def list_unseen(seeds: Iterable[int] = (1, 2)) -> list[NamedProblem]:
     """The stored problems changed at random: the same families, not the same problems."""
     return [
-        NamedProblem(f"{each.name}~{seed}", "unseen", partial(_changed, each, seed), seed)
-        for each in stored_problems()
+        NamedProblem(f"{each.name}~{seed}", "unseen", partial(_change, each, seed), seed)
+        for each in list_stored()
         for seed in seeds
     ]
 
 
-def _changed(each: NamedProblem, seed: int) -> FrictionProblem:
-    return changed(each.make(), np.random.default_rng(seed))
+def _change(each: NamedProblem, seed: int) -> FrictionProblem:
+    return change_problem(each.make(), np.random.default_rng(seed))
 
 
-def changed(problem: FrictionProblem, generator: np.random.Generator) -> FrictionProblem:
+def change_problem(problem: FrictionProblem, generator: np.random.Generator) -> FrictionProblem:
     """Another order of contacts, other friction, and q with noise; W stays that of real bodies.
 
     With bodies the noise is one of their velocities, so that q stays in the image of J.
@@ -127,47 +127,47 @@ def changed(problem: FrictionProblem, generator: np.random.Generator) -> Frictio
     if problem.bodies is None:
         offset = problem.offset[rows] + size * generator.standard_normal(len(rows))
         w = problem.delassus[rows][:, rows]
-        made: FrictionProblem = friction_problem(w, offset, friction, dim)
+        made: FrictionProblem = make_problem(w, offset, friction, dim)
         return made
     jacobian = sp.csr_array(problem.bodies.jacobian[rows])
     push = jacobian @ generator.standard_normal(jacobian.shape[1])
     push *= size * len(rows) ** 0.5 / (float(np.linalg.norm(push)) or 1.0)
     bodies = BodySpace(jacobian, problem.bodies.inverse_mass, problem.bodies.body_size)
-    made = friction_problem(bodies, problem.offset[rows] + push, friction, dim)
+    made = make_problem(bodies, problem.offset[rows] + push, friction, dim)
     return made
 
 
-def bodies_anew(problem: FrictionProblem) -> BodySpace:
+def renew_bodies(problem: FrictionProblem) -> BodySpace:
     """The bodies of a problem without what they keep of earlier solves."""
     bodies = problem.bodies
     assert bodies is not None
     return BodySpace(bodies.jacobian, bodies.inverse_mass, bodies.body_size)
 
 
-def generated_problems() -> list[NamedProblem]:
+def list_generated() -> list[NamedProblem]:
     """Towers and packings of up to 5,000 contacts."""
     boxes = ((50, 2), (200, 2), (50, 3), (200, 3))
     grains = ((250, 2), (1000, 2), (2500, 2), (200, 3), (1500, 3))
     problems = [
-        NamedProblem(f"tower{dim}d_{count}", f"towers {dim}D", partial(tower, count, dim))
+        NamedProblem(f"tower{dim}d_{count}", f"towers {dim}D", partial(build_tower, count, dim))
         for count, dim in boxes
     ]
     problems += [
         NamedProblem(
-            f"tower{dim}d_10_top1e4", f"towers {dim}D", partial(tower, 10, dim, top_mass=1e4)
+            f"tower{dim}d_10_top1e4", f"towers {dim}D", partial(build_tower, 10, dim, top_mass=1e4)
         )
         for dim in (2, 3)
     ]
     problems += [
         NamedProblem(
             f"{GRAINS[dim]}{count}_mu{mu:g}", f"packings {dim}D",
-            partial(_packing, count, dim, mu), 1,
+            partial(_make_packing, count, dim, mu), 1,
         )
         for count, dim in grains
         for mu in ((0.5,) if count > 1000 else (0.3, 0.8))
     ]  # fmt: skip
     return problems + [
-        NamedProblem(f"spheres_crystal{layers}", "packings 3D", partial(crystal, layers))
+        NamedProblem(f"spheres_crystal{layers}", "packings 3D", partial(build_crystal, layers))
         for layers in (5, 9)
     ]
 
@@ -190,24 +190,24 @@ FRICTIONLESS = (
 """Grains, dimension and seed."""
 
 
-def other_packings() -> list[NamedProblem]:
+def list_other_packings() -> list[NamedProblem]:
     """Packings of other seeds and frictions from 0.1 to 1.5."""
     beds = [(*other, seed) for other in OTHERS for seed in OTHER_SEEDS]
     return [
         NamedProblem(
             f"{GRAINS[dim]}{count}_mu{mu:g}_seed{seed}", f"other packings {dim}D",
-            partial(_packing, count, dim, mu, seed), seed,
+            partial(_make_packing, count, dim, mu, seed), seed,
         )
         for count, dim, mu, seed in (*beds, *HARD)
     ]  # fmt: skip
 
 
-def frictionless_problems() -> list[NamedProblem]:
+def list_frictionless() -> list[NamedProblem]:
     """The normal parts of packings of 100 to 5,000 contacts."""
     return [
         NamedProblem(
             f"{GRAINS[dim]}{count}_lcp" + f"_seed{seed}" * (seed > 1), "frictionless",
-            partial(_frictionless, count, dim, seed), seed,
+            partial(_make_frictionless, count, dim, seed), seed,
         )
         for count, dim, seed in FRICTIONLESS
     ]  # fmt: skip
@@ -217,42 +217,42 @@ YIELDING, YIELD_FRICTIONS = "spheres_500", (0.2, 0.25, 0.29, 0.3, 0.31, 0.35)
 """A stored packing that was settled under a friction of 0.5, and those it is given then."""
 
 
-def yielding_problems() -> list[NamedProblem]:
+def list_yielding() -> list[NamedProblem]:
     """A packing near yield: below some friction no forces hold it, and many contacts slide."""
     return [
-        NamedProblem(f"{each.name}_mu{mu:g}", "near yield", partial(_yielding, each, mu))
-        for each in stored_problems()
+        NamedProblem(f"{each.name}_mu{mu:g}", "near yield", partial(_change_friction, each, mu))
+        for each in list_stored()
         for mu in YIELD_FRICTIONS
         if each.name == YIELDING
     ]
 
 
-def _yielding(stored: NamedProblem, friction: float) -> FrictionProblem:
+def _change_friction(stored: NamedProblem, friction: float) -> FrictionProblem:
     problem = stored.make()
     made: FrictionProblem = replace(problem, friction=np.full(problem.contacts, friction))
     return made
 
 
-def _kept_beds() -> Path | None:
+def _find_beds() -> Path | None:
     kept = os.environ.get("TRACKBED_BEDS")
     return Path(kept) if kept else None
 
 
 @cache
-def _packing(grains: int, dim: int, friction: float, seed: int = 1) -> FrictionProblem:
-    return packing(grains, dim, seed=seed, friction=friction, folder=_kept_beds())
+def _make_packing(grains: int, dim: int, friction: float, seed: int = 1) -> FrictionProblem:
+    return build_packing(grains, dim, seed=seed, friction=friction, folder=_find_beds())
 
 
-def _frictionless(grains: int, dim: int, seed: int) -> FrictionProblem:
-    packed = _packing(grains, dim, 0.5, seed)
+def _make_frictionless(grains: int, dim: int, seed: int) -> FrictionProblem:
+    packed = _make_packing(grains, dim, 0.5, seed)
     assert packed.bodies is not None
-    made: FrictionProblem = friction_problem(packed.bodies, packed.offset, 0.0, dim)
+    made: FrictionProblem = make_problem(packed.bodies, packed.offset, 0.0, dim)
     return made
 
 
-def all_problems() -> list[NamedProblem]:
+def list_problems() -> list[NamedProblem]:
     """Everything that is raced; without the stored ones where their folders are not named."""
     return [
-        *stored_problems(), *suite_problems(), *generated_problems(), *other_packings(),
-        *unseen_problems(), *frictionless_problems(), *yielding_problems(),
+        *list_stored(), *list_suite(), *list_generated(), *list_other_packings(),
+        *list_unseen(), *list_frictionless(), *list_yielding(),
     ]  # fmt: skip

@@ -17,25 +17,25 @@ from rigid_lcp.scene.simulation import Simulation
 from rigid_lcp.shapes.disc import Disc
 from rigid_lcp.shapes.half_space import HalfSpace
 from rigid_lcp.shapes.polygon import Polygon
-from rigid_lcp.shapes.polyhedron import box
-from validation.bench.rigid.scenes import DENSITY, FLOOR, G, card_house_friction, stack
+from rigid_lcp.shapes.polyhedron import make_box
+from validation.bench.rigid.scenes import DENSITY, FLOOR, G, find_card_friction, stack
 
 Floats = NDArray[np.float64]
 
 
-def block_in_space(slope: float, across: float, mu: float) -> Simulation:
+def incline_in_space(slope: float, across: float, mu: float) -> Simulation:
     """A flat block (body 0) at rest on a plane inclined by ``slope`` [rad], in its frame.
 
     Downhill is turned from x by ``across`` [rad] about the normal of the plane, z.
     """
     down = np.array([sin(slope) * cos(across), sin(slope) * sin(across), -cos(slope)])
     scene = Scene(3, G * down)
-    scene.add(box(0.3, 0.2, 0.1), density=DENSITY, position=(0, 0, 0.05), friction=mu)
+    scene.add(make_box(0.3, 0.2, 0.1), density=DENSITY, position=(0, 0, 0.05), friction=mu)
     scene.add(HalfSpace((0, 0, 1)), friction=mu)
     return Simulation(scene)
 
 
-def turned(run: Simulation, angle: float) -> Simulation:
+def turn_scene(run: Simulation, angle: float) -> Simulation:
     """The scene, and gravity with it, turned about the origin by ``angle`` [rad]."""
     frame = np.array([[cos(angle), -sin(angle)], [sin(angle), cos(angle)]])
     old = run.world.scene
@@ -51,7 +51,7 @@ def turned(run: Simulation, angle: float) -> Simulation:
     return Simulation(scene, run.method, step=run.step)
 
 
-def in_units(run: Simulation, length: float, mass: float) -> Simulation:
+def change_units(run: Simulation, length: float, mass: float) -> Simulation:
     """The scene in units of which ``length`` make a metre and ``mass`` a kilogram."""
     old = run.world.scene
     scene = Scene(2, old.gravity * length)
@@ -70,7 +70,7 @@ def in_units(run: Simulation, length: float, mass: float) -> Simulation:
     return Simulation(scene, run.method, step=run.step)
 
 
-def jittered_grid(columns: int, rows: int, offset: float) -> Simulation:
+def jitter_grid(columns: int, rows: int, offset: float) -> Simulation:
     """Boxes side by side and upon each other, each off its place by up to ``offset`` [m]."""
     generator = np.random.default_rng(0)
     scene = Scene(2)
@@ -81,7 +81,7 @@ def jittered_grid(columns: int, rows: int, offset: float) -> Simulation:
     return Simulation(scene)
 
 
-def card_storeys(storeys: int, phi: float, mu: float) -> Simulation:
+def stack_cards(storeys: int, phi: float, mu: float) -> Simulation:
     """A card house: ``storeys`` pairs of cards below, one pair less a storey, slabs between.
 
     Cards of height 1 m lean by ``phi`` [rad], with flat feet and tops 2 cm wide; two meet in a
@@ -111,23 +111,23 @@ def card_storeys(storeys: int, phi: float, mu: float) -> Simulation:
     return Simulation(scene)
 
 
-def card_storeys_friction(storeys: int, phi: float) -> float:
+def find_storeys_friction(storeys: int, phi: float) -> float:
     """Least friction at which a card house can stand, by `validation.bench.rigid.rest_limit`."""
-    from validation.bench.rigid.rest_limit import BALANCED, least_that_rests, unbalance
+    from validation.bench.rigid.rest_limit import BALANCED, bisect_rest, find_unbalance
 
-    run = card_storeys(storeys, phi, 1.0)
-    few = card_house_friction(phi)
-    return least_that_rests(lambda mu: unbalance(run, mu) <= BALANCED, few / 10, 10 * few, 1e-9)
+    run = stack_cards(storeys, phi, 1.0)
+    few = find_card_friction(phi)
+    return bisect_rest(lambda mu: find_unbalance(run, mu) <= BALANCED, few / 10, 10 * few, 1e-9)
 
 
-def kicked_tower(boxes: int, speed: float) -> Simulation:
+def kick_tower(boxes: int, speed: float) -> Simulation:
     """A tower whose lowest box is given a ``speed`` [m/s] sideways."""
     scene = stack(boxes).world.scene
     scene.bodies[0] = replace(scene.bodies[0], velocity=np.array([speed, 0.0]))
     return Simulation(scene)
 
 
-def needle_heap(needles: int, slender: float) -> Simulation:
+def drop_needles(needles: int, slender: float) -> Simulation:
     """Needles of 1 m by ``1 / slender``, crossed, that fall on a floor and upon each other."""
     scene = Scene(2)
     for k in range(needles):
@@ -139,7 +139,7 @@ def needle_heap(needles: int, slender: float) -> Simulation:
     return Simulation(scene)
 
 
-def needle_pile(needles: int) -> Simulation:
+def pile_needles(needles: int) -> Simulation:
     """Needles of 1 m by 0.1 mm upon each other, and one that stands on its end on the floor."""
     scene = Scene(2)
     for k in range(needles):

@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 Extended = NDArray[np.longdouble]
 
 
-def residual_extended(problem: FrictionProblem, force: Floats) -> tuple[float, float]:
+def measure_residual(problem: FrictionProblem, force: Floats) -> tuple[float, float]:
     """``|r - P_K(r - rho (u + mu |u_T| n))|`` over |r|, and over what it is without forces.
 
     ``force`` r (nc * dim,).  Over ``rho |u|`` where all forces are zero.  The second number tells
@@ -28,34 +28,34 @@ def residual_extended(problem: FrictionProblem, force: Floats) -> tuple[float, f
     if not np.isfinite(force).all():
         return float("nan"), float("nan")
     shape = (problem.contacts, problem.dim)
-    mu, rho = problem.friction.astype(np.longdouble), _rho(problem)
+    mu, rho = problem.friction.astype(np.longdouble), _find_rho(problem)
     r = force.astype(np.longdouble)
-    u = _velocity(problem, r).reshape(shape)
-    left = _norm(_natural_map(r.reshape(shape), u, mu, rho))
+    u = _find_velocity(problem, r).reshape(shape)
+    left = _norm(_evaluate_map(r.reshape(shape), u, mu, rho))
     still = problem.offset.astype(np.longdouble).reshape(shape)
-    begun = _norm(_natural_map(np.zeros_like(still), still, mu, rho))
+    begun = _norm(_evaluate_map(np.zeros_like(still), still, mu, rho))
     size = _norm(r) or rho * _norm(u)
     return float(left / size) if size else 0.0, float(left / begun) if begun else float(left > 0)
 
 
-def _velocity(problem: FrictionProblem, force: Extended) -> Extended:
+def _find_velocity(problem: FrictionProblem, force: Extended) -> Extended:
     """``W r + q``, by the factors of W where they are known."""
     q = problem.offset.astype(np.longdouble)
     if problem.bodies is None:
-        return _product(problem.delassus, force) + q
+        return _multiply(problem.delassus, force) + q
     jacobian = problem.bodies.jacobian
-    spread = _product(sp.csr_array(jacobian.T), force)
-    return _product(jacobian, _product(problem.bodies.inverse_mass, spread)) + q
+    spread = _multiply(sp.csr_array(jacobian.T), force)
+    return _multiply(jacobian, _multiply(problem.bodies.inverse_mass, spread)) + q
 
 
-def _product(matrix: Any, vector: Extended) -> Extended:
+def _multiply(matrix: Any, vector: Extended) -> Extended:
     entries = sp.coo_array(matrix)
     made = np.zeros(matrix.shape[0], dtype=np.longdouble)
     np.add.at(made, entries.row, entries.data.astype(np.longdouble) * vector[entries.col])
     return made
 
 
-def _rho(problem: FrictionProblem) -> np.longdouble:
+def _find_rho(problem: FrictionProblem) -> np.longdouble:
     """``1 / mean(diag W)``, 1 where W has no diagonal."""
     if problem.bodies is None:
         diagonal = problem.delassus.diagonal()
@@ -66,7 +66,7 @@ def _rho(problem: FrictionProblem) -> np.longdouble:
     return 1 / mean if mean > 0 else np.longdouble(1)
 
 
-def _natural_map(r: Extended, u: Extended, mu: Extended, rho: np.longdouble) -> Extended:
+def _evaluate_map(r: Extended, u: Extended, mu: Extended, rho: np.longdouble) -> Extended:
     """Contact by contact: the nearest point of the cone is the point, its apex, or on its side."""
     x = r - rho * u
     x[:, 0] -= rho * mu * np.sqrt((u[:, 1:] ** 2).sum(axis=1))

@@ -17,9 +17,9 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from rigid_lcp.friction.methods.gauss_seidel import gauss_seidel
-from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, friction_problem
-from validation.bench.rigid.deposition import bed_poured, pairs_touching
+from rigid_lcp.friction.methods.gauss_seidel import solve_gauss_seidel
+from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, make_problem
+from validation.bench.rigid.deposition import find_touching, pour_grains
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -56,7 +56,7 @@ class Bed:
     """Greatest speed that one step gives a grain, over g h: 0 in equilibrium, 1 in free fall."""
 
 
-def tower(
+def build_tower(
     boxes: int, dim: int, *, top_mass: float = 1.0, friction: float = 0.5, step: float = 1e-3
 ) -> FrictionProblem:
     """Unit boxes of 1 kg on each other and the floor, the top one of ``top_mass`` times that.
@@ -68,16 +68,16 @@ def tower(
     arm = np.tile(np.column_stack([arms, np.full(len(arms), -0.5)]), (boxes, 1))
     above = np.repeat(np.arange(boxes), len(arms))
     normal = np.tile([0.0, 0.0, 1.0], (len(arm), 1))
-    jacobian = contact_jacobian(
+    jacobian = build_jacobian(
         np.column_stack([above, above - 1]), normal, arm, arm * [1, 1, -1], boxes, dim
     )
     mass = np.ones(boxes)
     mass[-1] = top_mass
-    space = body_space(jacobian, mass, mass / 6.0, dim)
-    return step_problem(space, step, friction, dim)
+    space = build_bodies(jacobian, mass, mass / 6.0, dim)
+    return pose_step(space, step, friction, dim)
 
 
-def packing(
+def build_packing(
     grains: int,
     dim: int,
     *,
@@ -88,11 +88,11 @@ def packing(
     folder: Path | None = None,
 ) -> FrictionProblem:
     """A settled bed of so many grains as a problem of one step, see `bed`."""
-    made = bed(grains, dim, seed=seed, friction=friction, settle=settle, folder=folder)
-    return bed_problem(made, step)
+    made = pour_bed(grains, dim, seed=seed, friction=friction, settle=settle, folder=folder)
+    return pose_bed(made, step)
 
 
-def bed(
+def pour_bed(
     grains: int,
     dim: int,
     *,
@@ -107,10 +107,10 @@ def bed(
     """
     name = f"bed{dim}d_{grains}_{seed}_{friction:g}_{settle}.npz"
     if folder is not None and (folder / name).exists():
-        return bed_read(folder / name)
+        return read_bed(folder / name)
     generator = np.random.default_rng(seed)
     radius = generator.uniform(*RADII, grains)
-    made = bed_of(radius, dim, generator, friction=friction, settle=settle)
+    made = pour_radii(radius, dim, generator, friction=friction, settle=settle)
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
         arrays: dict[str, Any] = vars(made)
@@ -118,7 +118,7 @@ def bed(
     return made
 
 
-def bed_of(
+def pour_radii(
     radius: Floats, dim: int, generator: np.random.Generator, *, friction: float, settle: int = 200
 ) -> Bed:
     """Pour grains of these radii (n,) [m] at random places and settle them, see `bed`."""
@@ -128,15 +128,15 @@ def bed_of(
         drop[:, 1] = -1.0
     width = 2.0 * float(radius.mean()) * max(2.0, grains ** (1 / dim))
     width = max(width, 2.5 * float(radius.max()))
-    centre = bed_poured(radius, width, drop)
+    centre = pour_grains(radius, width, drop)
     made = Bed(centre, radius, width, dim, friction, np.zeros((0, 2), int), np.zeros((0, 3)), 1.0)
     for k in range(settle):
         step = SETTLE_STEPS[0] * (SETTLE_STEPS[1] / SETTLE_STEPS[0]) ** (k / settle)
-        made = bed_settled(replace(made, friction=0.0 if 2 * k < settle else friction), step)
+        made = settle_step(replace(made, friction=0.0 if 2 * k < settle else friction), step)
     return made
 
 
-def crystal(layers: int, *, friction: float = 0.35, step: float = 1e-3) -> FrictionProblem:
+def build_crystal(layers: int, *, friction: float = 0.35, step: float = 1e-3) -> FrictionProblem:
     """Equal spheres in layers of squares, each in the hollows of the one below, in a box that
     touches all its sides (face-centred cubic): regular, where packings are not."""
     radius, centre = float(np.mean(RADII)), []
@@ -149,10 +149,10 @@ def crystal(layers: int, *, friction: float = 0.35, step: float = 1e-3) -> Frict
         place, np.full(len(place), radius), 2.0 * radius * layers, 3, friction,
         np.zeros((0, 2), int), np.zeros((0, 3)), 1.0,
     )  # fmt: skip
-    return bed_problem(bed_pairs(made, TOUCH * radius), step)
+    return pose_bed(update_pairs(made, TOUCH * radius), step)
 
 
-def bed_read(path: Path) -> Bed:
+def read_bed(path: Path) -> Bed:
     """A bed from its file."""
     with np.load(path) as data:
         numbers = {key: data[key].item() for key in ("width", "dim", "friction", "unrest")}
@@ -160,27 +160,27 @@ def bed_read(path: Path) -> Bed:
     return Bed(**arrays, **numbers)
 
 
-def bed_settled(made: Bed, step: float) -> Bed:
+def settle_step(made: Bed, step: float) -> Bed:
     """One step from rest: free gaps may close, touching grains bear; then all velocity is lost."""
     margin = 2.0 * GRAVITY * step**2
-    made = bed_pairs(made, margin)
-    problem = bed_problem(made, step, gaps=True)
-    start = bed_start(made, step)
-    found = gauss_seidel(problem, start, 1e-6, SETTLE_SWEEPS)
+    made = update_pairs(made, margin)
+    problem = pose_bed(made, step, gaps=True)
+    start = find_start(made, step)
+    found = solve_gauss_seidel(problem, start, 1e-6, SETTLE_SWEEPS)
     space = problem.bodies
     assert space is not None
-    fall = space.inverse_mass @ (space.jacobian.T @ found.r) + free_fall(space, step, made.dim)
+    fall = space.inverse_mass @ (space.jacobian.T @ found.r) + fall_freely(space, step, made.dim)
     velocity = fall.reshape(-1, space.body_size)[:, : made.dim]
     centre = made.centre.copy()
     centre[:, [0, 2] if made.dim == 2 else [0, 1, 2]] += step * velocity
-    impulse = np.einsum("ci,cik->ck", found.r.reshape(-1, made.dim), bed_frames(made)) / step
+    impulse = np.einsum("ci,cik->ck", found.r.reshape(-1, made.dim), find_frames(made)) / step
     unrest = float(np.linalg.norm(velocity, axis=1).max()) / (GRAVITY * step)
     return replace(made, centre=centre, impulse=impulse, unrest=unrest)
 
 
-def bed_pairs(made: Bed, margin: float) -> Bed:
+def update_pairs(made: Bed, margin: float) -> Bed:
     """Find the pairs within ``margin`` [m]; those known before keep their impulse."""
-    pairs = pairs_touching(made.centre, made.radius, made.width, made.dim == 2, margin)
+    pairs = find_touching(made.centre, made.radius, made.width, made.dim == 2, margin)
     keys, known = (each @ [len(made.radius) + 5, 1] for each in (pairs, made.pairs))
     impulse = np.zeros((len(pairs), 3))
     _, new, old = np.intersect1d(keys, known, assume_unique=True, return_indices=True)
@@ -188,41 +188,41 @@ def bed_pairs(made: Bed, margin: float) -> Bed:
     return replace(made, pairs=pairs, impulse=impulse)
 
 
-def bed_touching(made: Bed) -> Bed:
+def keep_touching(made: Bed) -> Bed:
     """The same grains with those pairs only that touch."""
-    kept = bed_gaps(made) < TOUCH * made.radius.mean()
+    kept = find_gaps(made) < TOUCH * made.radius.mean()
     return replace(made, pairs=made.pairs[kept], impulse=made.impulse[kept])
 
 
-def bed_problem(made: Bed, step: float, *, gaps: bool = False) -> FrictionProblem:
+def pose_bed(made: Bed, step: float, *, gaps: bool = False) -> FrictionProblem:
     """The problem of a step [s]: of the pairs that touch, or of all with what gaps they have.
 
     A gap g leaves ``u_N >= -g / h``, and an overlap asks for a part of it back.
     """
-    made = made if gaps else bed_touching(made)
-    apart = bed_gaps(made)
+    made = made if gaps else keep_touching(made)
+    apart = find_gaps(made)
     radius, first, second = made.radius, made.pairs[:, 0], made.pairs[:, 1]
-    frames = bed_frames(made)
+    frames = find_frames(made)
     other = np.where(second < 0, 0.0, radius[np.maximum(second, 0)])
-    jacobian = contact_jacobian(
+    jacobian = build_jacobian(
         made.pairs, frames[:, 0], -radius[first, None] * frames[:, 0], other[:, None]
         * frames[:, 0], len(radius), made.dim, frames,
     )  # fmt: skip
     mass = DENSITY * np.pi * radius**2 * (1.0 if made.dim == 2 else 4.0 / 3.0 * radius)
     inertia = mass * radius**2 * (0.5 if made.dim == 2 else 0.4)
-    problem = step_problem(body_space(jacobian, mass, inertia, made.dim), step, made.friction,
+    problem = pose_step(build_bodies(jacobian, mass, inertia, made.dim), step, made.friction,
                            made.dim)  # fmt: skip
     if gaps:
         problem.offset[:: made.dim] += np.where(apart > 0, apart, OVERLAP_MENDED * apart) / step
     return problem
 
 
-def bed_start(made: Bed, step: float) -> Floats:
+def find_start(made: Bed, step: float) -> Floats:
     """Impulses of the step before in the frames of this one, (nc * dim,): a warm start."""
-    return np.einsum("ck,cik->ci", made.impulse, bed_frames(made)).ravel() * step
+    return np.einsum("ck,cik->ci", made.impulse, find_frames(made)).ravel() * step
 
 
-def bed_frames(made: Bed) -> Floats:
+def find_frames(made: Bed) -> Floats:
     """Normal, from the second to the first of a pair, and tangents: (nc, dim, 3)."""
     first, second = made.pairs[:, 0], made.pairs[:, 1]
     normal = made.centre[first] - made.centre[np.maximum(second, 0)]
@@ -237,7 +237,7 @@ def bed_frames(made: Bed) -> Floats:
     return np.stack([normal, tangent, np.cross(normal, tangent)], 1)
 
 
-def bed_gaps(made: Bed) -> Floats:
+def find_gaps(made: Bed) -> Floats:
     """Gap of every pair [m], (nc,)."""
     first, second = made.pairs[:, 0], made.pairs[:, 1]
     between = made.centre[first] - made.centre[np.maximum(second, 0)]
@@ -250,7 +250,7 @@ def bed_gaps(made: Bed) -> Floats:
     return gap
 
 
-def contact_jacobian(
+def build_jacobian(
     pairs: Integers, normal: Floats, arm_first: Floats, arm_second: Floats, bodies: int, dim: int,
     frames: Floats | None = None,
 ) -> sp.csr_array:  # fmt: skip
@@ -279,23 +279,23 @@ def contact_jacobian(
     return rows
 
 
-def body_space(jacobian: sp.csr_array, mass: Floats, inertia: Floats, dim: int) -> BodySpace:
+def build_bodies(jacobian: sp.csr_array, mass: Floats, inertia: Floats, dim: int) -> BodySpace:
     """Bodies whose inertia is the same about every axis, (n,) [kg], [kg m^2]."""
     columns = [mass] * dim + [inertia] * (2 * dim - 3)
     inverse = 1.0 / np.stack(columns, axis=1).ravel()
     return BodySpace(jacobian, sp.csr_array(sp.diags(inverse)), 3 * dim - 3)
 
 
-def free_fall(space: BodySpace, step: float, dim: int) -> Floats:
+def fall_freely(space: BodySpace, step: float, dim: int) -> Floats:
     """Velocities of bodies from rest after one step without contact, (ndof,) [m/s]."""
     velocity = np.zeros(space.jacobian.shape[1])
     velocity[dim - 1 :: space.body_size] = -GRAVITY * step
     return velocity
 
 
-def step_problem(space: BodySpace, step: float, friction: float, dim: int) -> FrictionProblem:
+def pose_step(space: BodySpace, step: float, friction: float, dim: int) -> FrictionProblem:
     """One step from rest under gravity: ``q = J h g``."""
-    offset = space.jacobian @ free_fall(space, step, dim)
-    problem = friction_problem(space, offset, friction, dim)
+    offset = space.jacobian @ fall_freely(space, step, dim)
+    problem = make_problem(space, offset, friction, dim)
     assert isinstance(problem, FrictionProblem)
     return problem

@@ -10,15 +10,15 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rigid_lcp.motion.equations import body_space
+from rigid_lcp.motion.equations import make_body_space
 from rigid_lcp.scene.simulation import Simulation
-from validation.bench.rigid.scenes import arch
+from validation.bench.rigid.scenes import build_arch
 
 BALANCED = 1e-9
 """Out-of-balance force that counts as none, over the weight of the lightest body."""
 
 
-def unbalance(run: Simulation, mu: float) -> float:
+def find_unbalance(run: Simulation, mu: float) -> float:
     """Smallest sum of forces and moments that must be added for balance under gravity.
 
     In weights of the lightest body, moments over its size; ``mu`` at all contacts, 2D.  Zero: the
@@ -28,7 +28,7 @@ def unbalance(run: Simulation, mu: float) -> float:
 
     world, motion = run.world, run.motion
     contacts = world.contacts(motion, 1e-9 * world.length)
-    bodies = body_space(contacts, motion.position, world.columns, world.inverse_mass(motion))
+    bodies = make_body_space(contacts, motion.position, world.columns, world.inverse_mass(motion))
     mass = world.mass[world.movable]
     weight = float(mass.min() * np.linalg.norm(world.scene.gravity))
     unit = np.tile([1.0, 1.0, 1.0 / world.length], len(mass))
@@ -46,7 +46,7 @@ def unbalance(run: Simulation, mu: float) -> float:
     return float(found.fun)
 
 
-def least_that_rests(rests: Callable[[float], bool], low: float, high: float, off: float) -> float:
+def bisect_rest(rests: Callable[[float], bool], low: float, high: float, off: float) -> float:
     """Least number at which a scene rests, to ``off``, by bisection: at ``high`` it does."""
     while high - low > off:
         middle = (low + high) / 2
@@ -54,14 +54,14 @@ def least_that_rests(rests: Callable[[float], bool], low: float, high: float, of
     return high
 
 
-def arch_unbalance(stones: int, thickness: float, mu: float = 2.0) -> float:
+def balance_arch(stones: int, thickness: float, mu: float = 2.0) -> float:
     """Out-of-balance force of an arch, in weights of a stone; ``thickness`` over mean radius."""
-    return unbalance(arch(stones, thickness), mu)
+    return find_unbalance(build_arch(stones, thickness), mu)
 
 
-def arch_limit(stones: int, mu: float = 2.0, *, tolerance: float = 1e-7) -> float:
+def find_arch_limit(stones: int, mu: float = 2.0, *, tolerance: float = 1e-7) -> float:
     """Least thickness over mean radius at which an arch of so many stones stands: 0.1075 for ever
     more stones (Milankovitch), another where few stones leave few joints for hinges."""
-    return least_that_rests(
-        lambda thickness: arch_unbalance(stones, thickness, mu) <= BALANCED, 0.02, 0.3, tolerance
+    return bisect_rest(
+        lambda thickness: balance_arch(stones, thickness, mu) <= BALANCED, 0.02, 0.3, tolerance
     )

@@ -24,23 +24,23 @@ DENSITY = 2700.0
 FLOOR = HalfSpace((0, 1))
 
 
-def gravity_on(slope: float) -> Floats:
+def turn_gravity(slope: float) -> Floats:
     """Gravity in the frame of a plane inclined by ``slope`` [rad], x downhill [m/s^2]."""
     return G * np.array([sin(slope), -cos(slope)])
 
 
-def block_on_incline(
+def incline_block(
     slope: float, mu: float, *, size: float = 1.0, method: Method = "time-stepping",
     step: float = 1e-3,
 ) -> Simulation:  # fmt: skip
     """A square block at rest on an incline; it is body 0 and stays iff ``mu >= tan(slope)``."""
-    scene = Scene(2, gravity_on(slope))
+    scene = Scene(2, turn_gravity(slope))
     scene.add(Polygon.rectangle(size, size), density=DENSITY, position=(0, size / 2))
     scene.add(FLOOR, friction=mu)
     return Simulation(scene, method, step=step)
 
 
-def block_on_incline_way(slope: float, mu: float, seconds: float) -> float:
+def find_slide_distance(slope: float, mu: float, seconds: float) -> float:
     """How far it slides [m]: ``g (sin - mu cos) t^2 / 2``, or not at all."""
     return max(0.0, G * (sin(slope) - mu * cos(slope))) * seconds**2 / 2
 
@@ -60,7 +60,7 @@ def stack(
     return Simulation(scene, step=step)
 
 
-def card_house(phi: float, mu: float, *, height: float = 1.0, step: float = 1e-3) -> Simulation:
+def lean_cards(phi: float, mu: float, *, height: float = 1.0, step: float = 1e-3) -> Simulation:
     """Two cards that lean against each other, ``phi`` [rad] from the vertical; bodies 0 and 1.
 
     Parallelograms with a short vertical edge at the top, where they meet without friction (by
@@ -75,12 +75,12 @@ def card_house(phi: float, mu: float, *, height: float = 1.0, step: float = 1e-3
     return Simulation(scene, step=step)
 
 
-def card_house_friction(phi: float) -> float:
+def find_card_friction(phi: float) -> float:
     """Friction below which the cards slide apart: moments about a foot, ``tan(phi) / 2``."""
     return tan(phi) / 2
 
 
-def wedge(half_angle: float, mu: float, force: float, *, step: float = 1e-3) -> Simulation:
+def build_wedge(half_angle: float, mu: float, force: float, *, step: float = 1e-3) -> Simulation:
     """A symmetric wedge (body 0) squeezed by two plates under opposite forces, without gravity.
 
     The plates stand on a floor without friction; the wedge, wide end up, can only go up.
@@ -108,7 +108,7 @@ def wedge(half_angle: float, mu: float, force: float, *, step: float = 1e-3) -> 
     return Simulation(scene, step=step, loads=squeeze)
 
 
-def wedge_acceleration(run: Simulation, half_angle: float, mu: float, force: float) -> float:
+def find_wedge_acceleration(run: Simulation, half_angle: float, mu: float, force: float) -> float:
     """Upward acceleration of the wedge [m/s^2]; zero, it jams, iff ``mu >= tan(half_angle)``.
 
     ``2 N (sin a - mu cos a) = m_w y''`` and ``F - N (cos a + mu sin a) = m_p y'' tan a``.
@@ -122,18 +122,18 @@ def wedge_acceleration(run: Simulation, half_angle: float, mu: float, force: flo
     return float(drive * normal)
 
 
-def disc_on_incline(
+def incline_disc(
     slope: float, mu: float, *, radius: float = 0.5, method: Method = "time-stepping",
     step: float = 1e-3,
 ) -> Simulation:  # fmt: skip
     """A disc at rest on an incline (body 0)."""
-    scene = Scene(2, gravity_on(slope))
+    scene = Scene(2, turn_gravity(slope))
     scene.add(Disc(radius), density=DENSITY, position=(0, radius))
     scene.add(FLOOR, friction=mu)
     return Simulation(scene, method, step=step)
 
 
-def bouncing_disc(
+def drop_disc(
     height: float, restitution: float, *, radius: float = 0.1, method: Method = "time-stepping",
     step: float = 1e-3,
 ) -> Simulation:  # fmt: skip
@@ -144,7 +144,7 @@ def bouncing_disc(
     return Simulation(scene, method, step=step)
 
 
-def sliding_rod(
+def slide_rod(
     mu: float, *, method: Method, speed: float = 1.0, half_length: float = 0.5,
     lean: float = np.arctan(2.0), step: float = 1e-3,
 ) -> Simulation:  # fmt: skip
@@ -161,7 +161,7 @@ def sliding_rod(
     return Simulation(scene, method, step=step)
 
 
-def sliding_rod_limit(run: Simulation) -> float:
+def find_rod_limit(run: Simulation) -> float:
     """Friction at which ``1/m + x^2/J - mu |x y|/J`` is zero: above, no finite force exists."""
     contact = run.world.contacts(run.motion, 1e-9 * run.world.length)
     x, y = (contact.point - run.positions[0])[0]
@@ -169,7 +169,7 @@ def sliding_rod_limit(run: Simulation) -> float:
     return float((1 / mass + x * x / inertia) / (abs(x * y) / inertia))
 
 
-def light_on_heavy(ratio: float, *, step: float = 1e-3) -> Simulation:
+def stack_unequal(ratio: float, *, step: float = 1e-3) -> Simulation:
     """Light on heavy on light boxes, the middle one ``ratio`` times denser."""
     scene = Scene(2)
     for k, density in enumerate((DENSITY, ratio * DENSITY, DENSITY)):
@@ -178,7 +178,7 @@ def light_on_heavy(ratio: float, *, step: float = 1e-3) -> Simulation:
     return Simulation(scene, step=step)
 
 
-def arch(stones: int, thickness: float, *, mu: float = 2.0, step: float = 1e-3) -> Simulation:
+def build_arch(stones: int, thickness: float, *, mu: float = 2.0, step: float = 1e-3) -> Simulation:
     """A semicircular arch of equal stones with joints along radii, mean radius 1 m.
 
     ``thickness``: over the mean radius.  The two lowest stones stand on the floor.  It stands iff
@@ -198,7 +198,7 @@ def arch(stones: int, thickness: float, *, mu: float = 2.0, step: float = 1e-3) 
     return Simulation(scene, step=step)
 
 
-def poured(grains: int, *, seed: int = 0, step: float = 1e-3, mu: float = 0.5) -> Simulation:
+def fill_trough(grains: int, *, seed: int = 0, step: float = 1e-3, mu: float = 0.5) -> Simulation:
     """Irregular polygons on a loose lattice in a trough, to be poured: all bodies but the walls."""
     generator = np.random.default_rng(seed)
     columns = max(4, int(np.sqrt(grains)))

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, friction_problem
+from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, make_problem
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -76,10 +76,10 @@ class Grains:
         inverse = np.column_stack([1 / self.mass, 1 / self.mass, 1 / self.inertia]).ravel()
         space = BodySpace(sp.csr_array(rows), sp.csr_array(sp.diags_array(inverse)), 3)
         fall = np.tile([*self.gravity, 0.0], n)
-        return friction_problem(space, rows @ fall, friction, 2)
+        return make_problem(space, rows @ fall, friction, 2)
 
 
-def grains_of(
+def make_grains(
     centre: Floats, mass: Floats, inertia: Floats,
     contacts: Sequence[tuple[Feature, Feature | Face]], gravity: tuple[float, float],
 ) -> Grains:  # fmt: skip
@@ -96,7 +96,7 @@ def grains_of(
     )  # fmt: skip
 
 
-def groove(tilt: float = 0.35) -> Grains:
+def build_groove(tilt: float = 0.35) -> Grains:
     """A disc of 2 kg and 1 m radius between two planes at right angles, gravity ``tilt`` [rad]
     from their bisector: 4 forces, 3 equations."""
     centre = np.array([[1.0, 1.0]])
@@ -104,10 +104,10 @@ def groove(tilt: float = 0.35) -> Grains:
     angle = -0.75 * np.pi + tilt
     pull = (GRAVITY * float(np.cos(angle)), GRAVITY * float(np.sin(angle)))
     disc: Feature = (0, (0.0, 0.0), 1.0)
-    return grains_of(centre, np.array([2.0]), np.array([1.0]), [(disc, w) for w in walls], pull)
+    return make_grains(centre, np.array([2.0]), np.array([1.0]), [(disc, w) for w in walls], pull)
 
 
-def wedge(half_angle: float = 0.5, shift: float = 0.1) -> Grains:
+def build_wedge(half_angle: float = 0.5, shift: float = 0.1) -> Grains:
     """A triangle, apex down, flush with both walls of a V of ``half_angle`` [rad], its centre of
     mass ``shift`` [m] off the middle: two contacts a face, 8 forces (4 without friction), 3
     equations."""
@@ -119,10 +119,10 @@ def wedge(half_angle: float = 0.5, shift: float = 0.1) -> Grains:
         for along in (0.3, 1.3):
             corner = (side * sine * along - shift, cosine * along - 0.9)
             contacts.append(((0, corner, 0.0), wall))
-    return grains_of(centre, np.array([3.0]), np.array([0.4]), contacts, (0.0, -GRAVITY))
+    return make_grains(centre, np.array([3.0]), np.array([0.4]), contacts, (0.0, -GRAVITY))
 
 
-def beam(position: float = 0.3) -> Grains:
+def build_beam(position: float = 0.3) -> Grains:
     """A beam of 10 kg on three round supports at -1, 0.2 and 1 m, its centre of mass at
     ``position`` [m]: 3 normal forces for 2 equations of balance; stops at both ends carry
     nothing."""
@@ -134,10 +134,10 @@ def beam(position: float = 0.3) -> Grains:
     for side in (-1.0, 1.0):  # stops at both ends: without friction it would slide off
         end = (0, (side * 1.5 - position, 0.0), (side, 0.0))
         contacts.append(((1, (side * 1.55, 0.1), 0.05), end))
-    return grains_of(centre, np.array([10.0]), np.array([30.0]), contacts, (0.0, -GRAVITY))
+    return make_grains(centre, np.array([10.0]), np.array([30.0]), contacts, (0.0, -GRAVITY))
 
 
-def pyramid(rows: int, walls: bool = False, seed: int = 1) -> Grains:
+def build_pyramid(rows: int, walls: bool = False, seed: int = 1) -> Grains:
     """Rows of touching discs of 1 m radius and unequal mass on a floor, and ``walls`` beside the
     lowest row: without friction it would spread."""
     place = {(r, i): k for k, (r, i) in enumerate(
@@ -157,10 +157,10 @@ def pyramid(rows: int, walls: bool = False, seed: int = 1) -> Grains:
         for near in ((r, i + 1), (r + 1, i), (r + 1, i - 1)):
             if near in place:
                 contacts.append(((place[near], (0.0, 0.0), 1.0), own))
-    return grains_of(centre, mass, 0.5 * mass, contacts, (0.0, -GRAVITY))
+    return make_grains(centre, mass, 0.5 * mass, contacts, (0.0, -GRAVITY))
 
 
-def renumbered(grains: Grains, contact: NDArray[np.int64], body: NDArray[np.int64]) -> Grains:
+def renumber(grains: Grains, contact: NDArray[np.int64], body: NDArray[np.int64]) -> Grains:
     """The same grains with contacts and bodies in another order."""
     number = np.append(np.argsort(body), len(body))
     return Grains(

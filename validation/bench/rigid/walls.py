@@ -13,21 +13,21 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from rigid_lcp.friction.problem.definition import BODY_SIZE, BodySpace
-from validation.bench.rigid.packings import contact_jacobian
+from validation.bench.rigid.packings import build_jacobian
 
 Floats = NDArray[np.float64]
 MASSES = ("equal", "random", "top", "one")
 """All 1 kg; each between 1 and the ratio; the last laid heavy; one of them."""
 
 
-def wall_bodies(
+def build_wall(
     rows: int, columns: int, dim: int, mass: Floats, *, length: float = 2.0, joined: bool = False
 ) -> BodySpace:
     """Bricks of ``length`` x 1 (x 1) m on a floor, row after row from below.
 
-    ``mass`` (`wall_count`,) [kg].  ``joined``: neighbours in a row touch as well.
+    ``mass`` (`count_bricks`,) [kg].  ``joined``: neighbours in a row touch as well.
     """
-    laid = [_row(k, columns, length) for k in range(rows)]
+    laid = [_lay_row(k, columns, length) for k in range(rows)]
     centre = np.array([(x, 0.0, k + 0.5) for k, row in enumerate(laid) for x in row])
     first = np.cumsum([0, *(len(row) for row in laid)])
     pairs: list[tuple[int, int]] = []
@@ -63,7 +63,7 @@ def wall_bodies(
         np.array([[1.0, 0, 0], [0, 0, 1], [0, 1, 0]])[:dim],
     )
     other = np.where(pair[:, 1, None] < 0, 0.0, point - centre[np.maximum(pair[:, 1], 0)])
-    jacobian = contact_jacobian(
+    jacobian = build_jacobian(
         pair, frames[:, 0], point - centre[pair[:, 0]], other, len(centre), dim, frames
     )
     inertia = np.array([2.0, length**2 + 1.0, length**2 + 1.0]) / 12.0
@@ -72,12 +72,12 @@ def wall_bodies(
     return BodySpace(jacobian, sp.csr_array(sp.diags_array(inverse)), BODY_SIZE[dim])
 
 
-def wall_count(rows: int, columns: int) -> int:
+def count_bricks(rows: int, columns: int) -> int:
     """Number of bricks."""
-    return sum(len(_row(k, columns, 2.0)) for k in range(rows))
+    return sum(len(_lay_row(k, columns, 2.0)) for k in range(rows))
 
 
-def wall_masses(count: int, kind: str, ratio: float, generator: np.random.Generator) -> Floats:
+def draw_masses(count: int, kind: str, ratio: float, generator: np.random.Generator) -> Floats:
     """Masses (count,) [kg] between 1 and ``ratio``, by one of `MASSES`."""
     mass = np.ones(count)
     if kind == "random":
@@ -89,7 +89,7 @@ def wall_masses(count: int, kind: str, ratio: float, generator: np.random.Genera
     return mass
 
 
-def _row(k: int, columns: int, length: float) -> Floats:
+def _lay_row(k: int, columns: int, length: float) -> Floats:
     """Middles of the bricks of row k; odd rows are half a brick in, and one brick shorter."""
     odd = k % 2 if columns > 1 else 0
     return np.asarray(length * (np.arange(columns - odd) + odd / 2), dtype=float)

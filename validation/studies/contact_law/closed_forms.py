@@ -2,9 +2,9 @@
 
 Symbols as in Chung and Ooi (2011): V_n, V_t speeds of approach of the contact point along normal
 and tangent, omega spin, mu friction, e restitution; primes mark what is after the impact.  Hertz'
-collision itself is `adapters.bed.contact_law.hertz_collision`.  Between rebound without sliding
-and rebound that slides all the time there is no closed form for a spring that stiffens: there an
-engine's own law is integrated, in units of m*, V_n and the stiffness of eq. 5.
+collision itself is `adapters.bed.contact_law.solve_hertz_collision`.  Between rebound without
+sliding and rebound that slides all the time there is no closed form for a spring that stiffens:
+there an engine's own law is integrated, in units of m*, V_n and the stiffness of eq. 5.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ import numpy as np
 from adapters.bed import contact_law
 from adapters.bed.contact_law import CONTACT_TIME_FACTOR, DAMPING_FACTOR
 from adapters.bed.state import FloatArray
-from validation.studies.contact_law.engine_runs import law_damps, law_pulls
+from validation.studies.contact_law.engine_runs import can_pull, has_damping
 
 
-def contact_time(mass: float, radius: float, modulus: float, speed: float) -> float:
+def find_contact_time(mass: float, radius: float, modulus: float, speed: float) -> float:
     """Duration of an elastic impact [s]: t_c = 2.87 (m*^2/(R* E*^2 V))^(1/5) (Timoshenko, Goodier).
 
     ``mass`` m* [kg], ``radius`` R* [m], ``modulus`` E* [Pa], ``speed`` V [m/s].
@@ -28,23 +28,25 @@ def contact_time(mass: float, radius: float, modulus: float, speed: float) -> fl
     return float(2.87 * (mass**2 / (radius * modulus**2 * speed)) ** 0.2)
 
 
-def peak_force(mass: float, radius: float, modulus: float, speed: float) -> float:
-    """Greatest force [N], 4/3 E* sqrt(R*) delta_max^(3/2) (eq. 5); arguments as `contact_time`."""
-    overlap = contact_law.hertz_collision(speed, modulus, radius, mass).overlap_max
-    return float(contact_law.normal_force(overlap, modulus, radius))
+def find_peak_force(mass: float, radius: float, modulus: float, speed: float) -> float:
+    """Greatest force [N], 4/3 E* sqrt(R*) delta_max^(3/2) (eq. 5); arguments as
+    `find_contact_time`.
+    """
+    overlap = contact_law.solve_hertz_collision(speed, modulus, radius, mass).overlap_max
+    return float(contact_law.find_normal_force(overlap, modulus, radius))
 
 
-def mean_overlap(mass: float, radius: float, modulus: float, speed: float) -> float:
+def find_mean_overlap(mass: float, radius: float, modulus: float, speed: float) -> float:
     """Mean overlap [m] of an elastic impact, weighted with the force: 0.8176 delta_max.
 
     1/2 B(7/5, 1/2) delta_max, from dt = d delta/(V sqrt(1 - (delta/delta_max)^(5/2))); arguments
-    as `contact_time`.
+    as `find_contact_time`.
     """
-    deepest = contact_law.hertz_collision(speed, modulus, radius, mass).overlap_max
+    deepest = contact_law.solve_hertz_collision(speed, modulus, radius, mass).overlap_max
     return 0.5 * gamma(1.4) * gamma(0.5) / gamma(1.9) * deepest
 
 
-def sliding_tangential_restitution(
+def find_sliding_restitution(
     tangent: FloatArray, friction: float, restitution: float
 ) -> FloatArray:
     """V_t'/V_t of the centre, 1 - mu (1 + e)/tan(theta): a grain that slides all the time.
@@ -54,22 +56,22 @@ def sliding_tangential_restitution(
     return 1 - friction * (1 + restitution) / tangent
 
 
-def sliding_spin(friction: float, restitution: float) -> float:
+def find_sliding_spin(friction: float, restitution: float) -> float:
     """Spin that sliding adds, 5/2 mu (1 + e), in the unit V_n/R (of two grains: times m*/m)."""
     return 2.5 * friction * (1 + restitution)
 
 
-def sliding_rebound_tangent(tangent: FloatArray, friction: float, restitution: float) -> FloatArray:
+def find_rebound_tangent(tangent: FloatArray, friction: float, restitution: float) -> FloatArray:
     """tan of the contact point's rebound angle, (tan(theta) - 7/2 mu (1 + e))/e.
 
     ``tangent`` is the slip of the contact point before over V_n: V_t/V_n in tests 4 and 5,
     R omega/V_n in test 6.  In units of mu, with e = 1, the rebound angle is that of incidence
     less 7 and the spin 5, the limits of test 5.
     """
-    return (tangent - sliding_begins(friction, restitution)) / restitution
+    return (tangent - find_sliding_start(friction, restitution)) / restitution
 
 
-def sliding_begins(friction: float, restitution: float) -> float:
+def find_sliding_start(friction: float, restitution: float) -> float:
     """tan(theta) from which a rigid sphere slides all the time: 7/2 mu (1 + e)."""
     return 3.5 * friction * (1 + restitution)
 
@@ -100,13 +102,13 @@ LAW_OF_ENGINE = {
 """The law that a scene gets: docs/contact-law.md."""
 
 
-def law_of(engine: str, law: str) -> Law:
+def find_law(engine: str, law: str) -> Law:
     """An engine's law under a name of `validation.studies.contact_law.engine_runs.LAWS`."""
     own = LAW_OF_ENGINE[engine]
-    return Law(own.rule, own.pulls and law_pulls(law), own.damping if law_damps(law) else "none")
+    return Law(own.rule, own.pulls and can_pull(law), own.damping if has_damping(law) else "none")
 
 
-def friction_impulse(
+def integrate_impulse(
     slip: FloatArray,
     friction: float,
     restitution: float,
@@ -123,9 +125,9 @@ def friction_impulse(
     overlap_max = 1.25**0.4  # of m* = V = 1 and F_n = delta^(3/2)
     dt = CONTACT_TIME_FACTOR * overlap_max / steps
     if law.pulls:
-        damping = 2 * DAMPING_FACTOR * contact_law.alpha_of_restitution(restitution)
+        damping = 2 * DAMPING_FACTOR * contact_law.find_alpha(restitution)
     else:
-        damping = 2 * contact_law.damping_of_rebound(restitution)
+        damping = 2 * contact_law.find_rebound_damping(restitution)
     slip = np.array(slip, dtype=float)
     spring, stretch, impulse = (np.zeros_like(slip) for _ in range(3))
     overlap, speed, root = 0.5 * dt, 1.0, 0.0
@@ -159,12 +161,12 @@ def friction_impulse(
     return impulse
 
 
-def pull_factor(restitution: float) -> float:
+def find_pull_factor(restitution: float) -> float:
     """Integral of |F_n| over that of F_n, for eq. 7, whose contacts pull before they part.
 
     Friction mu |F_n| makes the impulse of a grain that slides larger than mu (1 + e) V_n by it.
     1.067 for e = 0.5, 1.0001 for e = 0.98.
     """
-    ratio = DAMPING_FACTOR * contact_law.alpha_of_restitution(restitution)
-    kept = contact_law.collision(1.0, 1.0, 1.0, 1.0, ratio, may_pull=False).restitution
+    ratio = DAMPING_FACTOR * contact_law.find_alpha(restitution)
+    kept = contact_law.solve_collision(1.0, 1.0, 1.0, 1.0, ratio, may_pull=False).restitution
     return (1 + 2 * kept - restitution) / (1 + restitution)

@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from adapters.bed.contact_law import DAMPING_FACTOR, damping_of_rebound, restitution_of_alpha
+from adapters.bed.contact_law import DAMPING_FACTOR, find_rebound_damping, find_restitution
 from adapters.bed.state import FloatArray
 from adapters.engines.lammps import LammpsEngine
 from adapters.engines.liggghts import LiggghtsEngine
@@ -38,11 +38,11 @@ import bed
 import record
 
 O = Omega()
-parameters = bed.parameters_read()
+parameters = bed.read_parameters()
 start = parameters["impacts"]
-bed.materials_add(parameters)
-bed.grains_add(parameters)
-bed.walls_add(parameters)
+bed.add_materials(parameters)
+bed.add_grains(parameters)
+bed.add_walls(parameters)
 count = parameters["grain_count"]
 states = [O.bodies[number].state for number in range(count)]
 for state, velocity, spin, share in zip(
@@ -50,13 +50,13 @@ for state, velocity, spin, share in zip(
 ):
     state.vel, state.angVel = Vector3(*velocity), Vector3(*spin)
     state.mass, state.inertia = state.mass * share, state.inertia * share
-bed.engines_set(parameters)
+bed.set_engines(parameters)
 dumps = record.Dumps(parameters)
 force = open("force.txt", "w")
 
 
 def frame():
-    bed.forces_renew()
+    bed.renew_forces()
     dumps.frame()
     np.savetxt(force, [O.forces.f(number, True) for number in range(count)], fmt="%.17g")
 
@@ -66,7 +66,7 @@ for _ in range(start["steps"]):
     O.step()
     if O.iter % start["every"] == 0:
         frame()
-record.scene_save()
+record.save_scene()
 force.close()
 print(f"COMPLETE step {O.iter}", flush=True)
 """
@@ -113,34 +113,34 @@ LAWS = ("scene", "unpulled", "undamped", "sliding")
 tangent; and without both, as rigid bodies' limits have it."""
 
 
-def law_pulls(law: str) -> bool:
+def can_pull(law: str) -> bool:
     """Whether a parting contact pulls, where its engine lets it."""
     return law in ("scene", "undamped")
 
 
-def law_damps(law: str) -> bool:
+def has_damping(law: str) -> bool:
     """Whether a viscous force acts along the tangent."""
     return law in ("scene", "unpulled")
 
 
-def restitution_given(engine: str, law: str, restitution: float) -> float:
+def choose_restitution(engine: str, law: str, restitution: float) -> float:
     """Restitution to write into the scene, so that the engine rebounds with ``restitution``.
 
     Another one where a law that never pulls runs on an engine whose damping is made for one that
     does.
     """
-    if law_pulls(law) or engine == "yade" or restitution == 1:
+    if can_pull(law) or engine == "yade" or restitution == 1:
         return restitution
-    return restitution_of_alpha(damping_of_rebound(restitution) / DAMPING_FACTOR)
+    return find_restitution(find_rebound_damping(restitution) / DAMPING_FACTOR)
 
 
-def law_text(engine: str, law: str, text: str) -> str:
+def edit_law(engine: str, law: str, text: str) -> str:
     """A scene's generated text under a law of `LAWS`.
 
     Under eq. 7 as engines take it a parting contact pulls, and its friction then adds to the
     impulse; and a viscous force beside the Coulomb limit adds more.
     """
-    pulls, damps = law_pulls(law), law_damps(law)
+    pulls, damps = can_pull(law), has_damping(law)
     if engine == "liggghts":
         settings = " tangential_damping off" * (not damps) + " limitForce on" * (not pulls)
         pair = "pair_style gran model ${contact_model}"
@@ -155,7 +155,7 @@ def law_text(engine: str, law: str, text: str) -> str:
     return text if damps else re.sub(r'("damping_tangential": )[^,}]+', r"\g<1>0.0", text)
 
 
-def grains_data_started(text: str, start: Start) -> str:
+def add_starts(text: str, start: Start) -> str:
     """``grains.data`` with densities scaled, and a section of velocities and spins."""
     head, atoms = text.split("Atoms\n\n")
     rows = [row.split() for row in atoms.splitlines()]
@@ -189,7 +189,7 @@ def run_by_deck(
             height = float(start.position[:, 2].max())
             digests = engine.write_preparation(scene, start.position, start.radius, height, folder)
             data = folder / "grains.data"
-            data.write_text(grains_data_started(data.read_text(), start))
+            data.write_text(add_starts(data.read_text(), start))
             scene_part = folder / "scene.in"
             scene_part.write_text(edit(scene_part.read_text()))
             lines = f"fix motion grains nve/sphere\nrun {steps}"
@@ -238,12 +238,12 @@ def run_by_script(edit: Callable[[str], str]) -> ImpactRun:
     return run
 
 
-def impact_run(name: str, law: str = "scene") -> ImpactRun:
+def choose_run(name: str, law: str = "scene") -> ImpactRun:
     """The run on the engine ``liggghts``, ``lammps`` or ``yade``, under a law of `LAWS`.
 
     Each raises as its engine does.
     """
-    edit = partial(law_text, name, law)
+    edit = partial(edit_law, name, law)
     if name == "yade":
         return run_by_script(edit)
     if name == "lammps":

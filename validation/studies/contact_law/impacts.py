@@ -10,8 +10,8 @@ import numpy as np
 from adapters.bed import contact_law
 from adapters.bed.state import FloatArray
 from adapters.scene.tables import Scene
-from validation.bench.few_grains import table_1
-from validation.studies.contact_law.engine_runs import Motion, Start, impact_run, restitution_given
+from validation.bench.few_grains import load_table_1
+from validation.studies.contact_law.engine_runs import Motion, Start, choose_restitution, choose_run
 from validation.studies.contact_law.settings import RIGID, STEPS, Setting
 
 GAP_STEPS = 2.25
@@ -35,7 +35,7 @@ class Pair:
     """m* [kg]."""
 
 
-def pair_of(setting: Setting) -> Pair:
+def find_pair(setting: Setting) -> Pair:
     """E*, G*, R* and m*; a plane has neither compliance nor curvature, and infinite mass."""
     grain = (setting.material.young, setting.material.poisson)
     mass = 4 / 3 * pi * setting.radius**3 * setting.material.density
@@ -48,18 +48,18 @@ def pair_of(setting: Setting) -> Pair:
         ratio = (setting.partner_radius / setting.radius) ** 3 * setting.partner_mass_factor
         effective = 1 / (1 / mass + 1 / (ratio * mass))
     return Pair(
-        contact_law.equivalent_modulus(*grain, *wall),
-        contact_law.equivalent_shear_modulus(*grain, *wall),
+        contact_law.combine_moduli(*grain, *wall),
+        contact_law.combine_shear_moduli(*grain, *wall),
         radius,
         effective,
     )
 
 
-def scene_of(setting: Setting, restitution: float) -> Scene:
+def make_scene(setting: Setting, restitution: float) -> Scene:
     """A scene of the project with the setting's material, wide enough for all impacts."""
     m, r = setting.material, setting.radius
-    room = 5 * _pitch(setting) * (len(setting.impacts) + 2)
-    return table_1(
+    room = 5 * _find_pitch(setting) * (len(setting.impacts) + 2)
+    return load_table_1(
         f"material.grain.young={m.young!r}",
         f"material.grain.poisson={m.poisson!r}",
         f"material.grain.density={m.density!r}",
@@ -75,28 +75,28 @@ def scene_of(setting: Setting, restitution: float) -> Scene:
     )
 
 
-def _pitch(setting: Setting) -> float:
+def _find_pitch(setting: Setting) -> float:
     return 4 * max(setting.radius, setting.partner_radius or 0.0)
 
 
-def time_step_of(setting: Setting, steps: int = STEPS) -> tuple[float, int]:
+def choose_time_step(setting: Setting, steps: int = STEPS) -> tuple[float, int]:
     """Time step [s], ``steps`` in the shortest contact, and steps until all contacts have ended."""
-    pair = pair_of(setting)
+    pair = find_pair(setting)
     speeds = [impact.normal for impact in setting.impacts]
     times = [
-        contact_law.hertz_collision(v, pair.modulus, pair.radius, pair.mass).contact_time
+        contact_law.solve_hertz_collision(v, pair.modulus, pair.radius, pair.mass).contact_time
         for v in (max(speeds), min(speeds))
     ]
     return times[0] / steps, round(RUN_CONTACTS * times[1] / times[0] * steps)
 
 
-def start_of(setting: Setting, time_step: float) -> Start:
+def place_grains(setting: Setting, time_step: float) -> Start:
     """Grains above their planes or partners; the normal is z, the tangent x, the spin about y.
 
     Spin of an `Impact` is negative about y, so that it slides as a positive velocity does.
     """
     rows: list[tuple[float, float, float, float, float, float, float]] = []
-    pitch = _pitch(setting)
+    pitch = _find_pitch(setting)
     for number, impact in enumerate(setting.impacts, 1):
         steps = GAP_STEPS + (number - 1) / len(setting.impacts)
         gap = steps * impact.normal * time_step
@@ -123,17 +123,17 @@ def start_of(setting: Setting, time_step: float) -> Start:
     )
 
 
-def motion_of(
+def run_impacts(
     setting: Setting, engine: str, law: str = "scene", *, steps: int = STEPS, every: int = 0
 ) -> Motion:
     """Run all impacts of a setting on an engine, under a law of `engine_runs.LAWS`.
 
     ``steps`` in the shortest contact; ``every`` steps between instants, 0 for the two ends only.
     """
-    time_step, count = time_step_of(setting, steps)
-    start = start_of(setting, time_step)
-    scene = scene_of(setting, restitution_given(engine, law, setting.restitution))
-    return impact_run(engine, law)(scene, start, time_step, count, every or count)
+    time_step, count = choose_time_step(setting, steps)
+    start = place_grains(setting, time_step)
+    scene = make_scene(setting, choose_restitution(engine, law, setting.restitution))
+    return choose_run(engine, law)(scene, start, time_step, count, every or count)
 
 
 @dataclass(frozen=True)
@@ -154,9 +154,9 @@ class Rebound:
     """Momentum that two grains lost or gained over the greatest of one; 0 for planes."""
 
 
-def rebound_of(setting: Setting, motion: Motion) -> Rebound:
+def measure_rebound(setting: Setting, motion: Motion) -> Rebound:
     """Restitution, slip, friction impulse, spin of each impact, from the first and last frame."""
-    pair, start = pair_of(setting), motion.velocity[0]
+    pair, start = find_pair(setting), motion.velocity[0]
     mass = 4 / 3 * pi * setting.radius**3 * setting.material.density
     normal = np.array([impact.normal for impact in setting.impacts])
     velocity, spin = motion.velocity[[0, -1]], motion.spin[[0, -1], :, 1]

@@ -19,49 +19,49 @@ COLOURS = {"liggghts": "#0072B2", "lammps": "#E69F00", "yade": "#009E73"}
 Line = tuple[str, str, str, str, Callable[[Sequence[float]], str]]
 
 
-def tell_greatest(values: Sequence[float]) -> str:
+def format_most(values: Sequence[float]) -> str:
     """The value farthest from zero, without its sign, in per cent of two digits."""
     return f"{100 * max(map(abs, values)):.2g} %"
 
 
-def tell_span(values: Sequence[float]) -> str:
+def format_span(values: Sequence[float]) -> str:
     """Least to greatest, without sign, in per cent."""
     sizes = [100 * abs(value) for value in values]
     low, high = f"{min(sizes):.1f}", f"{max(sizes):.1f}"
     return f"{low} %" if low == high else f"{low} to {high} %"
 
 
-def tell_least(values: Sequence[float]) -> str:
+def format_least(values: Sequence[float]) -> str:
     """The least of them."""
     return f"{min(values):.2f}"
 
 
 ACCURACY: tuple[Line, ...] = (
-    ("1, 2", "overlap, force", "1 %", r"test [12], .*: greatest (overlap|force)$", tell_greatest),
-    ("1, 2", "contact time (its factor 2.87 is rounded)", "1 %", r": contact time$", tell_greatest),
-    ("3", "restitution, e = 0.2 to 1", "1 %", r"test 3, [^=]*: restitution$", tell_greatest),
-    ("4 to 8", "sliding limit: impulse", "2 %", r"sliding limit, impulse$", tell_greatest),
+    ("1, 2", "overlap, force", "1 %", r"test [12], .*: greatest (overlap|force)$", format_most),
+    ("1, 2", "contact time (its factor 2.87 is rounded)", "1 %", r": contact time$", format_most),
+    ("3", "restitution, e = 0.2 to 1", "1 %", r"test 3, [^=]*: restitution$", format_most),
+    ("4 to 8", "sliding limit: impulse", "2 %", r"sliding limit, impulse$", format_most),
     (
         "4 to 8", "sliding limit: e_t, spin, rebound angle", "2 %",
-        r"sliding limit, (e_t|spin|rebound angle)$", tell_greatest,
+        r"sliding limit, (e_t|spin|rebound angle)$", format_most,
     ),
-    ("4 to 8", "sticking and between: its own rule", "2 %", r"its own rule$", tell_greatest),
+    ("4 to 8", "sticking and between: its own rule", "2 %", r"its own rule$", format_most),
     (
         "4 to 8", "all impulses, a scene's law integrated", "2 %",
-        r"under the scene law, integrated$", tell_greatest,
+        r"under the scene law, integrated$", format_most,
     ),
     ("7, 8", "momentum", "1e-12", r": momentum$", lambda v: f"{max(v):.0e}"),
-    ("3", "order in the step, e = 0.2", "0.9", r"e = 0\.2: order", tell_least),
-    ("3", "order in the step, e = 1", "2.4", r"e = 1\.0: order", tell_least),
-    ("5", "order in the step, friction", "0.9", r"test 5, .*order .*friction$", tell_least),
-    ("6", "order in the step, a scene's law", "0.9", r"test 6, .*order .*friction$", tell_least),
+    ("3", "order in the step, e = 0.2", "0.9", r"e = 0\.2: order", format_least),
+    ("3", "order in the step, e = 1", "2.4", r"e = 1\.0: order", format_least),
+    ("5", "order in the step, friction", "0.9", r"test 5, .*order .*friction$", format_least),
+    ("6", "order in the step, a scene's law", "0.9", r"test 6, .*order .*friction$", format_least),
 )  # fmt: skip
 """Test, quantity, bar, pattern of the checks' names, how their values are written."""
 UNDER = "sliding limit, impulse, under the"
 GAP: tuple[Line, ...] = (
-    ("6 to 8", "as a scene has it", "", rf"test [678], .*{UNDER} scene law$", tell_span),
-    ("6", "nothing pulls", "", rf"{UNDER} unpulled law$", tell_span),
-    ("6", "no tangential damping", "", rf"{UNDER} undamped law$", tell_span),
+    ("6 to 8", "as a scene has it", "", rf"test [678], .*{UNDER} scene law$", format_span),
+    ("6", "nothing pulls", "", rf"{UNDER} unpulled law$", format_span),
+    ("6", "no tangential damping", "", rf"{UNDER} undamped law$", format_span),
 )
 
 

@@ -16,18 +16,18 @@ from adapters.bed.state import FloatArray
 from adapters.engines.contract import get_engine
 from validation.case import Check
 from validation.studies.contact_law.closed_forms import (
-    contact_time,
-    friction_impulse,
-    law_of,
-    mean_overlap,
-    peak_force,
-    pull_factor,
-    sliding_begins,
-    sliding_rebound_tangent,
-    sliding_spin,
-    sliding_tangential_restitution,
+    find_contact_time,
+    find_law,
+    find_mean_overlap,
+    find_peak_force,
+    find_pull_factor,
+    find_rebound_tangent,
+    find_sliding_restitution,
+    find_sliding_spin,
+    find_sliding_start,
+    integrate_impulse,
 )
-from validation.studies.contact_law.impacts import Rebound, motion_of, pair_of, rebound_of
+from validation.studies.contact_law.impacts import Rebound, find_pair, measure_rebound, run_impacts
 from validation.studies.contact_law.settings import (
     NORMAL,
     RESTITUTION,
@@ -67,12 +67,12 @@ LEVER = {"liggghts": 0.5, "lammps": 0.0, "yade": 1.0}
 """By how many overlaps the lever of a friction force is shorter than R, on a plane."""
 
 
-def within(name: str, error: float, bar: float) -> Check:
+def check_max(name: str, error: float, bar: float) -> Check:
     """A relative error against its bar."""
     return Check(name, error, f"<= {bar:g}", error <= bar)
 
 
-def reported(name: str, value: float, why: str) -> Check:
+def report(name: str, value: float, why: str) -> Check:
     """A figure without a bar, and why it has none."""
     return Check(name, value, f"none: {why}", ok=True)
 
@@ -80,14 +80,14 @@ def reported(name: str, value: float, why: str) -> Check:
 # --- tests 1 and 2: force, overlap, time ------------------------------------------------------
 
 
-def hertz_followed(setting: Setting, engine: str) -> tuple[FloatArray, FloatArray]:
+def follow_hertz(setting: Setting, engine: str) -> tuple[FloatArray, FloatArray]:
     """Greatest overlap [m], greatest force [N], contact time [s], error of the force-overlap curve.
 
     Also what Hertz gives for them, shape (4,) each; the last is the greatest distance from
     F = 4/3 E* sqrt(R*) delta^(3/2) over the greatest force.
     """
-    pair, speed = pair_of(setting), setting.impacts[0].normal
-    motion = motion_of(setting, engine, every=1)
+    pair, speed = find_pair(setting), setting.impacts[0].normal
+    motion = run_impacts(setting, engine, every=1)
     height = motion.position[:, -1, 2]
     if setting.partner_radius is None:
         overlap = setting.radius - height
@@ -99,21 +99,23 @@ def hertz_followed(setting: Setting, engine: str) -> tuple[FloatArray, FloatArra
         motion.time[i] - overlap[i] * (motion.time[j] - motion.time[i]) / (overlap[j] - overlap[i])
         for i, j in ((touching[0], touching[0] - 1), (touching[-1], touching[-1] + 1))
     ]
-    curve = contact_law.normal_force(overlap, pair.modulus, pair.radius)
+    curve = contact_law.find_normal_force(overlap, pair.modulus, pair.radius)
     law = (pair.mass, pair.radius, pair.modulus, speed)
-    deepest = contact_law.hertz_collision(speed, pair.modulus, pair.radius, pair.mass).overlap_max
+    deepest = contact_law.solve_hertz_collision(
+        speed, pair.modulus, pair.radius, pair.mass
+    ).overlap_max
     distance = float(np.abs(force - curve).max() / force.max())
     found = np.array([overlap.max(), force.max(), ends[1] - ends[0], distance])
-    return found, np.array([deepest, peak_force(*law), contact_time(*law), 0.0])
+    return found, np.array([deepest, find_peak_force(*law), find_contact_time(*law), 0.0])
 
 
-def normal_checks(setting: Setting, engine: str) -> list[Check]:
+def check_normal(setting: Setting, engine: str) -> list[Check]:
     """Tests 1 and 2 of one material against Hertz."""
-    found, hertz = hertz_followed(setting, engine)
+    found, hertz = follow_hertz(setting, engine)
     errors = [*np.abs(found[:3] / hertz[:3] - 1), found[3]]
     names = ("greatest overlap", "greatest force", "contact time", "force-displacement curve")
     return [
-        within(f"{engine}, {setting.label}: {name}", float(error), TOLERANCE_HERTZ)
+        check_max(f"{engine}, {setting.label}: {name}", float(error), TOLERANCE_HERTZ)
         for name, error in zip(names, errors, strict=True)
     ]
 
@@ -121,26 +123,26 @@ def normal_checks(setting: Setting, engine: str) -> list[Check]:
 # --- test 3: restitution ----------------------------------------------------------------------
 
 
-def restitution_checks(settings: Sequence[Setting], engine: str) -> list[Check]:
+def check_restitution(settings: Sequence[Setting], engine: str) -> list[Check]:
     """Test 3: what rebounds over what was asked for, the worst of the settings of a material."""
     errors: dict[str, float] = {}
     for setting in settings:
-        found = float(rebound_of(setting, motion_of(setting, engine)).restitution[0])
+        found = float(measure_rebound(setting, run_impacts(setting, engine)).restitution[0])
         error = abs(found / setting.restitution - 1)
         errors[setting.label] = max(error, errors.get(setting.label, 0.0))
     return [
-        within(f"{engine}, {label}: restitution", error, TOLERANCE_HERTZ)
+        check_max(f"{engine}, {label}: restitution", error, TOLERANCE_HERTZ)
         for label, error in errors.items()
     ]
 
 
-def order_check(engine: str, restitution: float) -> Check:
+def check_order(engine: str, restitution: float) -> Check:
     """Least order of the restitution's error in the step, from halving it twice (test 3)."""
     impacts = ORDER_PHASES * TEST_3.impacts
     setting = replace(TEST_3, restitution=restitution, impacts=impacts)
     errors = []
     for steps in ORDER_STEPS:
-        found = rebound_of(setting, motion_of(setting, engine, steps=steps)).restitution
+        found = measure_rebound(setting, run_impacts(setting, engine, steps=steps)).restitution
         errors.append(np.sqrt(np.mean((found / restitution - 1) ** 2)))
     order = float(np.log2(np.divide(errors[:-1], errors[1:])).min())
     name = f"{engine}, test 3, e = {restitution}: order of convergence in the step"
@@ -148,10 +150,10 @@ def order_check(engine: str, restitution: float) -> Check:
     return Check(name, order, f">= {least:g}", order >= least)
 
 
-def tangential_order_check(engine: str, setting: Setting, law: str) -> Check:
+def check_tangential_order(engine: str, setting: Setting, law: str) -> Check:
     """Mean order of the friction impulses in the step, from how far each halving moves them."""
     found = [
-        rebound_of(setting, motion_of(setting, engine, law, steps=steps)).friction_impulse
+        measure_rebound(setting, run_impacts(setting, engine, law, steps=steps)).friction_impulse
         for steps in TANGENTIAL_STEPS
     ]
     moves = [float(np.sqrt(np.mean((b - a) ** 2))) for a, b in pairwise(found)]
@@ -160,11 +162,11 @@ def tangential_order_check(engine: str, setting: Setting, law: str) -> Check:
     return Check(name, order, f">= {TANGENTIAL_ORDER:g}", order >= TANGENTIAL_ORDER)
 
 
-def tangential_order_checks(engine: str) -> list[Check]:
+def check_tangential_orders(engine: str) -> list[Check]:
     """Elastic impacts, and damped ones under the law that a scene gets."""
     return [
-        tangential_order_check(engine, TEST_5, "sliding"),
-        tangential_order_check(engine, TEST_6, "scene"),
+        check_tangential_order(engine, TEST_5, "sliding"),
+        check_tangential_order(engine, TEST_6, "scene"),
     ]
 
 
@@ -173,114 +175,115 @@ def tangential_order_checks(engine: str) -> list[Check]:
 
 def slides(setting: Setting, rebound: Rebound) -> BoolArray:
     """Which impacts must end at the sliding limit."""
-    begins = SLIDES_FROM * sliding_begins(setting.friction, setting.restitution)
+    begins = SLIDES_FROM * find_sliding_start(setting.friction, setting.restitution)
     return np.abs(rebound.slip_before) >= begins
 
 
-def farthest(found: FloatArray, limit: FloatArray | float) -> float:
+def find_farthest(found: FloatArray, limit: FloatArray | float) -> float:
     """The greatest relative error, with its sign."""
     error = found / limit - 1
     return float(error[np.abs(error).argmax()])
 
 
-def sliding_impulse_error(setting: Setting, rebound: Rebound) -> float:
+def find_impulse_error(setting: Setting, rebound: Rebound) -> float:
     """Error of the friction impulse against mu (1 + e) m* V_n, of the impact farthest off."""
     chosen = slides(setting, rebound)
     limit = setting.friction * (1 + setting.restitution)
-    return farthest(rebound.friction_impulse[chosen], limit)
+    return find_farthest(rebound.friction_impulse[chosen], limit)
 
 
-def sliding_checks(setting: Setting, engine: str, rebound: Rebound) -> list[Check]:
+def check_sliding(setting: Setting, engine: str, rebound: Rebound) -> list[Check]:
     """Friction impulse, tangential restitution, spin and rebound angle of what slides all the time.
 
     Spin and angle are those of a lever R.  An engine that takes R - l delta gives, for an elastic
-    impact, l times the `mean_overlap` over R less: where that is beyond the bar, the row says so.
+    impact, l times the `find_mean_overlap` over R less: where that is beyond the bar, the row says
+    so.
     """
     mu, e = setting.friction, setting.restitution
     name, chosen = f"{engine}, {setting.label}: sliding limit", slides(setting, rebound)
     before, after = rebound.slip_before[chosen], rebound.slip_after[chosen]
-    impulse = sliding_impulse_error(setting, rebound)
-    checks = [within(f"{name}, impulse", abs(impulse), TOLERANCE_SLIDING)]
+    impulse = find_impulse_error(setting, rebound)
+    checks = [check_max(f"{name}, impulse", abs(impulse), TOLERANCE_SLIDING)]
     if setting.impacts[0].tangential:
         kept = 1 - rebound.friction_impulse[chosen] / before
-        error = farthest(kept, sliding_tangential_restitution(before, mu, e))
-        checks.append(within(f"{name}, e_t", abs(error), TOLERANCE_SLIDING))
+        error = find_farthest(kept, find_sliding_restitution(before, mu, e))
+        checks.append(check_max(f"{name}, e_t", abs(error), TOLERANCE_SLIDING))
     errors = {
-        "spin": farthest(rebound.spin_gained[chosen], sliding_spin(mu, e)),
-        "rebound angle": farthest(
-            np.arctan(after / e), np.arctan(sliding_rebound_tangent(before, mu, e))
+        "spin": find_farthest(rebound.spin_gained[chosen], find_sliding_spin(mu, e)),
+        "rebound angle": find_farthest(
+            np.arctan(after / e), np.arctan(find_rebound_tangent(before, mu, e))
         ),
     }
-    pair, speed = pair_of(setting), max(impact.normal for impact in setting.impacts)
-    depth = mean_overlap(pair.mass, pair.radius, pair.modulus, speed) / setting.radius
+    pair, speed = find_pair(setting), max(impact.normal for impact in setting.impacts)
+    depth = find_mean_overlap(pair.mass, pair.radius, pair.modulus, speed) / setting.radius
     short = LEVER[engine] * depth
     if setting.partner_radius is not None or e < 1 or short < TOLERANCE_SLIDING:
         return checks + [
-            within(f"{name}, {what}", abs(error), TOLERANCE_SLIDING)
+            check_max(f"{name}, {what}", abs(error), TOLERANCE_SLIDING)
             for what, error in errors.items()
         ]
     lever = f"R - {LEVER[engine]:g} delta"
     checks += [
-        reported(f"{name}, {what}", error, f"its lever is {lever}, rigid bodies' is R")
+        report(f"{name}, {what}", error, f"its lever is {lever}, rigid bodies' is R")
         for what, error in errors.items()
     ]
     error = abs(errors["spin"] + short)
-    return [*checks, within(f"{name}, spin, lever {lever}", error, TOLERANCE_SLIDING)]
+    return [*checks, check_max(f"{name}, spin, lever {lever}", error, TOLERANCE_SLIDING)]
 
 
-def own_law_error(setting: Setting, rebound: Rebound, engine: str, law: str) -> float:
+def find_law_error(setting: Setting, rebound: Rebound, engine: str, law: str) -> float:
     """Greatest distance from the engine's own law, sticking and sliding, over mu (1 + e)."""
-    pair = pair_of(setting)
-    expected = friction_impulse(
+    pair = find_pair(setting)
+    expected = integrate_impulse(
         rebound.slip_before,
         setting.friction,
         setting.restitution,
         6 * pair.shear / pair.modulus,
-        law_of(engine, law),
+        find_law(engine, law),
     )
     limit = setting.friction * (1 + setting.restitution)
     return float(np.abs(rebound.friction_impulse - expected).max() / limit)
 
 
-def sticking_error(setting: Setting, rebound: Rebound, engine: str) -> float:
-    """`own_law_error` without pull and tangential damping: what the spring's rule alone gives."""
-    return own_law_error(setting, rebound, engine, "sliding")
+def judge_sticking(setting: Setting, rebound: Rebound, engine: str) -> float:
+    """`find_law_error` without pull and tangential damping: what the spring's rule alone gives."""
+    return find_law_error(setting, rebound, engine, "sliding")
 
 
-def tangential_checks(setting: Setting, engine: str, impulses: Impulses) -> list[Check]:
+def check_tangential(setting: Setting, engine: str, impulses: Impulses) -> list[Check]:
     """Tests 4 to 8 of one material: sliding and sticking limits, spin, momentum; eq. 7's excess."""
     name, bar = f"{engine}, {setting.label}", TOLERANCE_SLIDING
-    rebound = rebound_of(setting, motion_of(setting, engine, "sliding"))
+    rebound = measure_rebound(setting, run_impacts(setting, engine, "sliding"))
     impulses[setting.label] = rebound.friction_impulse.tolist()
     checks = [
-        *sliding_checks(setting, engine, rebound),
-        within(f"{name}: sticking, its own rule", sticking_error(setting, rebound, engine), bar),
+        *check_sliding(setting, engine, rebound),
+        check_max(f"{name}: sticking, its own rule", judge_sticking(setting, rebound, engine), bar),
     ]
     if setting.partner_radius is not None:
-        checks.append(within(f"{name}: momentum", rebound.momentum_error, 1e-12))
-    scene = rebound_of(setting, motion_of(setting, engine))
-    checks.append(scene_law_check(setting, engine, "scene", scene))
+        checks.append(check_max(f"{name}: momentum", rebound.momentum_error, 1e-12))
+    scene = measure_rebound(setting, run_impacts(setting, engine))
+    checks.append(check_scene_law(setting, engine, "scene", scene))
     name = f"{name}: sliding limit, impulse, under the scene law"
-    excess = sliding_impulse_error(setting, scene)
+    excess = find_impulse_error(setting, scene)
     if setting.restitution > 0.9:
-        return [*checks, within(name, abs(excess), bar)]
-    why = f"eq. 7 pulls, {pull_factor(setting.restitution) - 1:.3f}; "
+        return [*checks, check_max(name, abs(excess), bar)]
+    why = f"eq. 7 pulls, {find_pull_factor(setting.restitution) - 1:.3f}; "
     why += {
         "lammps": "nothing else",
         "liggghts": "viscous force beyond the Coulomb limit",
         "yade": "no pull, but viscous force beyond the Coulomb limit",
     }[engine]
-    return [*checks, reported(name, excess, why)]
+    return [*checks, report(name, excess, why)]
 
 
-def scene_law_check(setting: Setting, engine: str, law: str, rebound: Rebound) -> Check:
+def check_scene_law(setting: Setting, engine: str, law: str, rebound: Rebound) -> Check:
     """All friction impulses against the engine's own law, pull and damping with it, integrated."""
-    error = own_law_error(setting, rebound, engine, law)
+    error = find_law_error(setting, rebound, engine, law)
     name = f"{engine}, {setting.label}: all impulses under the {law} law, integrated"
-    return within(name, error, TOLERANCE_SLIDING)
+    return check_max(name, error, TOLERANCE_SLIDING)
 
 
-def closing_checks(engine: str) -> list[Check]:
+def check_closing(engine: str) -> list[Check]:
     """Test 6 without pull, or without tangential damping: what each adds to a sliding impulse.
 
     With the setting that closes the gap the bar of the sliding limit holds: LIGGGHTS needs both
@@ -289,36 +292,36 @@ def closing_checks(engine: str) -> list[Check]:
     closes = {"lammps": "unpulled", "yade": "undamped"}.get(engine)
     checks = []
     for law in ("unpulled", "undamped"):
-        rebound = rebound_of(TEST_6, motion_of(TEST_6, engine, law))
-        checks.append(scene_law_check(TEST_6, engine, law, rebound))
-        excess = sliding_impulse_error(TEST_6, rebound)
+        rebound = measure_rebound(TEST_6, run_impacts(TEST_6, engine, law))
+        checks.append(check_scene_law(TEST_6, engine, law, rebound))
+        excess = find_impulse_error(TEST_6, rebound)
         name = f"{engine}, {TEST_6.label}: sliding limit, impulse, under the {law} law"
         if law == closes:
-            checks.append(within(name, abs(excess), TOLERANCE_SLIDING))
+            checks.append(check_max(name, abs(excess), TOLERANCE_SLIDING))
         else:
-            checks.append(reported(name, excess, "one of two settings, not the one that closes it"))
+            checks.append(report(name, excess, "one of two settings, not the one that closes it"))
     return checks
 
 
-def lever_check(setting: Setting, engine: str) -> Check:
+def check_lever(setting: Setting, engine: str) -> Check:
     """A lever shorter than R is no error of the step: what a quarter of it changes in the spin."""
     coarse, fine = (
-        rebound_of(setting, motion_of(setting, engine, "sliding", steps=steps))
+        measure_rebound(setting, run_impacts(setting, engine, "sliding", steps=steps))
         for steps in (STEPS, 4 * STEPS)
     )
     change = float(np.abs(fine.spin_gained / coarse.spin_gained - 1)[slides(setting, fine)].max())
-    return within(f"{engine}, {setting.label}: spin at a quarter of the step", change, 1e-4)
+    return check_max(f"{engine}, {setting.label}: spin at a quarter of the step", change, 1e-4)
 
 
 def measure_engine(engine: str) -> Row:
     """All tests on one engine: every check, and the friction impulses of tests 4 to 8."""
     impulses: Impulses = {}
-    checks = [c for s in NORMAL for c in normal_checks(s, engine)]
-    checks += restitution_checks(RESTITUTION, engine)
-    checks += [order_check(engine, restitution) for restitution in ORDERS]
-    checks += tangential_order_checks(engine)
-    checks += [c for s in TANGENTIAL for c in tangential_checks(s, engine, impulses)]
-    checks += [*closing_checks(engine), lever_check(TANGENTIAL[3], engine)]
+    checks = [c for s in NORMAL for c in check_normal(s, engine)]
+    checks += check_restitution(RESTITUTION, engine)
+    checks += [check_order(engine, restitution) for restitution in ORDERS]
+    checks += check_tangential_orders(engine)
+    checks += [c for s in TANGENTIAL for c in check_tangential(s, engine, impulses)]
+    checks += [*check_closing(engine), check_lever(TANGENTIAL[3], engine)]
     rows = [
         {"name": check.name, "value": check.value, "bar": check.bar, "ok": bool(check.ok)}
         for check in checks

@@ -84,7 +84,7 @@ NYLON = Material("nylon", 2.5e9, 0.40, 1000.0)
 COPPER = Material("copper", 120e9, 0.35, 8900.0)
 
 
-def oblique(speed: float, degrees: float) -> Impact:
+def make_oblique(speed: float, degrees: float) -> Impact:
     """A grain without spin that arrives ``degrees`` from the normal at ``speed`` [m/s]."""
     return Impact(speed * cos(radians(degrees)), speed * sin(radians(degrees)))
 
@@ -96,7 +96,7 @@ TEST_4 = Setting(
     4,
     OXIDE,
     2.5e-3,
-    tuple(oblique(3.9, degrees) for degrees in range(5, 90, 5)),
+    tuple(make_oblique(3.9, degrees) for degrees in range(5, 90, 5)),
     restitution=0.98,
     friction=0.092,
 )

@@ -13,11 +13,11 @@ from validation.studies.engines.reading import (
     JUDGED,
     LEVEL,
     TITLES,
-    by_way,
-    median_speed,
+    find_median_speed,
+    group_by_way,
     pair,
 )
-from validation.study import mean_interval
+from validation.study import estimate_mean
 
 PAGE = "docs/engines.md"
 SAME_WORK = 0.01
@@ -28,13 +28,13 @@ HEAVY = "liggghts, piston of 0.1 kg"
 
 def check_bars(rows: Sequence[dict[str, Any]]) -> list[Check]:
     """Failed runs, differences that are real, contacts of the timed beds, speeds."""
-    runs = by_way(rows)
+    runs = group_by_way(rows)
     failed = [row for row in rows if not row.get("ok", True) and row["way"] != HEAVY]
     checks = [Check("runs that failed and are not known to", len(failed), "<= 0", not failed)]
     for first, second in combinations(ENGINES, 2):
         for key in JUDGED:
             words, factor, _ = FIGURES[key]
-            mean, half = mean_interval(pair(runs, second, first, key) * factor, LEVEL)
+            mean, half = estimate_mean(pair(runs, second, first, key) * factor, LEVEL)
             name = f"{TITLES[second]} less {TITLES[first]}: {words}"
             bar = f"<= {half:.3g}"
             checks.append(Check(name, abs(mean), bar, abs(mean) <= half, page=PAGE))
@@ -45,7 +45,7 @@ def check_bars(rows: Sequence[dict[str, Any]]) -> list[Check]:
         name = f"{grains:,} grains: contacts a grain, greatest difference of two engines"
         checks.append(Check(name, apart, f"<= {SAME_WORK:g}", apart <= SAME_WORK, page=PAGE))
         for engine in ENGINES:
-            speed = median_speed(rows, engine, grains)[0] / 1e6
+            speed = find_median_speed(rows, engine, grains)[0] / 1e6
             name = f"{TITLES[engine]}, {grains:,} grains: million grain-steps a CPU second"
             checks.append(Check(name, speed, "measured", speed > 0, page=PAGE))
     return checks

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from adapters.bed.overlaps import neighbours
-from adapters.bed.radii import sample_radii
+from adapters.bed.overlaps import find_pairs
+from adapters.bed.radii import draw_radii
 from adapters.bed.sample import (
     SURFACE_SHARE,
     draw_sample_start,
     measure_bed_height,
-    relative_density,
+    measure_relative_density,
 )
 from adapters.bed.state import FloatArray
 from adapters.engines.contract import Engine, EngineStart, get_engine
@@ -22,7 +22,7 @@ from adapters.files.window import Window, read_state, read_window
 from adapters.procedure.checks import check_state, check_window
 from adapters.scene.file import load_scene
 from adapters.scene.tables import Scene
-from trackbed.scenes import scene_path
+from trackbed.scenes import find_scene_file
 
 CYCLES = 50
 SETTINGS = ("material.grain.young=1e9",)
@@ -55,13 +55,13 @@ class Way:
     aside: float = 0.0
     """By how much the first grain starts aside [m]."""
 
-    def made(self) -> Engine:
+    def make_engine(self) -> Engine:
         """The engine itself."""
         return get_engine(self.engine)
 
     def scene(self, seed: int) -> Scene:
         """The scene of the bed of a seed, as this way has it."""
-        return bed_scene(seed, f'engine.name="{self.engine}"', *self.settings)
+        return load_bed(seed, f'engine.name="{self.engine}"', *self.settings)
 
 
 WAYS = (
@@ -100,9 +100,11 @@ class Figures:
     """Settlement after cycles 0, 1, ..., `CYCLES` [m]."""
 
 
-def bed_scene(seed: int, *settings: str) -> Scene:
+def load_bed(seed: int, *settings: str) -> Scene:
     """The coarse scene of a seed under `SETTINGS` and more."""
-    return load_scene(scene_path("karrech-coarse"), [*SETTINGS, f"sample.seed={seed}", *settings])
+    return load_scene(
+        find_scene_file("karrech-coarse"), [*SETTINGS, f"sample.seed={seed}", *settings]
+    )
 
 
 def measure_window(window: Window, start: FloatArray, scene: Scene) -> Figures:
@@ -116,8 +118,8 @@ def measure_window(window: Window, start: FloatArray, scene: Scene) -> Figures:
     walls = scene.container.walls()
     pairs, density = [], []
     for position in window.position[-LAST:]:
-        pairs.append(int((neighbours(position, window.radius, walls).second >= 0).sum()))
-        density.append(relative_density(position, window.radius, scene.container, top))
+        pairs.append(int((find_pairs(position, window.radius, walls).second >= 0).sum()))
+        density.append(measure_relative_density(position, window.radius, scene.container, top))
     deflection = window.piston.elastic_deflection(scene.steps_per_cycle)[-LAST:]
     return Figures(
         settlement=float(curve[-1]),
@@ -130,10 +132,10 @@ def measure_window(window: Window, start: FloatArray, scene: Scene) -> Figures:
     )
 
 
-def rain_bed(seed: int, folder: Path) -> tuple[FloatArray, FloatArray]:
+def pour_bed(seed: int, folder: Path) -> tuple[FloatArray, FloatArray]:
     """Positions (n, 3) and radii (n,) [m] of the settled bed of a seed, by LIGGGHTS' rain."""
-    scene = bed_scene(seed, 'engine.name="liggghts"')
-    radius = sample_radii(scene.sample.grain_radius.law, scene.grain_count, seed)
+    scene = load_bed(seed, 'engine.name="liggghts"')
+    radius = draw_radii(scene.sample.grain_radius.law, scene.grain_count, seed)
     position, height = draw_sample_start(
         radius, scene.container, scene.sample.relative_density_start, seed
     )
@@ -157,7 +159,7 @@ def run_way(
     ``cycles`` load cycles; ``folder`` is made for it.  Raises `EngineFailed`, `NotCredible`,
     `NotConverged`.
     """
-    scene, engine = way.scene(seed), way.made()
+    scene, engine = way.scene(seed), way.make_engine()
     position = start.copy()
     position[0, 0] += way.aside
     settled, loaded = folder / "settled", folder / "loaded"
@@ -176,7 +178,7 @@ def run_way(
     done = engine.run(scene, "in.cycles", loaded, lambda: None, decks)
     window = read_window(loaded, 0, engine.wall_names(scene, piston=True), face)
     check_window(scene, window, cycles)
-    common = bed_scene(seed, 'engine.name="liggghts"')
+    common = load_bed(seed, 'engine.name="liggghts"')
     figures = measure_window(window, start, common if way.engine == "yade" else scene)
     return figures, rest.cpu_s + done.cpu_s
 

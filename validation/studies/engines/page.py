@@ -18,13 +18,13 @@ from validation.studies.engines.reading import (
     LEVEL,
     PAIRS,
     TITLES,
-    by_way,
-    leaves_zero_out,
-    median_speed,
+    excludes_zero,
+    find_median_speed,
+    format_mean,
+    group_by_way,
     pair,
-    tell_mean,
 )
-from validation.study import describe_commits, format_table, mean_interval, summarise_bars
+from validation.study import describe_commits, estimate_mean, format_table, summarise_bars
 
 Row = dict[str, Any]
 COLOURS = {"liggghts": "#0072B2", "lammps": "#E69F00", "yade": "#009E73"}
@@ -39,7 +39,7 @@ def tabulate_engines(runs: dict[str, dict[int, Row]]) -> str:
     lines = []
     for name in ENGINES:
         found = list(runs[name].values())
-        cells = [tell_mean(np.array([row[k] for row in found]), k, signed=False) for k in FIGURES]
+        cells = [format_mean(np.array([row[k] for row in found]), k, signed=False) for k in FIGURES]
         cpu = float(np.median([row["engine_cpu_s"] for row in found]))
         lines.append([TITLES[name], *cells, str(len(found)), f"{cpu:.0f}"])
     words = [words for words, _, _ in FIGURES.values()]
@@ -55,21 +55,21 @@ def tabulate_differences(runs: dict[str, dict[int, Row]]) -> str:
         for key in JUDGED:
             values = pair(runs, way, other, key)
             engines = way in ENGINES and other in ENGINES
-            marked = leaves_zero_out(values, LEVEL if engines else 0.95)
-            text = tell_mean(values, key)
+            marked = excludes_zero(values, LEVEL if engines else 0.95)
+            text = format_mean(values, key)
             cells.append(f"**{text}**" if marked else text)
         early = pair(runs, way, other, "curve")[:, EARLY]
-        text = tell_mean(early, "settlement")
-        cells.append(f"**{text}**" if leaves_zero_out(early) else text)
+        text = format_mean(early, "settlement")
+        cells.append(f"**{text}**" if excludes_zero(early) else text)
         lines.append([words, *cells, str(len(early))])
     head = ["difference", *(FIGURES[key][0] for key in JUDGED)]
     return format_table([*head, f"settlement after {EARLY} cycles, µm", "beds"], lines)
 
 
-def tell_resolution(runs: dict[str, dict[int, Row]]) -> str:
+def describe_resolution(runs: dict[str, dict[int, Row]]) -> str:
     """How small a difference the study can see, and how far a run strays from itself."""
     apart = [1e6 * pair(runs, b, a, "settlement") for a, b in combinations(ENGINES, 2)]
-    halves = [mean_interval(values)[1] for values in apart]
+    halves = [estimate_mean(values)[1] for values in apart]
     scatter = [float(np.std(values, ddof=1)) for values in apart]
     settled = [row["settlement"] for name in ENGINES for row in runs[name].values()]
     mean = 1e6 * float(np.mean(settled))
@@ -90,8 +90,8 @@ def tabulate_speed(rows: Sequence[Row]) -> str:
     lines = []
     for engine in ENGINES:
         for grains in sorted({row["grains"] for row in rows if "speed" in row}):
-            middle, least, most = median_speed(rows, engine, grains)
-            beside = middle / median_speed(rows, "lammps", grains)[0]
+            middle, least, most = find_median_speed(rows, engine, grains)
+            beside = middle / find_median_speed(rows, "lammps", grains)[0]
             mine = [r for r in rows if r.get("speed") == engine and r["grains"] == grains]
             start = float(np.median([row["start_up_s"] for row in mine]))
             lines.append([
@@ -106,7 +106,7 @@ def tabulate_speed(rows: Sequence[Row]) -> str:
     return format_table(head, lines)
 
 
-def tell_runs(rows: Sequence[Row]) -> str:
+def describe_runs(rows: Sequence[Row]) -> str:
     """How many of the planned runs are made, what failed."""
     made = [row for row in rows if "way" in row]
     spent = sum(row.get("engine_cpu_s", 0.0) for row in made) / 60
@@ -119,15 +119,15 @@ def tell_runs(rows: Sequence[Row]) -> str:
 
 def describe(rows: Sequence[Row]) -> dict[str, str]:
     """The text for each mark of the page."""
-    runs = by_way(rows)
+    runs = group_by_way(rows)
     real = sum(
-        leaves_zero_out(pair(runs, b, a, key), LEVEL)
+        excludes_zero(pair(runs, b, a, key), LEVEL)
         for a, b in combinations(ENGINES, 2)
         for key in JUDGED
     )
     packing = next(row for row in rows if "way" in row)
-    fastest = median_speed(rows, "liggghts", 9999)[0]
-    slower = {name: fastest / median_speed(rows, name, 9999)[0] for name in ("lammps", "yade")}
+    fastest = find_median_speed(rows, "liggghts", 9999)[0]
+    slower = {name: fastest / find_median_speed(rows, name, 9999)[0] for name in ("lammps", "yade")}
     return {
         "GRAINS": str(packing["grains"]),
         "STEPS": f"{packing['steps_per_cycle']:,}",
@@ -138,12 +138,12 @@ def describe(rows: Sequence[Row]) -> dict[str, str]:
         "REAL": "None of the nine" if not real else f"{real} of the nine",
         "FASTER": f"{slower['lammps']:.1f}",
         "YADE_FASTER": f"{slower['yade']:.0f}",
-        "RESOLUTION": tell_resolution(runs),
+        "RESOLUTION": describe_resolution(runs),
         "TABLE_SPEED": tabulate_speed(rows),
         "CYCLE_MINUTES": f"{37_200 * 1e6 / fastest / 128 / 60:.1f}",
         "RAIN_HOURS": f"{2e12 / fastest / 128 / 3600:.1f}",
         "BARS": summarise_bars(check_bars(rows)),
-        "RUNS": tell_runs(rows),
+        "RUNS": describe_runs(rows),
         "ORIGIN": f"{rows[0]['origin']['machine']}; "
         f"{', '.join(dict.fromkeys(row['engine'] for row in rows))}; commits "
         f"{describe_commits(row['origin']['commit'] for row in rows)}.",
@@ -157,24 +157,24 @@ def draw(rows: Sequence[Row], picture: Path) -> None:
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    runs = by_way(rows)
+    runs = group_by_way(rows)
     figure, (left, middle, right) = plt.subplots(
         1, 3, figsize=(13, 4), layout="constrained", width_ratios=(3, 3, 2)
     )
     cycles = np.arange(CYCLES + 1)
     for name in ENGINES:
         curves = 1e6 * np.array([row["curve"] for row in runs[name].values()])
-        mean, half = np.array([mean_interval(column) for column in curves.T]).T
+        mean, half = np.array([estimate_mean(column) for column in curves.T]).T
         left.plot(cycles, mean, color=COLOURS[name], label=TITLES[name])
         left.fill_between(cycles, mean - half, mean + half, color=COLOURS[name], alpha=0.15, lw=0)
-        speeds = [median_speed(rows, name, grains)[0] / 1e6 for grains in (1111, 9999)]
+        speeds = [find_median_speed(rows, name, grains)[0] / 1e6 for grains in (1111, 9999)]
         right.plot((1111, 9999), speeds, "o-", color=COLOURS[name])
     left.set(xlabel="load cycle", ylabel="settlement [µm]", title="mean of the beds, 95 %")
     left.legend(frameon=False)
     shown = [*SHOWN, *PAIRS]
     for height, (_, way, other) in enumerate(shown):
         values = 1e6 * pair(runs, way, other, "settlement")
-        mean, half = mean_interval(values)
+        mean, half = estimate_mean(values)
         middle.plot(values, np.full(len(values), -height), ".", color="0.7", ms=4)
         middle.errorbar(mean, -height, xerr=half, fmt="o", color="k", capsize=3, ms=4)
     middle.axvline(0, color="0.5", lw=0.8)

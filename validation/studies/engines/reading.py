@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from adapters.bed.state import FloatArray
-from validation.study import mean_interval
+from validation.study import estimate_mean
 
 Row = dict[str, Any]
 ENGINES = ("liggghts", "lammps", "yade")
@@ -39,7 +39,7 @@ PAIRS = (
 """What changes, with it, without it."""
 
 
-def by_way(rows: Sequence[Row]) -> dict[str, dict[int, Row]]:
+def group_by_way(rows: Sequence[Row]) -> dict[str, dict[int, Row]]:
     """Runs that gave figures, by way and seed."""
     found: dict[str, dict[int, Row]] = {}
     for row in rows:
@@ -55,20 +55,20 @@ def pair(runs: dict[str, dict[int, Row]], way: str, other: str, key: str) -> Flo
     return np.subtract(mine, theirs)
 
 
-def tell_mean(values: FloatArray, key: str, signed: bool = True) -> str:
+def format_mean(values: FloatArray, key: str, signed: bool = True) -> str:
     """Mean and interval in the units of `FIGURES`."""
     _, factor, digits = FIGURES[key]
-    mean, half = mean_interval(values * factor)
+    mean, half = estimate_mean(values * factor)
     return f"{mean:{'+' if signed else ''}.{digits}f} ± {half:.{digits}f}"
 
 
-def leaves_zero_out(values: FloatArray, level: float = 0.95) -> bool:
+def excludes_zero(values: FloatArray, level: float = 0.95) -> bool:
     """Whether zero is outside of the interval of the mean."""
-    mean, half = mean_interval(values, level)
+    mean, half = estimate_mean(values, level)
     return bool(abs(mean) > half)
 
 
-def median_speed(rows: Sequence[Row], engine: str, grains: int) -> tuple[float, float, float]:
+def find_median_speed(rows: Sequence[Row], engine: str, grains: int) -> tuple[float, float, float]:
     """Grain-steps a CPU second: median, least and greatest of the runs."""
     found = [
         grains * (row["steps"][1] - row["steps"][0]) / row["steps_cpu_s"]

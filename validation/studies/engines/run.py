@@ -13,12 +13,12 @@ from typing import Any
 from adapters.bed.state import FloatArray
 from adapters.engines.contract import get_engine
 from adapters.errors import TrackbedError
-from validation.studies.engines.packing import SEEDS, WAYS, Way, rain_bed, run_way
+from validation.studies.engines.packing import SEEDS, WAYS, Way, pour_bed, run_way
 from validation.studies.engines.speed import (
     count_contacts,
+    load_tiles,
     mirror_tiles,
     run_bed,
-    scene_of_tiles,
     settle_tile,
 )
 
@@ -30,15 +30,15 @@ ENGINES = ("liggghts", "lammps", "yade")
 
 
 @cache
-def start_of(seed: int) -> tuple[FloatArray, FloatArray]:
+def make_start(seed: int) -> tuple[FloatArray, FloatArray]:
     """The rained bed of a seed: positions (n, 3), radii (n,) [m]."""
     with TemporaryDirectory() as temporary:
-        return rain_bed(seed, Path(temporary) / "rain")
+        return pour_bed(seed, Path(temporary) / "rain")
 
 
 def settle_packing(way: Way, seed: int) -> Row:
     """One way on one bed; a run that failed says why."""
-    position, radius = start_of(seed)
+    position, radius = make_start(seed)
     scene = way.scene(seed)
     row: Row = {"way": way.name, "seed": seed, "ok": True, "why": ""}
     with TemporaryDirectory() as temporary:
@@ -48,7 +48,7 @@ def settle_packing(way: Way, seed: int) -> Row:
         except TrackbedError as error:
             row |= {"ok": False, "why": str(error)}
     row |= {"grains": scene.grain_count, "steps_per_cycle": scene.steps_per_cycle}
-    return row | {"engine": way.made().version()}
+    return row | {"engine": way.make_engine().version()}
 
 
 def time_engine(engine: str, tiles: tuple[int, int], repeat: int) -> Row:
@@ -56,7 +56,7 @@ def time_engine(engine: str, tiles: tuple[int, int], repeat: int) -> Row:
     home = Path(os.environ.get("TRACKBED_VALIDATION", "validation-runs")) / "engines"
     home.mkdir(parents=True, exist_ok=True)
     position, radius = mirror_tiles(*settle_tile(home), tiles)
-    scene, (short, long) = scene_of_tiles(engine, tiles), SPEED[tiles]
+    scene, (short, long) = load_tiles(engine, tiles), SPEED[tiles]
     with TemporaryDirectory(dir=home) as temporary:
         runs = [
             run_bed(scene, position, radius, steps, Path(temporary) / str(steps))

@@ -51,16 +51,16 @@ import record
 from yade import Omega
 
 O = Omega()
-parameters = bed.parameters_read()
-bed.materials_add(parameters)
-bed.grains_add(parameters)
-bed.walls_add(parameters)
-bed.engines_set(parameters)
+parameters = bed.read_parameters()
+bed.add_materials(parameters)
+bed.add_grains(parameters)
+bed.add_walls(parameters)
+bed.set_engines(parameters)
 O.run({steps}, True)
-grains = record.grain_table(parameters["grain_count"])
+grains = record.tabulate_grains(parameters["grain_count"])
 with open("end.dump", "w") as stream:
     rows = [[i, *g[:6], *g[9:]] for i, g in enumerate(grains, 1)]
-    record.frame_write(
+    record.write_frame(
         stream, "ATOMS", "{columns}", record.np.array(rows), 1, parameters["box"]
     )
 """
@@ -107,7 +107,7 @@ MIRROR = {"wall_young": 1e15, "wall_friction": 0.0}
 """Walls that do what a mirror does, while the tile settles."""
 
 
-def scene_of_tiles(engine: str, tiles: tuple[int, int], more: str = "", **material: float) -> Scene:
+def load_tiles(engine: str, tiles: tuple[int, int], more: str = "", **material: float) -> Scene:
     """The scene of ``tiles`` along x and y on an engine.
 
     ``more`` tables as text; ``material`` as `TABLE_1`, whose values are taken for all not named.

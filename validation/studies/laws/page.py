@@ -90,7 +90,7 @@ def shorten_name(name: str) -> str:
     return name.removeprefix("p_").replace("_q_", " / ").replace("_f_", ", ")
 
 
-def tell_whole(found: dict[str, Row]) -> str:
+def describe_whole(found: dict[str, Row]) -> str:
     """How many whole tests are refused, of those stopped at strains of 0.3 and of the others."""
     tests = found["whole"]["tests"]
     refused = (*WHY_NOT, UNCERTAIN)
@@ -132,7 +132,7 @@ def describe(rows: Sequence[Row]) -> dict[str, str]:
         "engine": f"{format_share(engine['error'], 0)} median error, and the band holds "
         f"{format_share(engine['coverage'], 0)} of {engine['cases']}",
         "other_all": format_share(found["other cuts"]["auto"]["all"]["error_90"]),
-        "whole": tell_whole(found),
+        "whole": describe_whole(found),
         "origin": f"Commit `{origin['commit'][:10]}`, {origin['machine']}.",
     }
 

@@ -15,17 +15,17 @@ import numpy as np
 from adapters.bed.state import FloatArray
 from adapters.errors import UsageError
 from adapters.laws import get_law
-from adapters.laws.fit.outlook import outlook
-from adapters.laws.fit.refusal import UNCERTAIN, failure, refusals
+from adapters.laws.fit.outlook import find_outlook
+from adapters.laws.fit.refusal import UNCERTAIN, find_refusals, predict_failure
 from adapters.laws.fit.regime import REGIMES
 from validation.studies.laws.series import (
     OTHER_CUTS,
     LawCase,
-    ballast_cases,
-    ballast_series,
-    family_cases,
-    fast_cases,
-    run_cases,
+    list_ballast_cases,
+    list_family_cases,
+    list_fast_cases,
+    list_run_cases,
+    read_ballast,
 )
 
 Row = dict[str, Any]
@@ -39,7 +39,7 @@ WHOLE_TO, FAIL_AT = 1e6, 0.3
 """Whole tests are predicted up to here; the strain at which they were stopped, 0.297 to 0.305."""
 
 
-def data_folder() -> Path:
+def find_data() -> Path:
     """The folder of the real series; raises `UsageError` where TRACKBED_DATA names none."""
     folder = Path(os.environ.get("TRACKBED_DATA", ""))
     if not (folder / "full_runs").is_dir():
@@ -72,15 +72,15 @@ def predict_by_curve_fit(case: LawCase) -> float:
     """And second: a N^b by scipy.optimize.curve_fit, started at the last reading and b = 0.1."""
     from scipy import optimize
 
-    def power(n: FloatArray, a: float, b: float) -> FloatArray:
+    def find_power(n: FloatArray, a: float, b: float) -> FloatArray:
         return np.asarray(a * n**b)
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # its covariance is not used
         found, _ = optimize.curve_fit(
-            power, case.cycle, case.settlement, p0=(case.settlement[-1], 0.1), maxfev=20000
+            find_power, case.cycle, case.settlement, p0=(case.settlement[-1], 0.1), maxfev=20000
         )
-    return float(power(np.array(case.to_cycle), *found))
+    return float(find_power(np.array(case.to_cycle), *found))
 
 
 def list_predictors() -> dict[str, Callable[[LawCase], float]]:
@@ -104,10 +104,10 @@ def judge_auto(cases: Sequence[LawCase]) -> list[Row]:
     found = []
     for case in cases:
         start = time.process_time()
-        said = outlook(case.cycle, case.settlement[:, None], case.to_cycle)
+        said = find_outlook(case.cycle, case.settlement[:, None], case.to_cycle)
         cost = time.process_time() - start
         prediction, low, high = (float(x[0]) for x in (said.prediction, said.low, said.high))
-        (refusal,) = refusals(said)
+        (refusal,) = find_refusals(said)
         each = case.settlement[-1] + said.candidates.increment[:, 0]
         found.append(
             {
@@ -179,17 +179,17 @@ def measure_source(read: Callable[[], list[LawCase]]) -> Row:
 
 def measure_fast() -> Row:
     """How many series with a constant or growing rate are refused."""
-    rows = judge_auto(fast_cases(MEMBERS))
+    rows = judge_auto(list_fast_cases(MEMBERS))
     return {"cases": len(rows), "refused": sum(not row["allowed"] for row in rows)}
 
 
 def predict_whole_tests() -> Row:
     """Whole ballast tests to a million cycles, and what is said of them with ``--fail-at``."""
     found = []
-    for name, cycle, strain in ballast_series(data_folder()):
-        said = outlook(cycle, strain[:, None], WHOLE_TO)
-        (refusal,) = refusals(said)
-        failed = refusal or failure(float(said.prediction[0]), FAIL_AT, WHOLE_TO)
+    for name, cycle, strain in read_ballast(find_data()):
+        said = find_outlook(cycle, strain[:, None], WHOLE_TO)
+        (refusal,) = find_refusals(said)
+        failed = refusal or predict_failure(float(said.prediction[0]), FAIL_AT, WHOLE_TO)
         regime = said.regime[0].name
         found.append(
             {
@@ -207,10 +207,10 @@ def predict_whole_tests() -> Row:
 
 
 PARTS: dict[str, Callable[[], Row]] = {
-    "ballast": partial(measure_source, lambda: ballast_cases(data_folder())),
-    "other cuts": partial(measure_source, lambda: ballast_cases(data_folder(), OTHER_CUTS)),
-    "families": partial(measure_source, lambda: family_cases(MEMBERS)),
-    "engine": partial(measure_source, lambda: run_cases(data_folder())),
+    "ballast": partial(measure_source, lambda: list_ballast_cases(find_data())),
+    "other cuts": partial(measure_source, lambda: list_ballast_cases(find_data(), OTHER_CUTS)),
+    "families": partial(measure_source, lambda: list_family_cases(MEMBERS)),
+    "engine": partial(measure_source, lambda: list_run_cases(find_data())),
     "fast": measure_fast,
     "whole": predict_whole_tests,
 }

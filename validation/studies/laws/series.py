@@ -50,7 +50,7 @@ class LawCase:
     truth: float
 
 
-def ballast_series(folder: Path) -> Iterator[tuple[str, FloatArray, FloatArray]]:
+def read_ballast(folder: Path) -> Iterator[tuple[str, FloatArray, FloatArray]]:
     """Name, cycles and axial strain of each triaxial test; repeated cycles once."""
     for path in sorted((folder / "ballast_triaxial").glob("*.txt")):
         table = np.loadtxt(path, delimiter=",")
@@ -72,16 +72,16 @@ def cut_cases(
             yield LawCase(source, name, cut, cycle[known], settlement[known], to_cycle, truth)
 
 
-def ballast_cases(folder: Path, cuts: tuple[float, ...] = CUTS) -> list[LawCase]:
+def list_ballast_cases(folder: Path, cuts: tuple[float, ...] = CUTS) -> list[LawCase]:
     """All cases of the triaxial tests."""
     return [
         case
-        for name, cycle, strain in ballast_series(folder)
+        for name, cycle, strain in read_ballast(folder)
         for case in cut_cases("ballast", name, cycle, strain, cuts)
     ]
 
 
-def run_cases(folder: Path) -> list[LawCase]:
+def list_run_cases(folder: Path) -> list[LawCase]:
     """Mean settlement of full runs at every cycle: 1,085 grains (two), 150 grains in bursts."""
     found = []
     for name in RUNS:
@@ -92,7 +92,7 @@ def run_cases(folder: Path) -> list[LawCase]:
     return found
 
 
-def slow_families(random: np.random.Generator) -> dict[str, Curve]:
+def draw_slow_families(random: np.random.Generator) -> dict[str, Curve]:
     """One member of each family whose rate falls for good, its parameters drawn at random.
 
     Of the bank's own laws and of others: sums of two and three logarithms, of two stretched
@@ -100,17 +100,17 @@ def slow_families(random: np.random.Generator) -> dict[str, Curve]:
     and a logarithm with one event after which the bed is another.
     """
 
-    def wide(low: float, high: float) -> float:
+    def draw(low: float, high: float) -> float:
         return float(np.exp(random.uniform(np.log(low), np.log(high))))
 
     even = random.uniform
-    onset = [wide(1, 10), wide(30, 3000), wide(10, 1e4)]
+    onset = [draw(1, 10), draw(30, 3000), draw(10, 1e4)]
     weight = [even(0.3, 3), even(0.3, 3)]
-    scale = [wide(3, 100), wide(300, 3e4), wide(10, 1e4), wide(30, 3000)]
+    scale = [draw(3, 100), draw(300, 3e4), draw(10, 1e4), draw(30, 3000)]
     shape = [even(0.3, 1), even(0.3, 1), even(0.2, 0.9), even(0.08, 0.3), even(0.1, 2)]
     burst_cycle = np.exp(random.uniform(0, np.log(LAST), random.poisson(40)))
     burst_size = 0.12 * random.pareto(2.0, len(burst_cycle))
-    middle, width, height = wide(80, 1500), even(0.25, 0.7), even(2, 10)
+    middle, width, height = draw(80, 1500), even(0.25, 0.7), even(2, 10)
     power_sum = even(0.78, 0.9)
     start, late = even(0.2, 1), even(0.02, 0.4)
     return {
@@ -141,7 +141,7 @@ def slow_families(random: np.random.Generator) -> dict[str, Curve]:
     }
 
 
-def fast_families(random: np.random.Generator) -> dict[str, Curve]:
+def draw_fast_families(random: np.random.Generator) -> dict[str, Curve]:
     """Families that must be refused: a constant rate, reached or being reached, and growth."""
     rate, exponent = random.uniform(0.5, 2), random.uniform(1.2, 2)
     return {
@@ -166,12 +166,12 @@ def read_off(
     return cycle, np.round(read / (DIGIT * size)) * DIGIT * size
 
 
-def family_cases(members: int) -> list[LawCase]:
+def list_family_cases(members: int) -> list[LawCase]:
     """Cases of ``members`` of each slow family; the truth is the curve's own value."""
     found = []
     for member in range(members):
         random = np.random.default_rng([SEED, member])
-        for name, curve in slow_families(random).items():
+        for name, curve in draw_slow_families(random).items():
             cycle, read = read_off(curve, LAST, random)
             for case in cut_cases("families", name, cycle, read, CUTS):
                 truth = float(np.asarray(curve(np.array([case.to_cycle])))[0])
@@ -180,12 +180,12 @@ def family_cases(members: int) -> list[LawCase]:
     return found
 
 
-def fast_cases(members: int) -> list[LawCase]:
+def list_fast_cases(members: int) -> list[LawCase]:
     """Series of ``members`` of each fast family, 300 cycles long; there is no truth to predict."""
     found = []
     for member in range(members):
         random = np.random.default_rng([SEED, 1, member])
-        for name, curve in fast_families(random).items():
+        for name, curve in draw_fast_families(random).items():
             cycle, read = read_off(curve, 300.0, random)
             found.append(LawCase("fast", name, 300.0, cycle, read, 10 * float(cycle[-1]), np.nan))
     return found

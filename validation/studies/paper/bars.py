@@ -17,12 +17,12 @@ PAPER = {"linear": 0.14, "log": 0.14}
 """The paper's largest E_r at k_i = 10."""
 
 
-def largest(jumps: Sequence[dict[str, Any]], way: str, k_i: int, denominator: int = 0) -> float:
+def find_max(jumps: Sequence[dict[str, Any]], way: str, k_i: int, denominator: int = 0) -> float:
     """Largest E_r of a way over all k and h."""
     return max(one["errors"][way][denominator] for one in jumps if one["k_i"] == k_i)
 
 
-def share_of_steps(jumps: Sequence[dict[str, Any]], way: str, along: str) -> tuple[int, int]:
+def count_rises(jumps: Sequence[dict[str, Any]], way: str, along: str) -> tuple[int, int]:
     """In how many steps to the next longer k or h E_r rises, of how many."""
     other = "h" if along == "k" else "k"
     rises = []
@@ -44,7 +44,7 @@ def check_bars(rows: Sequence[dict[str, Any]]) -> list[Check]:
     jumps, overlap = found["jumps"]["jumps"], found["cell"]["overlap"]
     checks = []
     for law in LAWS:
-        first, last = (largest(jumps, law, k_i) for k_i in (FIRST, LAST))
+        first, last = (find_max(jumps, law, k_i) for k_i in (FIRST, LAST))
         checks.append(
             Check(f"{law}: largest E_r of coordinates at k_i = {FIRST}", first,
                   f"<= {PAPER[law]:g}", first <= PAPER[law], page=PAGE)
@@ -54,10 +54,10 @@ def check_bars(rows: Sequence[dict[str, Any]]) -> list[Check]:
             Check(f"{law}: at k_i = {LAST} over that at {FIRST}", last / first, "<= 1",
                   last <= first, page=PAGE, why=why)
         )  # fmt: skip
-    rises, steps = share_of_steps(jumps, "log", "h")
+    rises, steps = count_rises(jumps, "log", "h")
     checks.append(Check("log: share of steps of h in which E_r rises", rises / steps, ">= 0.9",
                         rises >= 0.9 * steps, page=PAGE))  # fmt: skip
-    rises, steps = share_of_steps(jumps, "log", "k")
+    rises, steps = count_rises(jumps, "log", "k")
     why = "windows with a burst inside err more; fewer than two steps in three fall"
     checks.append(Check("log: share of steps of k in which E_r falls", 1 - rises / steps, ">= 0.9",
                         1 - rises / steps >= 0.9, page=PAGE, why=why))  # fmt: skip

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from validation.studies.paper.bars import check_bars, count_nearer, largest
+from validation.studies.paper.bars import check_bars, count_nearer, find_max
 from validation.studies.paper.run import DENOMINATORS, FIRST, LAWS, LENGTHS, NOTHING, OTHER
 from validation.study import format_checks, format_table
 
@@ -18,7 +18,7 @@ def tabulate_largest(jumps: Sequence[Row]) -> str:
     lines = []
     for number, words in enumerate(DENOMINATORS):
         for way in (*LAWS, NOTHING):
-            cells = [f"{100 * largest(jumps, way, k_i, number):.3g} %" for k_i in FIRST]
+            cells = [f"{100 * find_max(jumps, way, k_i, number):.3g} %" for k_i in FIRST]
             lines.append([words, way, *cells])
     return format_table(["over", "way", *(f"kᵢ = {k_i}" for k_i in FIRST)], lines)
 

@@ -8,15 +8,15 @@ from typing import Any, Literal
 
 import numpy as np
 
-from adapters.bed.overlaps import neighbours
+from adapters.bed.overlaps import find_pairs
 from adapters.bed.state import FloatArray, State
 from adapters.laws import get_law
 from adapters.laws.fit.residual import measure_coordinates_error, measure_displacement_error
 from adapters.relaxation.measured import RelaxationNotConverged
 from adapters.relaxation.methods import relax
 from adapters.scene.file import load_scene
-from trackbed.scenes import scene_path
-from validation.studies.laws.run import data_folder
+from trackbed.scenes import find_scene_file
+from validation.studies.laws.run import find_data
 
 Row = dict[str, Any]
 FIRST = (10, 20, 50, 100, 200)
@@ -32,7 +32,7 @@ DEPTH = 1.8e-3
 
 def read_positions(name: str) -> FloatArray:
     """Centres at all cycle ends of a stored full run [m], shape (cycles + 1, n, 3)."""
-    with np.load(data_folder() / "full_runs" / f"{name}.npz") as data:
+    with np.load(find_data() / "full_runs" / f"{name}.npz") as data:
         return np.asarray(data["initial_position_m"] + 1e-6 * data["displacement_um"].astype(float))
 
 
@@ -78,7 +78,7 @@ def relax_cell() -> Row:
     Eight equal grains at the corners of a cube touch the one in its middle, far from any wall.  The
     paper's method holds the eight, its frontier.
     """
-    scene = load_scene(scene_path("karrech"))
+    scene = load_scene(find_scene_file("karrech"))
     radius, walls = np.full(9, scene.sample.grain_radius.mean), scene.container.walls()
     corners = np.array(list(product((-1, 1), repeat=3))) / np.sqrt(3)
     middle = np.array([[0.03, 0.03, 0.03]])
@@ -89,25 +89,25 @@ def relax_cell() -> Row:
     estimate = position.copy()
     estimate[0] += DEPTH * corners[-1]
 
-    def greatest(places: FloatArray) -> float:
-        overlap = neighbours(places, radius, walls).overlap
+    def find_greatest(places: FloatArray) -> float:
+        overlap = find_pairs(places, radius, walls).overlap
         return float(f"{overlap.max(initial=0.0):.4g}")
 
     held = np.arange(9) > 0
 
-    def relaxed(method: Literal["smallest-move", "karrech2007"]) -> float:
+    def relax_by(method: Literal["smallest-move", "karrech2007"]) -> float:
         try:
             found = relax(estimate, before, walls, scene.stiffness, method=method, frontier=held)
         except RelaxationNotConverged as error:  # overlaps of round-off, with no load to close
             found = error.best
-        return greatest(found.position)
+        return find_greatest(found.position)
 
     return {
         "overlap": {
-            "before": greatest(position),
-            "estimate": greatest(estimate),
-            "smallest-move": relaxed("smallest-move"),
-            "karrech2007": relaxed("karrech2007"),
+            "before": find_greatest(position),
+            "estimate": find_greatest(estimate),
+            "smallest-move": relax_by("smallest-move"),
+            "karrech2007": relax_by("karrech2007"),
         }
     }
 

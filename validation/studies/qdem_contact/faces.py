@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import qdem_fem as q
-from validation.bench.qdem.contact import SIDE, cube
+from validation.bench.qdem.contact import SIDE, make_cube
 from validation.case import Check
 
 Floats = NDArray[np.float64]
@@ -22,7 +22,7 @@ FACES = (  # cells below and above, radius of spheres [m] or points of a face's 
 )  # fmt: skip
 
 
-def contact_made(model: str, detail: float, friction: float) -> q.SphereContact | q.SurfaceContact:
+def make_contact(model: str, detail: float, friction: float) -> q.SphereContact | q.SurfaceContact:
     """Spheres of radius ``detail`` [m], or surfaces of ``detail`` squared points a face."""
     if model == "spheres":
         return q.SphereContact(detail, STIFFNESS, friction)
@@ -39,12 +39,12 @@ def average_stress(
     """
     damped = q.Material(30e9, 0.2, 2700.0, shear_viscosity=3e4, bulk_viscosity=3e4)
     gap = 2 * detail if model == "spheres" else 0.0
-    bodies = [cube(below, material=damped), cube(above, (0, 0, SIDE + gap), damped)]
-    run = q.Simulation(bodies, threads=1, contact=contact_made(model, detail, 0.5))
+    bodies = [make_cube(below, material=damped), make_cube(above, (0, 0, SIDE + gap), damped)]
+    run = q.Simulation(bodies, threads=1, contact=make_contact(model, detail, 0.5))
     run.fix(bodies[0], bodies[0].nodes[:, 2] == 0, "z")
     run.fix(bodies[0], 0)
     top = bodies[1].nodes[:, 2] > 2 * SIDE + gap - 1e-9
-    run.pressure(bodies[1], top, q.ramp(3e-4, PRESSURE))
+    run.pressure(bodies[1], top, q.make_ramp(3e-4, PRESSURE))
     run.advance(1e-5)
     started, before = time.process_time(), run.steps_done
     run.advance(1.5e-3)
@@ -56,7 +56,7 @@ def average_stress(
     return stress, float(carried), seconds
 
 
-def faces_name(model: str, below: int, above: int, detail: float) -> str:
+def name_faces(model: str, below: int, above: int, detail: float) -> str:
     """How the names of the checks of one pair of meshes begin."""
     words = {
         "spheres": f"spheres of {2000 * detail:.0f} mm",
@@ -65,12 +65,12 @@ def faces_name(model: str, below: int, above: int, detail: float) -> str:
     return f"faces, {below} on {above} cells, {words}"
 
 
-def faces_checks() -> list[Check]:
+def check_faces() -> list[Check]:
     """Vertices on vertices, and between them, on two sizes of mesh, by both models."""
     checks = []
     for model, below, above, detail in FACES:
         stress, carried, seconds = average_stress(model, below, above, detail)
-        name, worst = faces_name(model, below, above, detail), float(np.abs(stress - 1).max())
+        name, worst = name_faces(model, below, above, detail), float(np.abs(stress - 1).max())
         same = model == "surface" and below == above
         checks += [
             Check(f"{name}: force carried less load", abs(carried - 1), "<= 0.001",

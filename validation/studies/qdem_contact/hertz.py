@@ -21,8 +21,8 @@ from scipy.sparse.linalg import splu
 import qdem_fem as q
 from qdem_fem.files.errors import NotConverged
 from qdem_fem.mesh.generation import make_box_mesh
-from validation.bench.qdem.checks import orders, reported
-from validation.bench.qdem.judge import stiffness
+from validation.bench.qdem.checks import fit_order, report
+from validation.bench.qdem.judge import build_stiffness
 from validation.case import Check
 
 Floats = NDArray[np.float64]
@@ -44,7 +44,7 @@ CLOSED_FORCE = (
 )  # fmt: skip
 
 
-def cap_mesh(cells: int, across: int) -> tuple[Floats, NDArray[np.int64]]:
+def mesh_cap(cells: int, across: int) -> tuple[Floats, NDArray[np.int64]]:
     """A block over the paraboloid ``z = r^2/(2 R)``, ``across`` cells from side to side; [m]."""
     mesh = make_box_mesh((2.0, 2.0, 1.0), (across, across, cells), "kuhn", (-1.0, -1.0, 0.0))
     s = mesh.nodes
@@ -55,13 +55,13 @@ def cap_mesh(cells: int, across: int) -> tuple[Floats, NDArray[np.int64]]:
     return nodes, mesh.elements
 
 
-def outer(nodes: Floats) -> NDArray[np.intp]:
+def find_outer(nodes: Floats) -> NDArray[np.intp]:
     """Nodes at the sides and the top of a block."""
     far = np.abs(nodes).max(axis=1)
     return np.flatnonzero(far > SIZE * (1 - 1e-9))
 
 
-def outer_motion(nodes: Floats) -> Floats:
+def find_outer_motion(nodes: Floats) -> Floats:
     """Displacement of one block far from the contact (n, 3) [m]: Boussinesq, half of d less."""
     x, y, z = nodes.T
     r, far = np.hypot(x, y), np.linalg.norm(nodes, axis=1)
@@ -73,23 +73,23 @@ def outer_motion(nodes: Floats) -> Floats:
     return np.column_stack([*(across * unit), along - APPROACH / 2])
 
 
-def pressed(force: Floats, place: Floats) -> tuple[float, float]:
+def measure(force: Floats, place: Floats) -> tuple[float, float]:
     """Total of forces (n,) [N], and the radius of a Hertz pressure with their second moment [m]."""
     total = float(force.sum())
     moment = float((force * (place[:, :2] ** 2).sum(axis=1)).sum())
     return total, float(np.sqrt(2.5 * moment / total))
 
 
-def hertz_rival(cells: int) -> tuple[float, float]:
+def solve_rival(cells: int) -> tuple[float, float]:
     """F [N] and a [m]: nodes of one block that a plane pushes up, by an active set."""
-    nodes, elements = cap_mesh(cells, 2 * cells)
-    matrix = stiffness(nodes, elements, YOUNG, POISSON).tocsc()
-    held_far = outer(nodes)
+    nodes, elements = mesh_cap(cells, 2 * cells)
+    matrix = build_stiffness(nodes, elements, YOUNG, POISSON).tocsc()
+    held_far = find_outer(nodes)
     near = np.flatnonzero(nodes[:, 2] <= (nodes[:, :2] ** 2).sum(axis=1) / (2 * CURVATURE) + 1e-9)
     near = np.setdiff1d(near, held_far)
     wanted = -nodes[near, 2]
     held = wanted > -APPROACH / 4
-    motion = outer_motion(nodes)
+    motion = find_outer_motion(nodes)
     for _ in range(50):
         known = np.zeros(nodes.size, dtype=bool)
         known.reshape(-1, 3)[held_far] = True
@@ -102,10 +102,10 @@ def hertz_rival(cells: int) -> tuple[float, float]:
         if (again == held).all():
             break
         held = again
-    return pressed(np.where(held, reaction, 0.0), nodes[near])
+    return measure(np.where(held, reaction, 0.0), nodes[near])
 
 
-def first_touch(lower: Floats, upper: Floats, diameter: float) -> float:
+def find_first_touch(lower: Floats, upper: Floats, diameter: float) -> float:
     """Lift of the upper block [m] at which the first two spheres touch."""
     a, b = (n[(n[:, :2] ** 2).sum(axis=1) < (3 * diameter) ** 2] for n in (lower, upper))
     apart = ((a[:, None, :2] - b[:, :2]) ** 2).sum(axis=2)
@@ -113,14 +113,14 @@ def first_touch(lower: Floats, upper: Floats, diameter: float) -> float:
     return float(np.where(apart < diameter**2, reach, 0.0).max())
 
 
-def contact_of(model: str, edge: float) -> q.SphereContact | q.SurfaceContact:
+def make_contact(model: str, edge: float) -> q.SphereContact | q.SurfaceContact:
     """Ten times as stiff as a layer of the size ``edge`` [m] of the faces in contact."""
     if model.startswith("spheres"):
         return q.SphereContact(edge / 2, 10 * YOUNG * edge, 0.0)
     return q.SurfaceContact(10 * YOUNG / edge, 0.0, depth=0.2 * edge)
 
 
-def rest(run: q.Simulation, period: float, tolerance: float = 1e-6, most: int = 600) -> None:
+def settle(run: q.Simulation, period: float, tolerance: float = 1e-6, most: int = 600) -> None:
     """March until kinetic energy is a share of all; velocities go to zero at its peaks.
 
     Raises `NotConverged` after the ``most`` looks.
@@ -145,68 +145,68 @@ def rest(run: q.Simulation, period: float, tolerance: float = 1e-6, most: int = 
     )
 
 
-def hertz_pressed(model: str, cells: int) -> tuple[float, float, float, float]:
+def press_blocks(model: str, cells: int) -> tuple[float, float, float, float]:
     """F [N], a [m], CPU of a step and of all [s]; ``spheres, matching``: vertex on vertex."""
     edge, period = SIZE / (4 * cells), 8 * SIZE / np.sqrt(YOUNG / DENSITY)
     same = model.endswith("matching")
-    lower, elements = cap_mesh(cells, 2 * cells)
-    upper, others = (lower, elements) if same else cap_mesh(cells, 2 * cells + 2)
-    gap = first_touch(lower, upper, edge) if model.startswith("spheres") else 0.0
+    lower, elements = mesh_cap(cells, 2 * cells)
+    upper, others = (lower, elements) if same else mesh_cap(cells, 2 * cells + 2)
+    gap = find_first_touch(lower, upper, edge) if model.startswith("spheres") else 0.0
     bodies = [
         q.Body((lower * [1, 1, -1], elements[:, [0, 2, 1, 3]]), STONE, name="lower"),
         q.Body((upper + np.array([0, 0, gap]), others), STONE, name="upper"),
     ]
-    run = q.Simulation(bodies, threads=1, strain="small", contact=contact_of(model, edge))
+    run = q.Simulation(bodies, threads=1, strain="small", contact=make_contact(model, edge))
     for body, nodes, sign in ((bodies[0], lower, -1), (bodies[1], upper, 1)):
-        far, motion = outer(nodes), outer_motion(nodes) * [1, 1, sign]
+        far, motion = find_outer(nodes), find_outer_motion(nodes) * [1, 1, sign]
         for k, component in enumerate("xyz"):
-            run.prescribe(body, far, component, q.ramp(2 * period, 1.0), profile=motion[:, k])
+            run.prescribe(body, far, component, q.make_ramp(2 * period, 1.0), profile=motion[:, k])
     run.advance(1e-7)
     started, before = time.process_time(), run.steps_done
     run.advance(2 * period)
-    rest(run, period)
+    settle(run, period)
     spent = time.process_time() - started
     assert run.contacts is not None
     own = run.contacts.nodes < len(lower)
     force = -run.contacts.kernel.force[own, 2]
-    return *pressed(force, lower[run.contacts.nodes[own]]), spent / (run.steps_done - before), spent
+    return *measure(force, lower[run.contacts.nodes[own]]), spent / (run.steps_done - before), spent
 
 
 MODELS = ("spheres", "spheres, matching", "points")
 
 
-def hertz_checks() -> list[Check]:
+def check_hertz() -> list[Check]:
     """Force and radius of all models on three meshes, beside the rival on the same and a finer."""
-    fine = hertz_rival(14)
+    fine = solve_rival(14)
     name = "Hertz, rival on a fine mesh"
     checks = [
-        reported(f"{name}: force less the closed form", fine[0] / CLOSED_FORCE - 1),
-        reported(f"{name}: radius less the closed form", fine[1] / CLOSED_RADIUS - 1),
+        report(f"{name}: force less the closed form", fine[0] / CLOSED_FORCE - 1),
+        report(f"{name}: radius less the closed form", fine[1] / CLOSED_RADIUS - 1),
     ]
     for cells in CELLS:
         started, name = time.process_time(), f"Hertz, rival, {cells} cells"
-        force, radius = hertz_rival(cells)
+        force, radius = solve_rival(cells)
         spent = time.process_time() - started
-        checks += [reported(f"{name}: solved", spent, "s"), *errors_of(name, force, radius)]
+        checks += [report(f"{name}: solved", spent, "s"), *report_errors(name, force, radius)]
     for model in MODELS:
         errors = []
         for cells in CELLS:
-            force, radius, step, spent = hertz_pressed(model, cells)
+            force, radius, step, spent = press_blocks(model, cells)
             errors.append(abs(force / CLOSED_FORCE - 1))
             name = f"Hertz, {model}, {cells} cells"
             checks += [
-                *errors_of(name, force, radius),
-                reported(f"{name}: step", step, "s"),
-                reported(f"{name}: until it rests", spent, "s"),
+                *report_errors(name, force, radius),
+                report(f"{name}: step", step, "s"),
+                report(f"{name}: until it rests", spent, "s"),
             ]
-        order = -orders(CELLS, errors)
-        checks.append(reported(f"Hertz, {model}: order of the force", order))
+        order = -fit_order(CELLS, errors)
+        checks.append(report(f"Hertz, {model}: order of the force", order))
     return checks
 
 
-def errors_of(name: str, force: float, radius: float) -> list[Check]:
+def report_errors(name: str, force: float, radius: float) -> list[Check]:
     """Of force and radius to the closed form."""
     return [
-        reported(f"{name}: force error", abs(force / CLOSED_FORCE - 1)),
-        reported(f"{name}: radius error", abs(radius / CLOSED_RADIUS - 1)),
+        report(f"{name}: force error", abs(force / CLOSED_FORCE - 1)),
+        report(f"{name}: radius error", abs(radius / CLOSED_RADIUS - 1)),
     ]

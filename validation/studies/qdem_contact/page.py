@@ -10,7 +10,7 @@ from validation.bench.qdem.checks import describe_checks, describe_origin, draw_
 from validation.bench.qdem.contact import CASES, MODELS
 from validation.case import Check
 from validation.studies.qdem_contact.bars import check_bars
-from validation.studies.qdem_contact.faces import FACES, faces_name
+from validation.studies.qdem_contact.faces import FACES, name_faces
 from validation.studies.qdem_contact.hertz import CELLS
 from validation.studies.qdem_contact.hertz import MODELS as HERTZ_MODELS
 from validation.study import Row, format_table
@@ -28,23 +28,23 @@ POINTS = {
 }  # fmt: skip
 
 
-def value_of(checks: Sequence[Check], name: str) -> float:
+def look_up(checks: Sequence[Check], name: str) -> float:
     """The value of the figure that is named so."""
     return find_check(checks, name).value
 
 
-def hertz_lines(checks: Sequence[Check]) -> list[list[str]]:
+def tabulate_hertz(checks: Sequence[Check]) -> list[list[str]]:
     """Rows: model, error of force and radius mesh by mesh, cost on the finest."""
     lines = []
     for model in ("rival", *HERTZ_MODELS):
         ends = "solved" if model == "rival" else "until it rests"
         names = [f"Hertz, {model}, {cells} cells: " for cells in CELLS]
         force, radius = (
-            [f"{100 * value_of(checks, f'{name}{what} error'):.0f} %" for name in names]
+            [f"{100 * look_up(checks, f'{name}{what} error'):.0f} %" for name in names]
             for what in ("force", "radius")
         )
         label = "scikit-fem, active set" if model == "rival" else model
-        cost = value_of(checks, names[-1] + ends)
+        cost = look_up(checks, names[-1] + ends)
         lines.append([label, ", ".join(force), ", ".join(radius), f"{cost:.2g} s"])
     return lines
 
@@ -54,12 +54,12 @@ def describe(rows: Sequence[Row]) -> dict[str, str]:
     checks = check_bars(rows)
     faces = []
     for model, below, above, detail in FACES:
-        name = faces_name(model, below, above, detail)
-        error = value_of(checks, f"{name}: stress, greatest")
-        step = value_of(checks, f"{name}: step")
+        name = name_faces(model, below, above, detail)
+        error = look_up(checks, f"{name}: stress, greatest")
+        step = look_up(checks, f"{name}: step")
         faces.append([name.removeprefix("faces, "), f"{100 * error:.2g} %", f"{1e6 * step:.3g} µs"])
     hard = [
-        [words, *(f"{value_of(checks, f'hard case, {words}, {m}: energies'):.1e}" for m in MODELS)]
+        [words, *(f"{look_up(checks, f'hard case, {words}, {m}: energies'):.1e}" for m in MODELS)]
         for words in CASES
     ]
     return {
@@ -67,7 +67,7 @@ def describe(rows: Sequence[Row]) -> dict[str, str]:
         "faces": format_table(["meshes, model", "greatest error of stress", "a step"], faces),
         "hertz": format_table(
             ["model", "error of the force, three meshes", "of the radius", "cost of the finest"],
-            hertz_lines(checks),
+            tabulate_hertz(checks),
         ),
         "hard": format_table(["case", *MODELS], hard),
         "made": describe_origin(rows),
@@ -78,12 +78,12 @@ def draw(rows: Sequence[Row], picture: Path) -> None:
     """All models, meshes that match and such that do not, and a rival."""
     checks = check_bars(rows)
 
-    def panels(figure: Any) -> None:
+    def draw_panels(figure: Any) -> None:
         cubes, hertz = figure.subplots(1, 2)
         for model, below, above, detail in FACES:
-            name, same = faces_name(model, below, above, detail), below == above
+            name, same = name_faces(model, below, above, detail), below == above
             cubes.loglog(
-                value_of(checks, f"{name}: step"), value_of(checks, f"{name}: stress, greatest"),
+                look_up(checks, f"{name}: step"), look_up(checks, f"{name}: stress, greatest"),
                 "o" if same else "s", color=COLOURS[model], mfc=COLOURS[model] if same else "none",
                 label=f"{model}, meshes {'match' if same else 'differ'}",
             )  # fmt: skip
@@ -92,8 +92,8 @@ def draw(rows: Sequence[Row], picture: Path) -> None:
         for model in (*HERTZ_MODELS, "rival"):
             ends = "solved" if model == "rival" else "until it rests"
             names = [f"Hertz, {model}, {cells} cells: " for cells in CELLS]
-            cost = [value_of(checks, name + ends) for name in names]
-            error = [value_of(checks, name + "force error") for name in names]
+            cost = [look_up(checks, name + ends) for name in names]
+            error = [look_up(checks, name + "force error") for name in names]
             style = "--^" if model == "spheres, matching" else "-o"
             hertz.loglog(cost, error, style, color=COLOURS[model.split(",")[0]], label=model)
         hertz.set(xlabel="CPU time until at rest, or solved (s)", ylabel="error of the force")
@@ -101,4 +101,4 @@ def draw(rows: Sequence[Row], picture: Path) -> None:
             handles = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
             axes.legend(handles.values(), handles.keys(), fontsize=7)
 
-    draw_figure((11, 4.4), panels, picture)
+    draw_figure((11, 4.4), draw_panels, picture)

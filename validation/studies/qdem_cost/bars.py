@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from validation.bench.qdem.checks import between, reported
+from validation.bench.qdem.checks import check_between, report
 from validation.case import Check
-from validation.studies.qdem_cost.reading import cost_at, family, order, pairs
+from validation.studies.qdem_cost.reading import find_cost, fit_order, list_runs, pair_runs
 from validation.study import Row
 
 SAME = 1e-3
@@ -18,12 +18,12 @@ TIPS = 0.02
 """Between time steps, precisions and strain measures, at one time of the race's warm-up."""
 
 
-def at_most(name: str, value: float, bar: float) -> Check:
+def check_max(name: str, value: float, bar: float) -> Check:
     """A value and its upper bar."""
     return Check(name, value, f"<= {bar:g}", value <= bar)
 
 
-def at_least(name: str, value: float, bar: float, unit: str = "") -> Check:
+def check_min(name: str, value: float, bar: float, unit: str = "") -> Check:
     """A value and its lower bar."""
     return Check(name, value, f">= {bar:g}", value >= bar, unit)
 
@@ -36,28 +36,28 @@ def check_bars(rows: Sequence[Row]) -> list[Check]:
             checks += check_question(rows, row["part"], row["reference"])
         else:
             checks += check_race(row)
-    slope = order(family(rows, "bending", "QDEM float64"), 3)
-    return [*checks, between("bending: order of convergence of QDEM", slope, 1.8, 2.2)]
+    slope = fit_order(list_runs(rows, "bending", "QDEM float64"), 3)
+    return [*checks, check_between("bending: order of convergence of QDEM", slope, 1.8, 2.2)]
 
 
 def check_question(rows: Sequence[Row], question: str, reference: float) -> list[Check]:
     """The same answers as the same elements elsewhere, at no higher cost."""
-    checks = [at_most(f"{question}: uncertainty of the reference", reference, REFERENCE)]
+    checks = [check_max(f"{question}: uncertainty of the reference", reference, REFERENCE)]
     for name in ("P1 central difference", "QDEM float32"):
         apart = max(
             abs(theirs["error"] / ours["error"] - 1)
-            for ours, theirs in pairs(rows, question, "QDEM float64", name)
+            for ours, theirs in pair_runs(rows, question, "QDEM float64", name)
         )
-        checks.append(at_most(f"{question}: error of {name} over QDEM's, less 1", apart, SAME))
-    ours, theirs = pairs(rows, question, "QDEM float64", "P1 central difference")[-1]
+        checks.append(check_max(f"{question}: error of {name} over QDEM's, less 1", apart, SAME))
+    ours, theirs = pair_runs(rows, question, "QDEM float64", "P1 central difference")[-1]
     title = f"{question}: cost of QDEM over central differences', {ours['elements']:,} elements"
-    checks.append(at_most(title, ours["cost_s"] / theirs["cost_s"], 1))
-    error = min(row["error"] for row in family(rows, question, "QDEM float64"))
-    cost = cost_at(family(rows, question, "QDEM float64"), error).seconds
+    checks.append(check_max(title, ours["cost_s"] / theirs["cost_s"], 1))
+    error = min(row["error"] for row in list_runs(rows, question, "QDEM float64"))
+    cost = find_cost(list_runs(rows, question, "QDEM float64"), error).seconds
     for name in ("P1 Newmark", "P2 Newmark"):
-        other = cost_at(family(rows, question, name), error)
+        other = find_cost(list_runs(rows, question, name), error)
         title = f"{question}: cost of QDEM over {name}'s at an error of {error:.2g}"
-        checks.append(reported(title + " (extrapolated)" * other.guessed, cost / other.seconds))
+        checks.append(report(title + " (extrapolated)" * other.guessed, cost / other.seconds))
     return checks
 
 
@@ -70,15 +70,15 @@ def check_race(row: Row) -> list[Check]:
     mkl = [s for name, s in speed.items() if name.startswith("mkl") and "float64 2" in name]
     share = ours * row["bytes_per_element"] / 1e3 / row["bandwidth"]["2"]
     checks = [
-        at_least("speed, float64, 2 threads", ours, 110, "Mel/s"),
-        at_least("over scipy, float64", ours / speed["scipy float64 1 threads"], 1.5),
-        at_least("float32 over float64, 2 threads", single / ours, 1.5),
-        at_most("cost of viscosity, float64, 2 threads", ours / viscous, 1.35),
-        at_least("2 threads over 1, float64", ours / speed["qdem finger float64 1 threads"], 1.9),
-        at_most("traffic over the memory triad, 2 threads", share, 1),
+        check_min("speed, float64, 2 threads", ours, 110, "Mel/s"),
+        check_min("over scipy, float64", ours / speed["scipy float64 1 threads"], 1.5),
+        check_min("float32 over float64, 2 threads", single / ours, 1.5),
+        check_max("cost of viscosity, float64, 2 threads", ours / viscous, 1.35),
+        check_min("2 threads over 1, float64", ours / speed["qdem finger float64 1 threads"], 1.9),
+        check_max("traffic over the memory triad, 2 threads", share, 1),
     ]
     if tips:
-        checks.append(at_most("tips apart after the warm-up", max(tips) / min(tips) - 1, TIPS))
+        checks.append(check_max("tips apart after the warm-up", max(tips) / min(tips) - 1, TIPS))
     if mkl:
-        checks.append(at_least("over MKL's best, float64, 2 threads", ours / max(mkl), 1))
+        checks.append(check_min("over MKL's best, float64, 2 threads", ours / max(mkl), 1))
     return checks

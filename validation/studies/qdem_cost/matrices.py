@@ -25,7 +25,7 @@ from scipy import sparse
 
 from qdem_fem.files.errors import LibraryMissing
 from qdem_fem.kernel.cpu.ordering import order_for_locality
-from validation.bench.qdem.judge import FloatArray, IntArray, lumped_mass, stiffness
+from validation.bench.qdem.judge import FloatArray, IntArray, build_stiffness, lump_mass
 
 ENVIRONMENT = {"MKL_DYNAMIC": "FALSE", "OMP_DYNAMIC": "FALSE", "MKL_THREADING_LAYER": "INTEL"}
 SAFETY = 0.9
@@ -51,14 +51,14 @@ class LinearProblem:
     step: float
     """dt [s]."""
 
-    def in_caller_order(self, u: NDArray[Any]) -> FloatArray:
+    def restore_order(self, u: NDArray[Any]) -> FloatArray:
         """u [m], (n, 3), in the caller's numbering."""
         out = np.empty((len(self.node_order), 3))
         out[self.node_order] = u.reshape(-1, 3)
         return out
 
 
-def linear_problem(
+def build_problem(
     nodes: FloatArray, elements: IntArray, material: tuple[float, float, float],
     fixed: NDArray[np.bool_], force: FloatArray,
 ) -> LinearProblem:  # fmt: skip
@@ -74,8 +74,8 @@ def linear_problem(
     place[order] = np.arange(len(nodes))
     points, corners = nodes[order], place[elements[element_order]]
     free = np.repeat(~fixed[order], 3).astype(float)
-    mass = np.repeat(lumped_mass(points, corners, density), 3)
-    rate = sparse.diags_array(free / mass) @ stiffness(points, corners, young, poisson)
+    mass = np.repeat(lump_mass(points, corners, density), 3)
+    rate = sparse.diags_array(free / mass) @ build_stiffness(points, corners, young, poisson)
     rate = sparse.csr_matrix(rate @ sparse.diags_array(free))
     rate.eliminate_zeros()
     rate.sort_indices()
@@ -105,7 +105,7 @@ class ScipyRival:
 
     def displacement(self) -> FloatArray:
         """u [m], (n, 3), in the caller's numbering."""
-        return self._problem.in_caller_order(self._u)
+        return self._problem.restore_order(self._u)
 
 
 class _Description(ctypes.Structure):
@@ -117,7 +117,7 @@ class _Description(ctypes.Structure):
 GENERAL = _Description(20, 0, 0)
 
 
-def mkl_load() -> ctypes.CDLL:
+def load_mkl() -> ctypes.CDLL:
     """MKL's run-time library, of this Python environment or of the system; or `LibraryMissing`."""
     folder = Path(sys.prefix) / "lib"
     found = [str(path) for path in sorted(folder.glob("libmkl_rt.so*"))]
@@ -138,7 +138,7 @@ class MklRival:
     def __init__(
         self, problem: LinearProblem, precision: str, threads: int, storage: str = "rows"
     ) -> None:
-        self._mkl, kind = mkl_load(), np.dtype(precision)
+        self._mkl, kind = load_mkl(), np.dtype(precision)
         self._mkl.MKL_Set_Dynamic(0)
         self._mkl.MKL_Set_Num_Threads(threads)
         letter = "d" if kind.itemsize == 8 else "s"
@@ -148,12 +148,12 @@ class MklRival:
         self._matrix = matrix.tobsr((3, 3)) if storage == "blocks" else matrix
         self._u, self._v = (np.zeros(matrix.shape[0], kind) for _ in range(2))
         self._increment = problem.increment.astype(kind)
-        self._product = self._function(f"mkl_sparse_{letter}_mv", ctypes.c_int)
-        self._add = self._function(f"cblas_{letter}axpy", None)
-        self._add_some = self._function(f"cblas_{letter}axpyi", None)
+        self._product = self._find_function(f"mkl_sparse_{letter}_mv", ctypes.c_int)
+        self._add = self._find_function(f"cblas_{letter}axpy", None)
+        self._add_some = self._find_function(f"cblas_{letter}axpyi", None)
         self._handle = self._make_handle(letter, 3 if storage == "blocks" else 1)
 
-    def _function(self, name: str, result: Any) -> Callable[..., Any]:
+    def _find_function(self, name: str, result: Any) -> Callable[..., Any]:
         function = self._mkl[name]
         function.restype = result
         return function
@@ -191,4 +191,4 @@ class MklRival:
 
     def displacement(self) -> FloatArray:
         """u [m], (n, 3), in the caller's numbering."""
-        return self._problem.in_caller_order(self._u)
+        return self._problem.restore_order(self._u)

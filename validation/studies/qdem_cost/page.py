@@ -8,7 +8,7 @@ from typing import Any
 
 from validation.bench.qdem.checks import describe_checks, describe_origin, draw_figure
 from validation.studies.qdem_cost.bars import check_bars
-from validation.studies.qdem_cost.reading import FAMILIES, LEVELS, describe_costs, family, frontier
+from validation.studies.qdem_cost.reading import FAMILIES, LEVELS, find_best, list_costs, list_runs
 from validation.study import Row, format_table
 
 STYLE = {
@@ -45,8 +45,8 @@ def describe(rows: Sequence[Row]) -> dict[str, str]:
     race = next(row["race"] for row in rows if "race" in row)
     speeds = sorted(((name, turn["speed"]) for name, turn in race.items()), key=lambda one: -one[1])
     return {
-        "bending": describe_costs(rows, "bending"),
-        "pulse": describe_costs(rows, "pulse"),
+        "bending": list_costs(rows, "bending"),
+        "pulse": list_costs(rows, "pulse"),
         "points": describe_checks(checks, POINTS),
         "bars": describe_checks(checks, RACE),
         "race": format_table(["who", "Mel/s"], [[name, f"{speed:.0f}"] for name, speed in speeds]),
@@ -57,14 +57,14 @@ def describe(rows: Sequence[Row]) -> dict[str, str]:
 def draw(rows: Sequence[Row], picture: Path) -> None:
     """Error against cost, a panel a question: every run faint, each method's frontier joined."""
 
-    def panels(figure: Any) -> None:
+    def draw_panels(figure: Any) -> None:
         for axes, question in zip(figure.subplots(1, 2), LEVELS, strict=True):
             for name in FAMILIES:
                 marker, colour = STYLE[name]
-                every = family(rows, question, name)
+                every = list_runs(rows, question, name)
                 cost, error = ([run[key] for run in every] for key in ("cost_s", "error"))
                 axes.plot(cost, error, marker, color=colour, alpha=0.3, markersize=4)
-                best = frontier(every)
+                best = find_best(every)
                 cost, error = ([run[key] for run in best] for key in ("cost_s", "error"))
                 axes.plot(cost, error, f"{marker}-", color=colour, label=name)
             axes.set(xscale="log", yscale="log", title=question,
@@ -72,4 +72,4 @@ def draw(rows: Sequence[Row], picture: Path) -> None:
             axes.grid(True, which="both", alpha=0.25)
         figure.axes[0].legend(fontsize=8)
 
-    draw_figure((11, 4.6), panels, picture)
+    draw_figure((11, 4.6), draw_panels, picture)

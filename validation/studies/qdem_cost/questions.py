@@ -64,17 +64,17 @@ class Question:
         times = np.linspace(0.0, RISE if self.bends else PULSE, 1001)
         return times, self.factor(times)
 
-    def held(self, nodes: FloatArray) -> NDArray[np.bool_]:
+    def find_held(self, nodes: FloatArray) -> NDArray[np.bool_]:
         """Clamped nodes, (n,)."""
         return np.asarray((nodes[:, 0] < 1e-9) & self.bends)
 
-    def loaded(self, nodes: FloatArray) -> NDArray[np.bool_]:
+    def find_loaded(self, nodes: FloatArray) -> NDArray[np.bool_]:
         """Nodes of the loaded end, (n,)."""
         return np.abs(nodes[:, 0] - (BEAM.length if self.bends else 0.0)) < 1e-9
 
     def force(self, mesh: TetMesh) -> FloatArray:
         """Greatest nodal forces [N], (n, 3): equal shares as in the paper, or a pressure's."""
-        loaded = self.loaded(mesh.nodes)
+        loaded = self.find_loaded(mesh.nodes)
         if self.bends:
             force = np.zeros_like(mesh.nodes)
             force[loaded, 2] = LOAD / loaded.sum()
@@ -94,25 +94,25 @@ class Question:
         return fine, float(np.linalg.norm(fine - coarse) / np.linalg.norm(fine))
 
 
-def _raised(times: FloatArray) -> FloatArray:
+def _raise_load(times: FloatArray) -> FloatArray:
     return np.where(times < RISE, np.sin(np.pi * times / RISE / 2) ** 2, 1.0)
 
 
-def _pulse(times: FloatArray) -> FloatArray:
+def _pulse_load(times: FloatArray) -> FloatArray:
     return np.where(times < PULSE, np.sin(np.pi * times / PULSE) ** 2, 0.0)
 
 
-BENDING = Question("bending", np.linspace(0, 0.11, 1101), 1 / 26.87, 0, 2, _raised, LOAD)
-TRAVEL = Question("pulse", np.linspace(0, 8e-4, 801), PULSE, 1, 0, _pulse, PRESSURE)
+BENDING = Question("bending", np.linspace(0, 0.11, 1101), 1 / 26.87, 0, 2, _raise_load, LOAD)
+TRAVEL = Question("pulse", np.linspace(0, 8e-4, 801), PULSE, 1, 0, _pulse_load, PRESSURE)
 QUESTIONS = {question.name: question for question in (BENDING, TRAVEL)}
 
 
-def bar_mesh(cells: list[int]) -> TetMesh:
+def mesh_bar(cells: list[int]) -> TetMesh:
     """The bar in five tetrahedra a cell."""
     return make_box_mesh(SIZE, (cells[0], cells[1], cells[2]), "five")
 
 
-def end_middle(nodes: FloatArray) -> int:
+def find_end_middle(nodes: FloatArray) -> int:
     """The node next to the middle of the end x = L."""
     middle = np.array([BEAM.length, BEAM.width / 2, BEAM.height / 2])
     return int(np.argmin(np.linalg.norm(nodes - middle, axis=1)))

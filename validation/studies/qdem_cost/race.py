@@ -29,8 +29,8 @@ from validation.studies.qdem_cost.matrices import (
     ENVIRONMENT,
     MklRival,
     ScipyRival,
-    linear_problem,
-    mkl_load,
+    build_problem,
+    load_mkl,
 )
 
 DURATION = 6.5e-4
@@ -93,7 +93,7 @@ def start_matrix(one: Contestant, nodes: Any, elements: Any) -> tuple[Callable[[
     tip = np.isclose(nodes[:, 0], SIZE[0])
     force = np.zeros_like(nodes)
     force[tip] = np.array(FORCE) / tip.sum()
-    problem = linear_problem(nodes, elements, MATERIAL, nodes[:, 0] == 0, force)
+    problem = build_problem(nodes, elements, MATERIAL, nodes[:, 0] == 0, force)
     rival: Any = ScipyRival(problem, one.precision)
     if one.who == "mkl":
         rival = MklRival(problem, one.precision, one.threads, one.storage)
@@ -123,7 +123,7 @@ def measure_speed(one: Contestant, cells: tuple[int, int, int]) -> dict[str, flo
 def race(cells: tuple[int, int, int], rounds: int) -> dict[str, dict[str, float]]:
     """Every contestant in ``rounds`` turns: the median speed [Mel/s], and its tip [m]."""
     try:
-        mkl_load()
+        load_mkl()
         contestants = CONTESTANTS
     except LibraryMissing:
         contestants = [one for one in CONTESTANTS if one.who != "mkl"]
@@ -147,7 +147,7 @@ def race(cells: tuple[int, int, int], rounds: int) -> dict[str, dict[str, float]
 
 
 @njit(parallel=True, fastmath=True, cache=True)
-def _triad(a: Any, b: Any, c: Any, threads: int, rounds: int) -> None:
+def _run_triad(a: Any, b: Any, c: Any, threads: int, rounds: int) -> None:
     for thread in prange(threads):
         first, last = thread * a.size // threads, (thread + 1) * a.size // threads
         for number in range(rounds):
@@ -159,16 +159,16 @@ def measure_bandwidth(threads: int, size: int = 16_000_000, rounds: int = 5) -> 
     """STREAM's triad a = b + s c in memory, 24 bytes an element [GB/s]; the best of five."""
     a, b, c = (np.full(size, value) for value in (0.0, 1.0, 2.0))
     set_num_threads(threads)
-    _triad(a, b, c, threads, 1)
+    _run_triad(a, b, c, threads, 1)
     walls = []
     for _ in range(5):
         began = time.perf_counter()
-        _triad(a, b, c, threads, rounds)
+        _run_triad(a, b, c, threads, rounds)
         walls.append(time.perf_counter() - began)
     return 24 * size * rounds / min(walls) / 1e9
 
 
-def bytes_per_element(elements: int, nodes: int) -> float:
+def count_bytes(elements: int, nodes: int) -> float:
     """Least traffic of a step to memory [B], elastic, float64, if each array moved once.
 
     An element's nine gradients, two stiffnesses and four node numbers are read; a node's

@@ -18,13 +18,13 @@ FAMILIES = ("QDEM float64", "QDEM float32", "P1 central difference", "P1 Newmark
 """Methods that are compared."""
 
 
-def family(rows: Sequence[Row], question: str, name: str) -> list[Row]:
+def list_runs(rows: Sequence[Row], question: str, name: str) -> list[Row]:
     """Runs of a method on a question, by cost."""
     runs = next(row["runs"] for row in rows if row["part"] == question)
     return sorted((run for run in runs if run["method"] == name), key=lambda run: run["cost_s"])
 
 
-def dependable(rows: Sequence[Row]) -> list[Row]:
+def list_dependable(rows: Sequence[Row]) -> list[Row]:
     """A family's runs, each with the largest error of those as fine as it in mesh and step.
 
     Errors of mesh and step may cancel, and do where linear elements are too stiff and Newmark's
@@ -39,10 +39,10 @@ def dependable(rows: Sequence[Row]) -> list[Row]:
     ]  # fmt: skip
 
 
-def frontier(rows: Sequence[Row]) -> list[Row]:
-    """Those `dependable` runs for which nothing cheaper is as good, by cost."""
+def find_best(rows: Sequence[Row]) -> list[Row]:
+    """Those `list_dependable` runs for which nothing cheaper is as good, by cost."""
     best: list[Row] = []
-    for row in sorted(dependable(rows), key=lambda row: row["cost_s"]):
+    for row in sorted(list_dependable(rows), key=lambda row: row["cost_s"]):
         if not best or row["error"] < best[-1]["error"]:
             best.append(row)
     return best
@@ -56,22 +56,22 @@ class Cost:
     guessed: bool
 
     def __str__(self) -> str:
-        return f"{figures(self.seconds)} s" + " (extrapolated)" * self.guessed
+        return f"{format_figures(self.seconds)} s" + " (extrapolated)" * self.guessed
 
 
-def figures(number: float) -> str:
+def format_figures(number: float) -> str:
     """Two figures, without a power of ten."""
     return f"{float(f'{number:.2g}'):g}"
 
 
-def cost_at(rows: Sequence[Row], error: float) -> Cost:
+def find_cost(rows: Sequence[Row], error: float) -> Cost:
     """Cost of an error: between the runs of the frontier along straight lines in logarithms.
 
     Above their largest error the cheapest run's; below the smallest the line through the last
     run and the one nearest to twice its error goes on, which a family that has stopped to
     converge (one mesh, ever finer steps) would not do: add meshes before trusting it.
     """
-    best = frontier(rows)
+    best = find_best(rows)
     if not best:
         return Cost(np.nan, True)
     errors, costs = (np.log([row[key] for row in best]) for key in ("error", "cost_s"))
@@ -85,32 +85,32 @@ def cost_at(rows: Sequence[Row], error: float) -> Cost:
     return Cost(float(np.exp(costs[-1] + slope * (wanted - errors[-1]))), True)
 
 
-def order(rows: Sequence[Row], count: int = 3) -> float:
+def fit_order(rows: Sequence[Row], count: int = 3) -> float:
     """Order of convergence in the size of the elements, least squares over the ``count`` finest."""
     finest = sorted(rows, key=lambda row: row["elements"])[-count:]
     size = np.log([row["elements"] ** (-1 / 3) for row in finest])
     return float(np.polyfit(size, np.log([row["error"] for row in finest]), 1)[0])
 
 
-def pairs(rows: Sequence[Row], question: str, one: str, other: str) -> list[tuple[Row, Row]]:
+def pair_runs(rows: Sequence[Row], question: str, one: str, other: str) -> list[tuple[Row, Row]]:
     """Runs of two families on the same mesh, coarse meshes first."""
-    found = {json.dumps(r["setting"]["cells"]): r for r in family(rows, question, other)}
+    found = {json.dumps(r["setting"]["cells"]): r for r in list_runs(rows, question, other)}
     return sorted(
-        ((r, found[json.dumps(r["setting"]["cells"])]) for r in family(rows, question, one)
+        ((r, found[json.dumps(r["setting"]["cells"])]) for r in list_runs(rows, question, one)
          if json.dumps(r["setting"]["cells"]) in found),
         key=lambda pair: pair[0]["elements"],
     )  # fmt: skip
 
 
-def describe_costs(rows: Sequence[Row], question: str) -> str:
+def list_costs(rows: Sequence[Row], question: str) -> str:
     """Costs at equal error: the cheapest bold, what is extrapolated in brackets."""
     lines = []
     for level in LEVELS[question]:
-        costs = [cost_at(family(rows, question, name), level) for name in FAMILIES]
+        costs = [find_cost(list_runs(rows, question, name), level) for name in FAMILIES]
         least = min((c.seconds for c in costs if np.isfinite(c.seconds)), default=np.nan)
         cells = []
         for cost in costs:
-            known = "none" if np.isnan(cost.seconds) else figures(cost.seconds)
+            known = "none" if np.isnan(cost.seconds) else format_figures(cost.seconds)
             text = f"({known})" if cost.guessed and known != "none" else known
             cells.append(f"**{text}**" if cost.seconds == least else text)
         lines.append([f"{level:.0%}", *cells])

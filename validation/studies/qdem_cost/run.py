@@ -13,7 +13,7 @@ from qdem_fem.mesh.generation import make_box_mesh
 from validation.bench.qdem_gpu.beam import SIZE
 from validation.studies.qdem_cost.methods import Answer, answer_by
 from validation.studies.qdem_cost.questions import QUESTIONS
-from validation.studies.qdem_cost.race import bytes_per_element, measure_bandwidth, race
+from validation.studies.qdem_cost.race import count_bytes, measure_bandwidth, race
 from validation.study import Row
 
 LEVELS = ((22, 2, 2), (44, 4, 4), (65, 6, 6), (87, 8, 8), (109, 10, 10), (130, 12, 12),
@@ -95,7 +95,7 @@ def race_kernels() -> Row:
     mesh = make_box_mesh(SIZE, RACE_CELLS, "five")
     return {
         "elements": len(mesh.elements),
-        "bytes_per_element": bytes_per_element(len(mesh.elements), len(mesh.nodes)),
+        "bytes_per_element": count_bytes(len(mesh.elements), len(mesh.nodes)),
         "bandwidth": {str(n): measure_bandwidth(n) for n in (1, 2)},
         "race": race(RACE_CELLS, ROUNDS),
     }

@@ -24,7 +24,7 @@ POINTS = {
 }
 
 
-def tips_left(checks: Sequence[Check], ratio: float, pattern: str) -> list[float]:
+def list_tips(checks: Sequence[Check], ratio: float, pattern: str) -> list[float]:
     """Tips over those of quadratic tetrahedra, mesh by mesh."""
     return [
         find_check(checks, f"nu {ratio:g}, {pattern}, {a} x {b} x {c}: tip over").value
@@ -36,7 +36,7 @@ def describe(rows: Sequence[Row]) -> dict[str, str]:
     """The text for each mark of the page."""
     checks = check_bars(rows)
     lines = [
-        [f"{ratio:g}", pattern, *(f"{share:.3f}" for share in tips_left(checks, ratio, pattern))]
+        [f"{ratio:g}", pattern, *(f"{share:.3f}" for share in list_tips(checks, ratio, pattern))]
         for ratio in RATIOS
         for pattern in PATTERNS
     ]
@@ -52,14 +52,14 @@ def draw(rows: Sequence[Row], picture: Path) -> None:
     """The tip over that of quadratic tetrahedra, by cells along the beam."""
     checks = check_bars(rows)
 
-    def panel(figure: Any) -> None:
+    def draw_panel(figure: Any) -> None:
         axes = figure.subplots()
         for ratio, colour in zip(RATIOS, ("#0b5394", "#cc7a00", "#cc0000"), strict=True):
             for pattern, style in zip(PATTERNS, ("o-", "s--"), strict=True):
-                share = tips_left(checks, ratio, pattern)
+                share = list_tips(checks, ratio, pattern)
                 along = [cells[0] for cells in LOCKING]
                 axes.plot(along, share, style, color=colour, label=f"nu {ratio:g}, {pattern}")
         axes.set(xlabel="cells along the beam", ylabel="tip over that of quadratic tetrahedra")
         axes.legend(fontsize=7)
 
-    draw_figure((5.5, 3.6), panel, picture)
+    draw_figure((5.5, 3.6), draw_panel, picture)

@@ -31,7 +31,7 @@ APART = 8.0
 """Of the frequencies kept in the record [Hz]."""
 
 
-def passages(bogie: BogieTable) -> tuple[Floats, Floats]:
+def find_passages(bogie: BogieTable) -> tuple[Floats, Floats]:
     """Times at which the two axles are on the sleeper, and at which each passage ends (2,) [s].
 
     The first ends half-way to the second, the second when that axle is ``lead`` behind.
@@ -41,7 +41,7 @@ def passages(bogie: BogieTable) -> tuple[Floats, Floats]:
     return on, np.array([on.mean(), on[1] + bogie.lead / bogie.speed])
 
 
-def settlement_at(time: Floats, down: Floats, ends: Floats) -> list[dict[str, float]]:
+def find_settlement(time: Floats, down: Floats, ends: Floats) -> list[dict[str, float]]:
     """Greatest settlement within each passage, and that at its end [m], of a point that is ``down``
     [m] below where it was at ``time`` [s].
 
@@ -70,11 +70,11 @@ def measure_packing(folder: Path, seed: int, friction: float) -> dict[str, Any]:
     trial = run_scene(prepared, folder / f"run-{seed}-{friction}")
     bogie, rows = prepared.scene.track.bogie, read_table(trial.folder / "probes.csv")
     assert bogie is not None
-    _, ends = passages(bogie)
+    _, ends = find_passages(bogie)
     points = {}
     for name in POINTS:
         aside, up = (rows[f"{name}_{axis}"] - rows[f"{name}_{axis}"][0] for axis in "yz")
-        last = settlement_at(rows["time"], -up, ends)
+        last = find_settlement(rows["time"], -up, ends)
         points[name] = {
             "greatest": max(one["greatest"] for one in last), "end": last[-1]["end"],
             "lateral": float(np.abs(aside).max()),
@@ -83,11 +83,11 @@ def measure_packing(folder: Path, seed: int, friction: float) -> dict[str, Any]:
     return {
         "seed": seed, "friction": friction, "points": points,
         "imbalance": trial.energy["relative_imbalance"], "cpu_s": trial.cpu, "step": trial.step,
-        "curves": spectra_of(prepared, rows),
+        "curves": find_spectra(prepared, rows),
     }  # fmt: skip
 
 
-def spectra_of(prepared: TrackPrepared, rows: dict[str, Floats]) -> dict[str, list[float]]:
+def find_spectra(prepared: TrackPrepared, rows: dict[str, Floats]) -> dict[str, list[float]]:
     """Every `APART` Hz: the load [N s], acceleration of S2 [m/s], mobility of B2 [m/(s N)]."""
     time, load = rows["time"], prepared.load
     frequency, spectrum = transform_record(time, np.interp(time, load.times, load.values[:, 2]))

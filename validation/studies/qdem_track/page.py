@@ -11,7 +11,7 @@ import numpy as np
 from validation.bench.qdem.checks import describe_checks, describe_origin, draw_figure
 from validation.studies.qdem_track.bars import check_bars
 from validation.studies.qdem_track.bogie import APART, FRICTIONS, POINTS
-from validation.study import Row, format_table, mean_interval
+from validation.study import Row, estimate_mean, format_table
 
 TWENTY = {
     "unbalanced force over mean contact force, at rest": "equilibrium, unbalanced",
@@ -66,7 +66,7 @@ def describe_packings(row: Row) -> str:
             found = [run["points"][point] for run in row["runs"] if run["friction"] == friction]
             cells = [point, f"{friction:g}"]
             for key in MEASURES:
-                mean, half = mean_interval([1e6 * one[key] for one in found])
+                mean, half = estimate_mean([1e6 * one[key] for one in found])
                 cells.append(f"{mean:.3g} ± {half:.2g}")
             ratio = np.mean([one["lateral_over_vertical"] for one in found])
             lines.append([*cells, f"{ratio:.2g}"])
@@ -79,7 +79,7 @@ def draw(rows: Sequence[Row], picture: Path) -> None:
     """Spectra of load, sleeper and a grain, a line a packing, at the friction of Table 1."""
     runs = [run for row in rows for run in row.get("runs", ()) if run["friction"] == FRICTIONS[0]]
 
-    def panels(figure: Any) -> None:
+    def draw_panels(figure: Any) -> None:
         shown = {"load": "load [N s]", "S2": "acceleration of the sleeper, S2 [m/s]",
                  "B2": "mobility of a grain, B2 [m/(s N)]"}  # fmt: skip
         for axes, (name, words) in zip(figure.subplots(1, 3), shown.items(), strict=True):
@@ -90,4 +90,4 @@ def draw(rows: Sequence[Row], picture: Path) -> None:
             axes.set(xlabel="frequency [Hz]", title=words)
         figure.axes[0].legend(fontsize=7)
 
-    draw_figure((12, 3.6), panels, picture)
+    draw_figure((12, 3.6), draw_panels, picture)

@@ -13,32 +13,32 @@ from qdem_fem.scene.checks import load_scene
 from qdem_fem.track.bed import STAGES, read_bed
 from qdem_fem.track.enter import TrackPrepared, choose_contact
 from qdem_fem.track.stand import begin_bed
-from validation.bench.qdem.checks import figures_row, reported
+from validation.bench.qdem.checks import make_row, report
 from validation.studies.qdem_track.bogie import FRICTIONS, SCENE, SEEDS, measure_packing
-from validation.studies.qdem_track.trials import blow_checks, lever_checks, resume_check
+from validation.studies.qdem_track.trials import check_blows, check_levers, check_resume
 from validation.study import Row
 
 STEPS = 500
 
 
-def twenty() -> Row:
+def run_twenty() -> Row:
     """20 grains, in a folder that is thrown away."""
     with tempfile.TemporaryDirectory() as name, warnings.catch_warnings():
         warnings.simplefilter("ignore", StepWarning)  # contact makes the step short: known here
         folder = Path(name)
-        checks, reference = blow_checks(folder)
-        checks += [resume_check(folder), *lever_checks(folder, reference)]
-    return figures_row(checks)
+        checks, reference = check_blows(folder)
+        checks += [check_resume(folder), *check_levers(folder, reference)]
+    return make_row(checks)
 
 
-def packings() -> Row:
+def run_packings() -> Row:
     """300 grains under one bogie: 12 minutes of one thread a run, and a bed for each packing."""
     with tempfile.TemporaryDirectory() as name:
         pairs = product(SEEDS, FRICTIONS)
-        return figures_row([], runs=[measure_packing(Path(name), *pair) for pair in pairs])
+        return make_row([], runs=[measure_packing(Path(name), *pair) for pair in pairs])
 
 
-def paper_scale() -> Row:
+def run_paper_scale() -> Row:
     """A step of the paper's track from its bed at rest, one thread, all bodies deformable."""
     prepared = load_scene(SCENE.with_name("track.toml"))
     assert isinstance(prepared, TrackPrepared)
@@ -58,14 +58,14 @@ def paper_scale() -> Row:
     run.advance(STEPS * run.step)
     spent = (time.process_time() - started) / STEPS
     elements = sum(len(body.elements) for body in run.bodies)
-    return figures_row([
-        reported("grains", len(run.bodies) - 1),
-        reported("elements", elements),
-        reported("step", run.step, "s"),
-        reported("processor time of a step", spent, "s"),
-        reported("million element-steps a processor second", elements / spent / 1e6),
-        reported("preparation", sum(rest["cpu_s"] for rest in bed.rests.values()), "s CPU"),
+    return make_row([
+        report("grains", len(run.bodies) - 1),
+        report("elements", elements),
+        report("step", run.step, "s"),
+        report("processor time of a step", spent, "s"),
+        report("million element-steps a processor second", elements / spent / 1e6),
+        report("preparation", sum(rest["cpu_s"] for rest in bed.rests.values()), "s CPU"),
     ])  # fmt: skip
 
 
-PARTS = {"twenty": twenty, "packings": packings, "paper scale": paper_scale}
+PARTS = {"twenty": run_twenty, "packings": run_packings, "paper scale": run_paper_scale}

@@ -15,8 +15,8 @@ from qdem_fem.scene.energy_account import list_energy_facts
 from qdem_fem.scene.run import RunFolder, run_dynamic
 from qdem_fem.track.bed import prepare_bed
 from qdem_fem.track.enter import TrackPrepared
-from validation.bench.qdem.checks import reported
-from validation.bench.track_trials import scene_at
+from validation.bench.qdem.checks import report
+from validation.bench.track_trials import load_track
 from validation.case import Check
 
 FRICTIONS = (0.577, 1.73)
@@ -31,7 +31,7 @@ DURATION = 0.015
 class Quiet:
     """No progress is printed."""
 
-    def at(self, steps: int, total: int, when: float) -> None:
+    def report(self, steps: int, total: int, when: float) -> None:
         """Nothing."""
 
 
@@ -55,7 +55,7 @@ def run_scene(prepared: TrackPrepared, folder: Path) -> Trial:
     """Prepare, where that is not done yet, and run."""
     run, bodies = make_simulation(prepared)
     place = RunFolder(folder)
-    with place.locked():
+    with place.lock():
         done = run_dynamic(prepared, run, bodies, place, resume=False, progress=Quiet())
     return Trial(
         facts=list_track_facts(place.path, prepared.load),
@@ -67,25 +67,25 @@ def run_scene(prepared: TrackPrepared, folder: Path) -> Trial:
     )
 
 
-def blow_checks(folder: Path) -> tuple[list[Check], Trial]:
+def check_blows(folder: Path) -> tuple[list[Check], Trial]:
     """Equilibrium, and both frictions of the paper from the same bed."""
     trials = [
-        run_scene(scene_at(folder, f"contact.friction={f}"), folder / f"friction-{f}")
+        run_scene(load_track(folder, f"contact.friction={f}"), folder / f"friction-{f}")
         for f in FRICTIONS
     ]
     rest = trials[0].rests["rest"]
     asked = {"unbalanced": 0.1, "kinetic": 0.01, "loose": 0.02}
-    checks = [at_most(f"equilibrium, {name}", rest[name], bar) for name, bar in asked.items()]
+    checks = [check_max(f"equilibrium, {name}", rest[name], bar) for name, bar in asked.items()]
     spent = sum(one["cpu_s"] for one in trials[0].rests.values())
-    checks.append(reported("preparation", spent, "s CPU"))
+    checks.append(report("preparation", spent, "s CPU"))
     for friction, one in zip(FRICTIONS, trials, strict=True):
         of, name = one.facts["sleeper"], f"friction {friction}"
         missing = one.energy["relative_imbalance"]
         checks += [
-            at_most(f"{name}: missing in the account of energies", missing, 1e-3),
-            reported(f"{name}: greatest settlement", of["settlement_greatest"], "m"),
-            reported(f"{name}: settlement that stays", of["settlement"], "m"),
-            reported(f"{name}: processor time a simulated second", one.cpu / DURATION, "s/s"),
+            check_max(f"{name}: missing in the account of energies", missing, 1e-3),
+            report(f"{name}: greatest settlement", of["settlement_greatest"], "m"),
+            report(f"{name}: settlement that stays", of["settlement"], "m"),
+            report(f"{name}: processor time a simulated second", one.cpu / DURATION, "s/s"),
         ]
     for key in ("settlement_greatest", "lateral_greatest"):
         ratio = trials[1].facts["sleeper"][key] / trials[0].facts["sleeper"][key]
@@ -94,14 +94,14 @@ def blow_checks(folder: Path) -> tuple[list[Check], Trial]:
     return checks, trials[0]
 
 
-def at_most(name: str, value: float, bar: float, unit: str = "") -> Check:
+def check_max(name: str, value: float, bar: float, unit: str = "") -> Check:
     """A value and its upper bar."""
     return Check(name, float(value), f"<= {bar:g}", bool(value <= bar), unit)
 
 
-def resume_check(folder: Path) -> Check:
+def check_resume(folder: Path) -> Check:
     """A run that is saved and taken up again beside one that is not: the same to the bit."""
-    runs = [make_simulation(scene_at(folder))[0] for _ in range(2)]
+    runs = [make_simulation(load_track(folder))[0] for _ in range(2)]
     half = 1000 * runs[0].step
     runs[0].advance(half)
     runs[0].save(folder / "half.npz")
@@ -113,7 +113,7 @@ def resume_check(folder: Path) -> Check:
     return Check("resumed run less uninterrupted one", apart, "== 0", apart == 0.0, "m")
 
 
-def lever_checks(folder: Path, reference: Trial) -> list[Check]:
+def check_levers(folder: Path, reference: Trial) -> list[Check]:
     """What makes a run cheaper, and at what error of the greatest settlement."""
     levers = {"three contacts": ["contact.contacts=3"]}
     levers |= {
@@ -130,11 +130,11 @@ def lever_checks(folder: Path, reference: Trial) -> list[Check]:
     }  # fmt: skip
     checks, known = [], reference.facts["sleeper"]["settlement_greatest"]
     for number, (name, overrides) in enumerate(levers.items()):
-        one = run_scene(scene_at(folder, *overrides), folder / f"lever-{number}")
+        one = run_scene(load_track(folder, *overrides), folder / f"lever-{number}")
         error = one.facts["sleeper"]["settlement_greatest"] / known - 1
         checks += [
-            reported(f"{name}: step over the reference's", one.step / reference.step),
-            reported(f"{name}: processor time over the reference's", one.cpu / reference.cpu),
-            reported(f"{name}: settlement, greatest, beside the reference's", error),
+            report(f"{name}: step over the reference's", one.step / reference.step),
+            report(f"{name}: processor time over the reference's", one.cpu / reference.cpu),
+            report(f"{name}: settlement, greatest, beside the reference's", error),
         ]
     return checks

@@ -44,7 +44,7 @@ def describe(rows: Sequence[Row]) -> dict[str, str]:
     checks = check_bars(rows)
     modes = next(row["modes"] for row in rows if "modes" in row)
 
-    def value(start: str, form: str) -> str:
+    def show(start: str, form: str) -> str:
         return format(find_check(checks, start).value, form)
 
     return {
@@ -53,9 +53,9 @@ def describe(rows: Sequence[Row]) -> dict[str, str]:
             ["mode", "scikit-fem [Hz]", "QDEM [Hz]", "beam theory [Hz]"],
             [[name, *(f"{one:.2f}" for one in found)] for name, *found in modes],
         ),
-        "excess": value(f"{BIG}: excess stiffness", ".2f"),
-        "six": value("six tetrahedra a cell: excess", ".1f"),
-        "five": value("five tetrahedra a cell: excess", ".1f"),
+        "excess": show(f"{BIG}: excess stiffness", ".2f"),
+        "six": show("six tetrahedra a cell: excess", ".1f"),
+        "five": show("five tetrahedra a cell: excess", ".1f"),
         "made": describe_origin(rows),
     }
 
@@ -67,7 +67,7 @@ def draw(rows: Sequence[Row], picture: Path) -> None:
     first, second, third = (tip for _, tip, _ in quadratic[-3:])
     limit = third - (third - second) ** 2 / (third - 2 * second + first)  # Aitken's
 
-    def panels(figure: Any) -> None:
+    def draw_panels(figure: Any) -> None:
         by_mesh, by_cost = figure.subplots(1, 2)
         for method, (marker, colour) in STYLE.items():
             for pattern, inside in (("six", colour), ("five", "white")):
@@ -88,4 +88,4 @@ def draw(rows: Sequence[Row], picture: Path) -> None:
             axes.grid(True, which="both", alpha=0.25)
         by_mesh.legend(fontsize=7)
 
-    draw_figure((11, 4.6), panels, picture)
+    draw_figure((11, 4.6), draw_panels, picture)

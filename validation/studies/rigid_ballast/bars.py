@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from validation.case import Check
 from validation.studies.rigid_ballast.run import LEVELS, Level, Row
-from validation.study import mean_interval
+from validation.study import estimate_mean
 
 Floats = NDArray[np.float64]
 OVERLAP, GAIN, UPRIGHT = 1e-6, 0.01, 1e-3
@@ -36,7 +36,7 @@ class Summary:
     """It is the finest of its method, judged by that of the other."""
 
 
-def runs_of(rows: Sequence[Row], level: Level) -> list[Row]:
+def list_runs(rows: Sequence[Row], level: Level) -> list[Row]:
     """Runs of a level, bed after bed."""
     return [row["runs"][level.name] for row in rows if "runs" in row]
 
@@ -44,7 +44,7 @@ def runs_of(rows: Sequence[Row], level: Level) -> list[Row]:
 def list_ends(rows: Sequence[Row], method: str) -> Floats:
     """Settlement after the last cycle of a method's finest level (beds,) [m]."""
     finest = [level for level in LEVELS if level.method == method][-1]
-    return np.array([run["settlement"][-1] for run in runs_of(rows, finest)])
+    return np.array([run["settlement"][-1] for run in list_runs(rows, finest)])
 
 
 def summarise(rows: Sequence[Row]) -> list[Summary]:
@@ -53,12 +53,12 @@ def summarise(rows: Sequence[Row]) -> list[Summary]:
     finest = [[level for level in LEVELS if level.method == method][-1] for method in ends]
     found = []
     for level in LEVELS:
-        runs = runs_of(rows, level)
+        runs = list_runs(rows, level)
         reference = sum(ends.values()) / 2
         if level in finest:
             reference = ends["soft" if level.method == "rigid" else "rigid"]
         settled = np.array([run["settlement"] for run in runs])
-        off, wide = mean_interval(settled[:, -1] - reference)
+        off, wide = estimate_mean(settled[:, -1] - reference)
         scale = float(np.mean(reference))
         found.append(Summary(
             level, settled, (off / scale, wide / scale), np.array([run["cpu_s"] for run in runs]),
@@ -70,7 +70,7 @@ def summarise(rows: Sequence[Row]) -> list[Summary]:
 def check_bars(rows: Sequence[Row]) -> list[Check]:
     """The bars of rigid runs, and each level's error and cost."""
     rigid = [(level, run) for level in LEVELS if level.method == "rigid"
-             for run in runs_of(rows, level)]  # fmt: skip
+             for run in list_runs(rows, level)]  # fmt: skip
     failed = sum("why" in run for _, run in rigid)
     tilt = max(abs(run["tilt"]) for _, run in rigid)
     overlap = max(run["overlap"] for _, run in rigid) / SMALLEST

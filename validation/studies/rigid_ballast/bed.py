@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from rigid_lcp.motion.state import Motion, replace_rates
 from rigid_lcp.motion.world import Scene, make_world
-from rigid_lcp.scene.file import loads_of, scene_build, scene_read
+from rigid_lcp.scene.file import build_scene, load_scene, make_loads
 from rigid_lcp.scene.simulation import Simulation
-from validation.studies.rigid_ballast.soft import soft_advance, soft_grains
+from validation.studies.rigid_ballast.soft import advance_grains, soften_grains
 
 Floats = NDArray[np.float64]
 
@@ -53,14 +53,16 @@ class Moment:
 def prepare_bed(seed: int) -> tuple[Scene, Motion]:
     """The scene of a seed and its tamped state at rest."""
     seeds = [f"grains.{k}.seed={seed + 1000 * k}" for k in range(3)]
-    file = scene_read(SCENE, seeds)
-    scene = scene_build(file)
-    run = Simulation(scene, step=PREPARED_STEP, tolerance=PREPARED_TOLERANCE, loads=loads_of(file))
+    file = load_scene(SCENE, seeds)
+    scene = build_scene(file)
+    run = Simulation(
+        scene, step=PREPARED_STEP, tolerance=PREPARED_TOLERANCE, loads=make_loads(file)
+    )
     run.advance(TAMPED)
     return scene, replace_rates(run.motion, 0 * run.motion.rates)
 
 
-def load_at(time: Floats | float) -> Floats:
+def find_load(time: Floats | float) -> Floats:
     """Load of the sleeper (m, 2) [N] at m times [s] from the begin of the first cycle."""
     times = np.atleast_1d(np.asarray(time, dtype=float))
     angle = 2 * np.pi * np.maximum(times, 0.0) / PERIOD
@@ -69,12 +71,12 @@ def load_at(time: Floats | float) -> Floats:
     return np.column_stack([LATERAL * wheel * np.sin(angle), -down])
 
 
-def sleeper_of(scene: Scene) -> int:
+def find_sleeper(scene: Scene) -> int:
     """Number of the sleeper."""
     return next(n for n, body in enumerate(scene.bodies) if body.name == "sleeper")
 
 
-def overlap_of(scene: Scene, motion: Motion) -> float:
+def find_overlap(scene: Scene, motion: Motion) -> float:
     """Greatest overlap of any two bodies in a state [m]."""
     return max(0.0, -float(make_world(scene)[0].contacts(motion, 0.0).gap.min(initial=0.0)))
 
@@ -84,14 +86,14 @@ def load_rigid(
 ) -> Iterator[Moment]:
     """Load cycles by `rigid_lcp` with steps of ``step`` [s] at most: after the rest and after
     every half cycle."""
-    body, spent, work = sleeper_of(scene), 0.0, 0.0
+    body, spent, work = find_sleeper(scene), 0.0, 0.0
     forces = np.zeros((len(scene.bodies), 3))
 
-    def loads(time: float, motion: Motion) -> Floats:
-        forces[body, :2] = load_at(time - REST)[0]
+    def find_loads(time: float, motion: Motion) -> Floats:
+        forces[body, :2] = find_load(time - REST)[0]
         return forces
 
-    run = Simulation(scene, step=step, tolerance=tolerance, loads=loads)
+    run = Simulation(scene, step=step, tolerance=tolerance, loads=find_loads)
     run.motion = start
     for part in range(2 * cycles + 1):
         seconds = REST if part == 0 else PERIOD / 2
@@ -103,7 +105,7 @@ def load_rigid(
             work += float(forces[body, :2] @ (run.positions[body] - before))
         yield Moment(
             float(run.positions[body, 1]), float(run.angles[body]), run.energy, work,
-            overlap_of(scene, run.motion), spent, run.steps, run.worst_residual,
+            find_overlap(scene, run.motion), spent, run.steps, run.worst_residual,
         )  # fmt: skip
 
 
@@ -112,17 +114,17 @@ def load_soft(
 ) -> Iterator[Moment]:
     """The same load cycles by soft grains of normal stiffness ``stiffness`` [N/m]."""
     world = make_world(scene)[0]
-    run = soft_grains(world, start, stiffness, FRICTION, share)
-    body, spent = sleeper_of(scene), 0.0
+    run = soften_grains(world, start, stiffness, FRICTION, share)
+    body, spent = find_sleeper(scene), 0.0
     for part in range(2 * cycles + 1):
         seconds = REST if part == 0 else PERIOD / 2
         since = -REST if part == 0 else PERIOD / 2 * (part - 1)
-        forces = load_at(since + np.linspace(0, seconds, 41))
+        forces = find_load(since + np.linspace(0, seconds, 41))
         begin = process_time()
-        soft_advance(run, body, forces, seconds)
+        advance_grains(run, body, forces, seconds)
         spent += process_time() - begin
         yield Moment(
             float(run.motion.position[body, 1]), float(run.motion.angle[body]),
-            world.energy(run.motion), run.work, overlap_of(scene, run.motion), spent, run.steps,
+            world.energy(run.motion), run.work, find_overlap(scene, run.motion), spent, run.steps,
             0.0,
         )  # fmt: skip

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from validation.studies.rigid_ballast.bars import Summary, list_ends, runs_of, summarise
+from validation.studies.rigid_ballast.bars import Summary, list_ends, list_runs, summarise
 from validation.studies.rigid_ballast.run import Row
 from validation.studies.rigid_ballast.space import CYCLES, STEPS
-from validation.study import describe_commits, format_table, mean_interval
+from validation.study import describe_commits, estimate_mean, format_table
 
 COLOURS = {"rigid": "#0b5fa5", "soft": "#d1495b"}
 
@@ -18,16 +18,16 @@ COLOURS = {"rigid": "#0b5fa5", "soft": "#d1495b"}
 def describe(rows: Sequence[Row]) -> dict[str, str]:
     """The text for each mark of the page."""
     return {
-        "LIMITS": _limits(rows),
-        "LEVELS": _levels(rows, summarise(rows)),
-        "SPACE": _space(rows),
+        "LIMITS": _describe_limits(rows),
+        "LEVELS": _tabulate_levels(rows, summarise(rows)),
+        "SPACE": _tabulate_space(rows),
         "COMMITS": describe_commits(row["origin"]["commit"] for row in rows),
     }
 
 
-def _limits(rows: Sequence[Row]) -> str:
+def _describe_limits(rows: Sequence[Row]) -> str:
     rigid, soft = (list_ends(rows, method) for method in ("rigid", "soft"))
-    apart, wide = mean_interval(rigid - soft)
+    apart, wide = estimate_mean(rigid - soft)
     mean = float(np.mean((rigid + soft) / 2))
     verdict = "differ" if abs(apart) > wide else "cannot be distinguished"
     return (
@@ -38,15 +38,15 @@ def _limits(rows: Sequence[Row]) -> str:
     )
 
 
-def _levels(rows: Sequence[Row], found: Sequence[Summary]) -> str:
+def _tabulate_levels(rows: Sequence[Row], found: Sequence[Summary]) -> str:
     """Settlement, error and cost of every level, the cost also over that of rigid steps of 1 ms."""
     paper = next(each for each in found if each.level.name == "rigid, h = 1 ms")
     table = []
     for each in found:
-        mean, wide = mean_interval(each.settlement[:, -1])
-        middle, half = mean_interval(np.log(each.cost / paper.cost))
+        mean, wide = estimate_mean(each.settlement[:, -1])
+        middle, half = estimate_mean(np.log(each.cost / paper.cost))
         low, ratio, high = np.exp([middle - half, middle, middle + half])
-        recoil = np.median([run["recoil"] for run in runs_of(rows, each.level)])
+        recoil = np.median([run["recoil"] for run in list_runs(rows, each.level)])
         table.append([
             each.level.name + " (finest)" * each.is_limit,
             f"{1e3 * each.settlement[:, 0].mean():.2f}", f"{1e3 * mean:.2f} ± {1e3 * wide:.2f}",
@@ -59,7 +59,7 @@ def _levels(rows: Sequence[Row], found: Sequence[Summary]) -> str:
     return format_table(head, table)
 
 
-def _space(rows: Sequence[Row]) -> str:
+def _tabulate_space(rows: Sequence[Row]) -> str:
     """Settlement in space by the step, and its difference from the finest."""
     samples = [row["space"] for row in rows if "space" in row]
     ends = {step: np.array([each[f"{step:g}"]["settlement"][-1] for each in samples])
@@ -67,8 +67,8 @@ def _space(rows: Sequence[Row]) -> str:
     table = []
     for step in STEPS:
         runs = [each[f"{step:g}"] for each in samples]
-        mean, wide = mean_interval(ends[step])
-        apart, half = mean_interval(ends[step] - ends[min(STEPS)])
+        mean, wide = estimate_mean(ends[step])
+        apart, half = estimate_mean(ends[step] - ends[min(STEPS)])
         shift = "" if step == min(STEPS) else f"{1e3 * apart:+.3f} ± {1e3 * half:.3f}"
         table.append([
             f"{1e3 * step:g} ms", f"{1e3 * mean:.3f} ± {1e3 * wide:.3f}", shift,

@@ -20,8 +20,19 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rigid_lcp.contact.detection_plane import Shapes2D, pair_contacts, shapes_2d, widest_face
-from rigid_lcp.contact.near_pairs import HALF_SPACE, POLYGON, bound_shapes, near_pairs, place_shapes
+from rigid_lcp.contact.detection_plane import (
+    Shapes2D,
+    find_pair_contacts,
+    find_widest_face,
+    pack_shapes_2d,
+)
+from rigid_lcp.contact.near_pairs import (
+    HALF_SPACE,
+    POLYGON,
+    bound_shapes,
+    find_near_pairs,
+    place_shapes,
+)
 from rigid_lcp.motion.state import Motion
 from rigid_lcp.motion.world import World
 
@@ -55,7 +66,7 @@ class Springs:
 
 @dataclass
 class SoftGrains:
-    """State of a run of soft grains; `soft_advance` goes on with it."""
+    """State of a run of soft grains; `advance_grains` goes on with it."""
 
     world: World
     motion: Motion
@@ -76,18 +87,18 @@ class SoftGrains:
     steps: int = 0
 
 
-def soft_grains(
+def soften_grains(
     world: World, motion: Motion, stiffness: float, friction: float, share: float = STEP_SHARE
 ) -> SoftGrains:
     """Soft grains in the state of rigid ones: they still have to sink into each other."""
-    shapes = shapes_2d([body.shape for body in world.scene.bodies], world.movable)
+    shapes = pack_shapes_2d([body.shape for body in world.scene.bodies], world.movable)
     lightest = float(world.mass[world.movable].min())
     step = share * 2.0 * float(np.sqrt(lightest / stiffness))
     none = (np.zeros((0, 2), np.int64), np.zeros((0, 7)), np.zeros((0, 2)))
     return SoftGrains(world, motion, stiffness, friction, shapes, Springs(), step, none)
 
 
-def soft_advance(run: SoftGrains, body: int, forces: Floats, seconds: float) -> None:
+def advance_grains(run: SoftGrains, body: int, forces: Floats, seconds: float) -> None:
     """Go on for ``seconds`` [s] in equal steps, a force on one body.
 
     ``forces`` (m, 2) [N]: at m equal times from now to the end; linear in between.
@@ -102,7 +113,7 @@ def soft_advance(run: SoftGrains, body: int, forces: Floats, seconds: float) -> 
     inverse[moving, 2] = 1.0 / world.inertia[moving]
     law = np.array([run.stiffness, TANGENTIAL * run.stiffness, run.damping, run.friction])
     springs = run.springs
-    done = soft_run(
+    done = march_grains(
         shapes.kind, shapes.first, shapes.vertices, shapes.normals, shapes.radius, shapes.movable,
         world.reach, place, rates, inverse, world.scene.gravity, law, SKIN * world.length,
         seconds / steps, steps, body, np.ascontiguousarray(forces, dtype=float),
@@ -118,14 +129,14 @@ def soft_advance(run: SoftGrains, body: int, forces: Floats, seconds: float) -> 
 
 
 @njit(cache=True)
-def pairs_listed(
+def list_pairs(
     kind: Ints, first: Ints, vertices: Floats, normals: Floats, radius: Floats, position: Floats,
     movable: NDArray[np.bool_], skin: float,
 ) -> Ints:  # fmt: skip
     """Pairs of bodies that are nearer than ``skin`` [m], a lower bound of their distance taken."""
     margin = np.full(len(kind), 0.5 * skin)
     boxes = bound_shapes(first, vertices, radius, position, margin)
-    pairs = near_pairs(kind, boxes, movable)
+    pairs = find_near_pairs(kind, boxes, movable)
     near = np.zeros(len(pairs), dtype=np.bool_)
     for row in range(len(pairs)):
         i, j = pairs[row]
@@ -139,14 +150,16 @@ def pairs_listed(
         elif kind[i] == POLYGON and kind[j] == POLYGON:
             vi, ni = vertices[first[i] : first[i + 1]], normals[first[i] : first[i + 1]]
             vj, nj = vertices[first[j] : first[j + 1]], normals[first[j] : first[j + 1]]
-            near[row] = widest_face(vi, ni, vj)[1] <= skin and widest_face(vj, nj, vi)[1] <= skin
+            near[row] = (
+                find_widest_face(vi, ni, vj)[1] <= skin and find_widest_face(vj, nj, vi)[1] <= skin
+            )
         else:
             near[row] = True
     return pairs[near]
 
 
 @njit(cache=True)
-def springs_kept(
+def keep_springs(
     pair: Ints, key: Ints, point: Floats, old_pair: Ints, old_key: Ints, old_point: Floats,
     old_force: Floats,
 ) -> Floats:  # fmt: skip
@@ -185,7 +198,7 @@ def springs_kept(
 
 
 @njit(cache=True)
-def contact_law(
+def apply_law(
     law: Floats, gap: float, normal_rate: float, tangential_rate: float, spring: float,
     normal_mass: float, tangential_mass: float, h: float,
 ) -> tuple[float, float, float]:  # fmt: skip
@@ -204,7 +217,7 @@ def contact_law(
 
 
 @njit(cache=True)
-def soft_run(
+def march_grains(
     kind: Ints, first: Ints, vertices: Floats, normals: Floats, radius: Floats,
     movable: NDArray[np.bool_], reach: Floats, place: Floats, rates: Floats, inverse: Floats,
     gravity: Floats, law: Floats, skin: float, h: float, steps: int, loaded: int, forces: Floats,
@@ -233,19 +246,19 @@ def soft_run(
             furthest = max(furthest, moved + reach[b] * abs(place[b, 2] - listed_at[b, 2]))
         if not furthest <= 0.5 * skin:
             listed_at = place.copy()
-            pairs = pairs_listed(kind, first, world_vertices, world_normals, radius, position,
+            pairs = list_pairs(kind, first, world_vertices, world_normals, radius, position,
                                  movable, skin)  # fmt: skip
-        bodies, numbers, new_key = pair_contacts(
+        bodies, numbers, new_key = find_pair_contacts(
             pairs, kind, first, world_vertices, world_normals, radius, position, none
         )
         new_pair = np.empty(len(bodies), dtype=np.int64)
         for c in range(len(bodies)):
             a, b = bodies[c]
-            if kind[b] == HALF_SPACE:  # as `near_pairs` orders them
+            if kind[b] == HALF_SPACE:  # as `find_near_pairs` orders them
                 new_pair[c] = a * count + b
             else:
                 new_pair[c] = min(a, b) * count + max(a, b)
-        spring = springs_kept(new_pair, new_key, numbers[:, :2], pair, key, point, spring)
+        spring = keep_springs(new_pair, new_key, numbers[:, :2], pair, key, point, spring)
         pair, key, point = new_pair, new_key, numbers[:, :2].copy()
         at = (step + 0.5) / steps * (len(forces) - 1)
         low = min(int(at), len(forces) - 2)
@@ -267,7 +280,7 @@ def soft_run(
             normal_mass = 1.0 / (mass + arm_a**2 * inverse[a, 2] + arm_b**2 * inverse[b, 2])
             arm_a, arm_b = ax * n0 + ay * n1, bx * n0 + by * n1
             tangential_mass = 1.0 / (mass + arm_a**2 * inverse[a, 2] + arm_b**2 * inverse[b, 2])
-            normal, tangential, spring[c] = contact_law(
+            normal, tangential, spring[c] = apply_law(
                 law, numbers[c, 4], ux * n0 + uy * n1, -ux * n1 + uy * n0, spring[c],
                 normal_mass, tangential_mass, h,
             )  # fmt: skip

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from rigid_lcp.motion.state import Motion
 from rigid_lcp.motion.world import Scene
-from rigid_lcp.scene.file import scene_build, scene_read
+from rigid_lcp.scene.file import build_scene, load_scene
 from rigid_lcp.scene.simulation import Simulation
-from rigid_lcp.shapes.polyhedron import box
+from rigid_lcp.shapes.polyhedron import make_box
 from rigid_lcp.shapes.rotations import rotate
 
 SCENE = Path(__file__).parents[3] / "trackbed" / "scenes" / "sleeper-3d.toml"
@@ -35,12 +35,12 @@ HELD, FAR = 1e6, 10.0
 Floats = NDArray[np.float64]
 
 
-def bed(sample: int) -> tuple[Scene, int]:
+def make_bed(sample: int) -> tuple[Scene, int]:
     """Stones above their box and the block far above them; the block's number."""
     overrides = (f"grains.0.count={STONES}", f"grains.0.seed={sample}", "body=[]", "load=[]")
-    scene = scene_build(scene_read(SCENE, overrides))
+    scene = build_scene(load_scene(SCENE, overrides))
     block = scene.add(
-        box(*BLOCK), density=2400.0, position=[0.0, 0.0, FAR], friction=0.6, name="sleeper"
+        make_box(*BLOCK), density=2400.0, position=[0.0, 0.0, FAR], friction=0.6, name="sleeper"
     )
     body = scene.bodies[block]
     scene.bodies[block] = replace(body, inertia=HELD * body.inertia)
@@ -68,14 +68,14 @@ def push(motion: Motion, body: int, force: float) -> Floats:
     return loads
 
 
-def load_at(seconds: float) -> float:
+def find_load(seconds: float) -> float:
     """Load [N] ``seconds`` after the first cycle began."""
     return LEAST + (MOST - LEAST) * (0.5 - 0.5 * float(np.cos(2 * np.pi * FREQUENCY * seconds)))
 
 
 def measure_space(sample: int) -> dict[str, Any]:
     """Settlement after each cycle, cost and worst residual at every step."""
-    scene, block = bed(sample)
+    scene, block = make_bed(sample)
     pour = Simulation(scene, step=POUR_STEP, tolerance=TOLERANCE)
     pour.advance(POURING)
     start = Simulation(
@@ -92,7 +92,7 @@ def load_in_space(start: Simulation, block: int, step: float) -> dict[str, Any]:
     began = start.time
     run = Simulation(
         start.world.scene, step=step, tolerance=TOLERANCE,
-        loads=lambda now, motion: push(motion, block, load_at(now - began)),
+        loads=lambda now, motion: push(motion, block, find_load(now - began)),
     )  # fmt: skip
     run.motion, run.contacts, run.time = start.motion, start.contacts, began
     height, begin = [run.positions[block, 2]], process_time()

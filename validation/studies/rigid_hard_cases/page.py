@@ -37,9 +37,9 @@ def describe(rows: Sequence[Row]) -> dict[str, str]:
     return {
         "MET": f"{sum(line['ok'] for line in ours)} of {len(ours)} rows of `rigid_lcp` meet their "
         "bars.",
-        "ENGINES": _engines(lines),
-        "CASES": _families(rows),
-        "ABSENT": _absent(lines),
+        "ENGINES": _tabulate_engines(lines),
+        "CASES": _tabulate_families(rows),
+        "ABSENT": _list_absent(lines),
         "COMMITS": describe_commits(row["origin"]["commit"] for row in rows),
     }
 
@@ -48,7 +48,7 @@ def _name(line: Row) -> str:
     return str(line["method"]).partition(" ")[0]
 
 
-def _engines(lines: Sequence[Row]) -> str:
+def _tabulate_engines(lines: Sequence[Row]) -> str:
     """Each engine that ran: how many bars it met, and what a step cost it."""
     table = []
     for name in LOOKS:
@@ -61,7 +61,7 @@ def _engines(lines: Sequence[Row]) -> str:
     return format_table(head, table)
 
 
-def _families(rows: Sequence[Row]) -> str:
+def _tabulate_families(rows: Sequence[Row]) -> str:
     """A line a family, a column an engine: bars met of the rows that ran."""
     table = []
     for family in rows:
@@ -76,7 +76,7 @@ def _families(rows: Sequence[Row]) -> str:
     return format_table(("family", "cases", *LOOKS, "margin"), table)
 
 
-def _absent(lines: Sequence[Row]) -> str:
+def _list_absent(lines: Sequence[Row]) -> str:
     reasons = Counter((_name(line), line["why"]) for line in lines
                       if line["peer"] and line["steps"] == 0)  # fmt: skip
     return "\n".join(f"- {name}, {count}: {why}" for (name, why), count in reasons.items())

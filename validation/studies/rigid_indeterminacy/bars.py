@@ -26,26 +26,26 @@ def check_bars(rows: Sequence[Row]) -> list[Check]:
     return checks
 
 
-def _below(name: str, value: float, bar: float) -> Check:
+def _check_max(name: str, value: float, bar: float) -> Check:
     return Check(name, value, f"<= {bar:g}", value <= bar)
 
 
 def _check_scene(row: Row) -> Iterator[Check]:
     name, scene = row["part"], SCENES[row["part"]]
     if not scene.slides:
-        yield _below(f"{name}: direct limit - least energy", row["dense"], DENSE_BAR)
+        yield _check_max(f"{name}: direct limit - least energy", row["dense"], DENSE_BAR)
     for method in (SPRINGS, LIGGGHTS):
         mine = [run for run in row["runs"] if run["method"] == method]
         if not mine:
             continue
         if scene.slides:
             worst = max(run["residual"] for run in mine)
-            yield _below(f"{name}: {method}: worst residual", worst, RESIDUAL_BAR)
+            yield _check_max(f"{name}: {method}: worst residual", worst, RESIDUAL_BAR)
             continue
         ramp = SLOW if scene.friction else 0
         error = next(run["error"] for run in mine
                      if (run["stiffness"], run["ramp"]) == (STIFF, ramp))  # fmt: skip
-        yield _below(f"{name}: {method}: error at stiffness {STIFF:g}", error, STIFF_BAR)
+        yield _check_max(f"{name}: {method}: error at stiffness {STIFF:g}", error, STIFF_BAR)
 
 
 def _check_order(row: Row) -> Iterator[Check]:
@@ -53,4 +53,4 @@ def _check_order(row: Row) -> Iterator[Check]:
         yield Check(f"{pile['pile']}: limit found", float(pile["found"]), "= 1", pile["found"],
                     why=WHY)  # fmt: skip
         if pile["found"]:
-            yield _below(f"{pile['pile']}: other order", pile["order"], ORDER_BAR)
+            yield _check_max(f"{pile['pile']}: other order", pile["order"], ORDER_BAR)

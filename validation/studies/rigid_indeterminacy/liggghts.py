@@ -56,12 +56,12 @@ print "DONE $(step)"
 """
 
 
-def liggghts_there() -> bool:
+def has_liggghts() -> bool:
     """Whether the program is installed."""
     return shutil.which("liggghts") is not None
 
 
-def liggghts_rest(
+def settle_liggghts(
     grains: Grains, stiffness: float, friction: float, *, tangential: float = 1.0,
     ramp: int = 0, steps: int = 40_000,
 ) -> tuple[Floats, float, float]:  # fmt: skip
@@ -73,9 +73,9 @@ def liggghts_rest(
     h = 0.1 * sqrt(float(grains.mass.min()) / stiffness)
     with tempfile.TemporaryDirectory() as folder:
         home = Path(folder)
-        walls, dumps, planes = _walls(grains)
+        walls, dumps, planes = _format_walls(grains)
         size = float(np.linalg.norm(grains.gravity))
-        (home / "grains.data").write_text(_data(grains))
+        (home / "grains.data").write_text(_format_data(grains))
         (home / "deck.in").write_text(DECK.format(
             kn=stiffness, kt=tangential * stiffness, friction=friction, walls=walls, dumps=dumps,
             gamma=2 * DAMPING * sqrt(stiffness / float(grains.mass.mean())),
@@ -90,19 +90,19 @@ def liggghts_rest(
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         if f"DONE {steps}" not in done.stdout:
             raise RuntimeError(f"LIGGGHTS did not finish: {done.stdout[-400:]}")
-        force = _forces(grains, home, planes)
+        force = _read_forces(grains, home, planes)
     cpu = after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
     total = np.zeros((len(grains.mass) + 1, 2))
     np.add.at(total, grains.body_a, force)
     np.add.at(total, grains.body_b, -force)
     total[:-1] += grains.mass[:, None] * grains.gravity
-    normal = _normals(grains)
+    normal = _find_normals(grains)
     tangent = np.column_stack([-normal[:, 1], normal[:, 0]])
     parts = np.column_stack([(force * normal).sum(axis=1), (force * tangent).sum(axis=1)])
     return parts, float(np.abs(total[:-1]).max()) / grains.weight, cpu
 
 
-def _normals(grains: Grains) -> Floats:
+def _find_normals(grains: Grains) -> Floats:
     centre = np.vstack([grains.centre, np.zeros((1, 2))])
     between = centre[grains.body_a] + grains.place_a - centre[grains.body_b] - grains.place_b
     round_b = ~grains.face.any(axis=1)
@@ -111,7 +111,7 @@ def _normals(grains: Grains) -> Floats:
     return normal
 
 
-def _data(grains: Grains) -> str:
+def _format_data(grains: Grains) -> str:
     wide = 4.0 * len(grains.mass) ** 0.5 + 10.0 + float(np.abs(grains.centre).max())
     density = grains.mass / (4.0 / 3.0 * pi)
     atoms = [
@@ -123,7 +123,7 @@ def _data(grains: Grains) -> str:
     return "\n".join([*head, *atoms]) + "\n"
 
 
-def _walls(grains: Grains) -> tuple[str, str, list[int]]:
+def _format_walls(grains: Grains) -> tuple[str, str, list[int]]:
     """Lines of the walls, of their dumps, and for each wall its contacts' first row."""
     walls, dumps = "", ""
     rows: list[int] = []
@@ -147,7 +147,7 @@ def _walls(grains: Grains) -> tuple[str, str, list[int]]:
     return walls, dumps, rows
 
 
-def _forces(grains: Grains, home: Path, planes: list[int]) -> Floats:
+def _read_forces(grains: Grains, home: Path, planes: list[int]) -> Floats:
     """Forces on body a as vectors (nc, 2) [N]."""
     force = np.zeros((len(grains.body_a), 2))
     number = {
@@ -155,21 +155,21 @@ def _forces(grains: Grains, home: Path, planes: list[int]) -> Floats:
         for c, (a, b) in enumerate(zip(grains.body_a, grains.body_b, strict=True))
         if not grains.face[c].any()
     }
-    for first, second, fx, fz in _table(home / "pairs.dump"):
+    for first, second, fx, fz in _read_table(home / "pairs.dump"):
         i, j = int(first) - 1, int(second) - 1
         if (i, j) in number:
             force[number[i, j]] = fx, fz
         elif (j, i) in number:
             force[number[j, i]] = -fx, -fz
     for wall, first_row in enumerate(planes):
-        on_wall = _table(home / f"wall{wall}.dump")
+        on_wall = _read_table(home / f"wall{wall}.dump")
         same = (grains.face == grains.face[first_row]).all(axis=1)
         for c in np.flatnonzero(same):
             force[c] = on_wall[grains.body_a[c], 1:]
     return force
 
 
-def _table(path: Path) -> Floats:
+def _read_table(path: Path) -> Floats:
     lines = path.read_text().splitlines()
     begin = max(k for k, line in enumerate(lines) if line.startswith("ITEM: ")) + 1
     return np.array([[float(word) for word in line.split()] for line in lines[begin:]])

@@ -29,75 +29,75 @@ def describe(rows: Sequence[Row]) -> dict[str, str]:
     scenes = [row for row in rows if row["part"] in SCENES]
     resting = [row for row in scenes if not SCENES[row["part"]].slides]
     return {
-        "STIFF": _stiff(resting),
-        "COSTS": _costs(resting),
-        "SLIDING": _sliding([row for row in scenes if SCENES[row["part"]].slides]),
-        "ORDER": _order(next(row for row in rows if row["part"] == "order")),
+        "STIFF": _tabulate_stiff(resting),
+        "COSTS": _tabulate_costs(resting),
+        "SLIDING": _tabulate_sliding([row for row in scenes if SCENES[row["part"]].slides]),
+        "ORDER": _tabulate_order(next(row for row in rows if row["part"] == "order")),
         "COMMITS": describe_commits(row["origin"]["commit"] for row in rows),
     }
 
 
-def _number(value: float | None) -> str:
+def _format(value: float | None) -> str:
     return "-" if value is None else f"{value:.1e}"
 
 
-def _runs(row: Row, method: str) -> list[Row]:
+def _list_runs(row: Row, method: str) -> list[Row]:
     return [run for run in row["runs"] if run["method"] == method]
 
 
-def _stiff(rows: Sequence[Row]) -> str:
+def _tabulate_stiff(rows: Sequence[Row]) -> str:
     """Errors by stiffness, and of the direct limit against dense least squares."""
     table = []
     for row in rows:
         ramp = SLOW if SCENES[row["part"]].friction else 0
         for method in (SPRINGS, LIGGGHTS):
-            error = {run["stiffness"]: run["error"] for run in _runs(row, method)
+            error = {run["stiffness"]: run["error"] for run in _list_runs(row, method)
                      if run["ramp"] == ramp}  # fmt: skip
             if error:
                 table.append([
                     row["part"], str(row["contacts"]), str(row["redundant"]),
-                    _number(row["dense"]), method, *(_number(error.get(k)) for k in SHOWN),
+                    _format(row["dense"]), method, *(_format(error.get(k)) for k in SHOWN),
                 ])  # fmt: skip
     head = ("scene", "contacts", "redundant", "dense", "", *(f"k = {k:.0e}" for k in SHOWN))
     return format_table(head, table)
 
 
-def _costs(rows: Sequence[Row]) -> str:
+def _tabulate_costs(rows: Sequence[Row]) -> str:
     """Least costs [ms] to an error of 1e-6."""
     table = []
     for row in rows:
         cells = [f"{1e3 * row['limit_cpu_s']:.2g}"]
         for method in (RELAXATION, SPRINGS, LIGGGHTS):
-            reached = [run["cpu_s"] for run in _runs(row, method) if run["error"] <= 1e-6]
+            reached = [run["cpu_s"] for run in _list_runs(row, method) if run["error"] <= 1e-6]
             cells.append(f"{1e3 * min(reached):.2g}" if reached else "-")
         table.append([row["part"], *cells])
     return format_table(("scene", "direct limit", RELAXATION, SPRINGS, LIGGGHTS), table)
 
 
-def _sliding(rows: Sequence[Row]) -> str:
+def _tabulate_sliding(rows: Sequence[Row]) -> str:
     """Where contacts slide: errors by the steps of loading, and other states."""
     table = []
     for row in rows:
-        peer = {run["ramp"]: run["error"] for run in _runs(row, LIGGGHTS)}
-        for run in _runs(row, SPRINGS):
+        peer = {run["ramp"]: run["error"] for run in _list_runs(row, LIGGGHTS)}
+        for run in _list_runs(row, SPRINGS):
             table.append([
                 row["part"], f"{row['sliding']} of {row['contacts']}",
-                f"{run['ramp']:,}" if run["ramp"] else "at once", _number(run["error"]),
-                _number(peer.get(run["ramp"])), _number(run["residual"]),
-                _number(run.get("other_state")), _number(run.get("from_it")),
+                f"{run['ramp']:,}" if run["ramp"] else "at once", _format(run["error"]),
+                _format(peer.get(run["ramp"])), _format(run["residual"]),
+                _format(run.get("other_state")), _format(run.get("from_it")),
             ])  # fmt: skip
     head = ("scene", "sliding", "loaded in steps", SPRINGS, LIGGGHTS, "residual of the springs",
             "other state", "springs from it")  # fmt: skip
     return format_table(head, table)
 
 
-def _order(row: Row) -> str:
+def _tabulate_order(row: Row) -> str:
     """What another order and other numbers do."""
     return format_table(
         ("pile", "contacts", "sliding", "other order"),
         [
             [pile["pile"], str(pile["contacts"]), str(pile["sliding"]),
-             _number(pile["order"]) if pile["found"] else "not found"]
+             _format(pile["order"]) if pile["found"] else "not found"]
             for pile in row["piles"]
         ],
     )  # fmt: skip
@@ -112,15 +112,15 @@ def draw(rows: Sequence[Row], picture: Path) -> None:
     stiff, cost, slow = figure.subplots(1, 3)
     for k, name in enumerate(("beam on three supports", "pyramid of 15", "pyramid of 55")):
         for method in (SPRINGS, LIGGGHTS, RELAXATION):
-            runs = _runs(found[name], method)
+            runs = _list_runs(found[name], method)
             if method != RELAXATION:
-                _curve(stiff, runs, "stiffness", k, f"{method}, {name}")
-            _curve(cost, runs, "cpu_s", k, f"{method}, {name}")
+                _draw_curve(stiff, runs, "stiffness", k, f"{method}, {name}")
+            _draw_curve(cost, runs, "cpu_s", k, f"{method}, {name}")
         cost.plot(found[name]["limit_cpu_s"], max(found[name]["dense"], LEAST), "*",
                   color=COLOURS[k], markersize=11, label=f"direct limit, {name}")  # fmt: skip
     for k, name in enumerate(name for name, scene in SCENES.items() if scene.slides):
         for method in (SPRINGS, LIGGGHTS):
-            _curve(slow, _runs(found[name], method), "ramp", k, f"{method}, {name}")
+            _draw_curve(slow, _list_runs(found[name], method), "ramp", k, f"{method}, {name}")
     stiff.set(xlabel="stiffness, weights a metre", title="stiff limit",
               ylabel="greatest error of a contact force / weight")  # fmt: skip
     cost.set(xlabel="CPU time [s], one thread", title="cost")
@@ -132,7 +132,7 @@ def draw(rows: Sequence[Row], picture: Path) -> None:
     figure.savefig(picture, dpi=120)
 
 
-def _curve(axes: Any, runs: Sequence[Row], across: str, k: int, label: str) -> None:
+def _draw_curve(axes: Any, runs: Sequence[Row], across: str, k: int, label: str) -> None:
     if runs:
         x = [max(run[across], 100) if across == "ramp" else run[across] for run in runs]
         y = [max(run["error"], LEAST) for run in runs]

@@ -13,11 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigid_lcp.friction.problem.definition import FrictionProblem
-from rigid_lcp.unique.elastic_limit import elastic_limit
-from rigid_lcp.unique.micro_displacements import micro_displacements
-from validation.bench.rigid.static_grains import Grains, beam, groove, pyramid, renumbered, wedge
-from validation.studies.rigid_indeterminacy.liggghts import liggghts_rest, liggghts_there
-from validation.studies.rigid_indeterminacy.springs import springs_rest
+from rigid_lcp.unique.elastic_limit import find_elastic_limit
+from rigid_lcp.unique.micro_displacements import relax_displacements
+from validation.bench.rigid.static_grains import (
+    Grains,
+    build_beam,
+    build_groove,
+    build_pyramid,
+    build_wedge,
+    renumber,
+)
+from validation.studies.rigid_indeterminacy.liggghts import has_liggghts, settle_liggghts
+from validation.studies.rigid_indeterminacy.springs import settle_springs
 
 Floats = NDArray[np.float64]
 Row = dict[str, Any]
@@ -51,14 +58,14 @@ class Scene:
 
 
 SCENES = {
-    "beam on three supports": Scene(beam),
-    "wedge in a V": Scene(wedge),
-    "wedge in a V, sticking": Scene(wedge, 5.0),
-    "disc in a groove, sticking": Scene(groove, 5.0, True),
-    "pyramid of 15": Scene(partial(pyramid, 5, walls=True), 0.0, True),
-    "pyramid of 55": Scene(partial(pyramid, 10, walls=True), 0.0, True),
-    "pyramid of 15, friction 0.3": Scene(partial(pyramid, 5, walls=True), 0.3, True, True),
-    "pyramid of 55, friction 0.3": Scene(partial(pyramid, 10, walls=True), 0.3, True, True),
+    "beam on three supports": Scene(build_beam),
+    "wedge in a V": Scene(build_wedge),
+    "wedge in a V, sticking": Scene(build_wedge, 5.0),
+    "disc in a groove, sticking": Scene(build_groove, 5.0, True),
+    "pyramid of 15": Scene(partial(build_pyramid, 5, walls=True), 0.0, True),
+    "pyramid of 55": Scene(partial(build_pyramid, 10, walls=True), 0.0, True),
+    "pyramid of 15, friction 0.3": Scene(partial(build_pyramid, 5, walls=True), 0.3, True, True),
+    "pyramid of 55, friction 0.3": Scene(partial(build_pyramid, 10, walls=True), 0.3, True, True),
 }
 PILES = (6, 12, 16, 20, 30)
 """Rows of the pyramids whose order and start are changed."""
@@ -70,7 +77,7 @@ def count_sliding(force: Floats, friction: float) -> int:
     return int((at_limit & (force[:, 0] > 0)).sum()) if friction > 0 else 0
 
 
-def closed_rows(problem: FrictionProblem, force: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+def find_closed_rows(problem: FrictionProblem, force: Floats) -> tuple[Floats, NDArray[np.bool_]]:
     """J, and which of its rows belong to contacts that carry ``force`` (nc, 2)."""
     assert problem.bodies is not None
     closed = force[:, 0] > 1e-12 * force.max()
@@ -80,14 +87,14 @@ def closed_rows(problem: FrictionProblem, force: Floats) -> tuple[Floats, NDArra
 
 def count_redundant(problem: FrictionProblem, force: Floats) -> int:
     """Free parameters of the forces of closed contacts: their number less the rank of J there."""
-    rows, kept = closed_rows(problem, force)
+    rows, kept = find_closed_rows(problem, force)
     return int(kept.sum() - np.linalg.matrix_rank(rows[kept]))
 
 
-def least_energy(problem: FrictionProblem, force: Floats, fall: Floats) -> Floats:
+def minimise_energy(problem: FrictionProblem, force: Floats, fall: Floats) -> Floats:
     """``argmin sum f^2`` in balance with ``fall`` (ndof,) over closed contacts, by dense least
     squares."""
-    rows, kept = closed_rows(problem, force)
+    rows, kept = find_closed_rows(problem, force)
     found = np.zeros(len(kept))
     found[kept] = np.linalg.lstsq(rows[kept].T, -fall, rcond=1e-12)[0]
     return found
@@ -95,13 +102,13 @@ def least_energy(problem: FrictionProblem, force: Floats, fall: Floats) -> Float
 
 def measure_scene(scene: Scene) -> Row:
     """All ways to the forces of a scene."""
-    springs_rest(groove(), 1e4, 0.0, steps_max=400)  # compiled before it is timed
+    settle_springs(build_groove(), 1e4, 0.0, steps_max=400)  # compiled before it is timed
     grains = scene.make()
     problem, weight = grains.problem(scene.friction), grains.weight
     costs = []
     for _ in range(6):
         began = process_time()
-        answer = elastic_limit(problem)
+        answer = find_elastic_limit(problem)
         costs.append(process_time() - began)
     if not answer.solved:
         raise RuntimeError(answer.message)
@@ -109,7 +116,7 @@ def measure_scene(scene: Scene) -> Row:
     dense = None
     if not scene.slides:
         fall = np.column_stack([grains.mass[:, None] * grains.gravity, 0.0 * grains.mass]).ravel()
-        dense = float(np.abs(least_energy(problem, limit, fall) - answer.r).max()) / weight
+        dense = float(np.abs(minimise_energy(problem, limit, fall) - answer.r).max()) / weight
     runs = []
 
     def keep(method: str, began: float | None, force: Floats, cpu: float = 0.0, **more: Any) -> Row:
@@ -122,22 +129,22 @@ def measure_scene(scene: Scene) -> Row:
 
     for asked in (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12):
         began = process_time()
-        relaxed = micro_displacements(problem, tolerance=asked, iterations_max=30_000)
+        relaxed = relax_displacements(problem, tolerance=asked, iterations_max=30_000)
         keep(RELAXATION, began, relaxed.r.reshape(-1, 2), asked=asked)
     for stiffness, ramp in scene.settings():
         began = process_time()
-        rest = springs_rest(
+        rest = settle_springs(
             grains, stiffness * weight, scene.friction, ramp=ramp,
             tolerance=max(1e-11, 1e-14 * stiffness), steps_max=40_000 + ramp,
         )  # fmt: skip
         run = keep(SPRINGS, began, rest.force, stiffness=stiffness, ramp=ramp)
         if scene.slides and ramp >= SLOW:
             # whether the springs' forces are those of another state of eq. 38
-            other = elastic_limit(problem, begin=stiffness * weight * rest.displacement).r
+            other = find_elastic_limit(problem, begin=stiffness * weight * rest.displacement).r
             run["other_state"] = float(np.abs(other - answer.r).max()) / weight
             run["from_it"] = float(np.abs(rest.force.ravel() - other).max()) / weight
-        if scene.discs and liggghts_there():
-            force, _, cpu = liggghts_rest(
+        if scene.discs and has_liggghts():
+            force, _, cpu = settle_liggghts(
                 grains, stiffness * weight, scene.friction, ramp=ramp, steps=40_000 + ramp
             )
             keep(LIGGGHTS, None, force, cpu, stiffness=stiffness, ramp=ramp)
@@ -156,19 +163,19 @@ def measure_order() -> Row:
 def try_order(rows: int, friction: float) -> Row:
     """A pyramid of so many rows: relative differences (2-norm) of all forces with contacts and
     bodies in random order."""
-    grains = pyramid(rows, walls=friction < 1, seed=rows)
+    grains = build_pyramid(rows, walls=friction < 1, seed=rows)
     problem = grains.problem(friction)
     rng = np.random.default_rng(rows)
     contact, body = rng.permutation(problem.contacts), rng.permutation(len(grains.mass))
-    mixed = renumbered(grains, contact, body).problem(friction)
-    first = elastic_limit(problem)
+    mixed = renumber(grains, contact, body).problem(friction)
+    first = find_elastic_limit(problem)
     row: Row = {
         "pile": f"pyramid of {len(grains.mass)}, friction {friction:g}",
         "contacts": problem.contacts, "found": first.solved, "order": None,
         "sliding": count_sliding(first.r.reshape(-1, 2), friction),
     }  # fmt: skip
     if first.solved:
-        other = elastic_limit(mixed)
+        other = find_elastic_limit(mixed)
         back = np.empty((problem.contacts, 2))
         back[contact] = other.r.reshape(-1, 2)
         row["order"] = float(np.linalg.norm(back.ravel() - first.r) / np.linalg.norm(first.r))

@@ -41,7 +41,7 @@ class Rest:
     """From where the grains touched, (3 n,) [m, rad]."""
 
 
-def springs_rest(
+def settle_springs(
     grains: Grains, stiffness: float, friction: float, *, tangential: float = 1.0,
     ramp: int = 0, tolerance: float = 1e-12, steps_max: int = 400_000, damping: float = 0.0,
 ) -> Rest:  # fmt: skip
@@ -53,14 +53,14 @@ def springs_rest(
     normals, in units of ``(k m)^1/2`` with the mean mass m.
     """
     h = STEP * sqrt(
-        float(min(grains.mass.min(), (grains.inertia / arms(grains)).min())) / stiffness
+        float(min(grains.mass.min(), (grains.inertia / find_arms(grains)).min())) / stiffness
     )
     drag = DRAG * sqrt(stiffness / float(grains.mass.max()))
     n = len(grains.mass)
     state = np.zeros((n + 1, 6))
     state[:n, :2] = grains.centre
     force, shear = np.zeros((len(grains.body_a), 2)), np.zeros(len(grains.body_a))
-    steps, imbalance = springs_advance(
+    steps, imbalance = advance_springs(
         state, shear, force, grains.mass, grains.inertia, grains.gravity, grains.body_a,
         grains.body_b, grains.place_a, grains.radius_a, grains.place_b, grains.radius_b,
         grains.face, friction, stiffness, tangential * stiffness, h, drag,
@@ -72,7 +72,7 @@ def springs_rest(
     return Rest(force, int(steps), float(imbalance) / grains.weight, moved)
 
 
-def arms(grains: Grains) -> Floats:
+def find_arms(grains: Grains) -> Floats:
     """Square of the longest arm of a contact on every body [m^2], (n,)."""
     longest = np.full(len(grains.mass) + 1, 1e-300)
     reach_a = np.linalg.norm(grains.place_a, axis=1) + grains.radius_a
@@ -83,7 +83,7 @@ def arms(grains: Grains) -> Floats:
 
 
 @njit(cache=True)
-def springs_advance(
+def advance_springs(
     state: Floats, shear: Floats, force: Floats, mass: Floats, inertia: Floats, gravity: Floats,
     body_a: Ints, body_b: Ints, place_a: Floats, radius_a: Floats, place_b: Floats,
     radius_b: Floats, face: Floats, friction: float, kn: float, kt: float, h: float, drag: float,

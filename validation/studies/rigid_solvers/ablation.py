@@ -25,7 +25,7 @@ from rigid_lcp.friction.auto.trial import Trial
 from validation.bench.rigid import examination_beds as beds
 from validation.bench.rigid.examination import FAMILIES, Family
 from validation.bench.rigid.examination_beds import Generator, Posed
-from validation.bench.rigid.friction_problems import bodies_anew
+from validation.bench.rigid.friction_problems import renew_bodies
 from validation.studies.rigid_solvers.run import load_kernels
 
 SEEDS, EVERY, ROUGH = (9201, 9202, 9203, 9204, 9205), 8, 1e-6
@@ -36,25 +36,25 @@ COLUMNS = ("contacts", "without", "status", "residual", "cpu_s", "tried", "ended
 
 def pose_yielding(generator: Generator, index: int) -> Posed:
     """A bed under 0.4 to 0.8 of the friction it settled with, where many contacts slide."""
-    posed = beds.settled(generator, 2 + index % 2, (100, 1300))
+    posed = beds.draw_bed(generator, 2 + index % 2, (100, 1300))
     friction = generator.uniform(0.4, 0.8) * posed.problem.friction
     return replace(posed, problem=replace(posed.problem, friction=friction))
 
 
 def pose_moving(generator: Generator, index: int) -> Posed:
     """The next step of a large bed that was kicked, from the forces of the one before."""
-    posed = beds.kicked(beds.settled(generator, 2 + index % 2, (350, 4000)), generator)
-    first, space = posed.problem, beds.bodies_of(posed)
+    posed = beds.kick_posed(beds.draw_bed(generator, 2 + index % 2, (350, 4000)), generator)
+    first, space = posed.problem, beds.require_bodies(posed)
     before = solve.solve_friction(space, first.offset, first.friction, first.dim)
     push = space.jacobian @ generator.standard_normal(space.jacobian.shape[1])
-    push *= beds.between(generator, 1e-3, 1e-1) * np.linalg.norm(first.offset)
+    push *= beds.draw_between(generator, 1e-3, 1e-1) * np.linalg.norm(first.offset)
     offset = first.offset + push / np.linalg.norm(push)
     return replace(posed, problem=replace(first, offset=offset), start=before.r)
 
 
 def pose_rough(generator: Generator, index: int) -> Posed:
     """A large bed, at rest or moving, of which only a rough answer is asked."""
-    make = pose_moving if index // 2 % 2 else beds.beds_large
+    make = pose_moving if index // 2 % 2 else beds.pose_large
     return replace(make(generator, index), bar=ROUGH)
 
 
@@ -85,7 +85,7 @@ def watch(rows: tuple[Stage, ...], without: str, tried: list[str], ended: list[s
 def measure(posed: Posed, without: str = "none") -> dict[str, Any]:
     """One problem, by the plan without a stage."""
     tried, ended, problem = list[str](), list[str](), posed.problem
-    w = problem.delassus if problem.bodies is None else bodies_anew(problem)
+    w = problem.delassus if problem.bodies is None else renew_bodies(problem)
     whole, first = (watch(rows, without, tried, ended) for rows in (plan.PLAN, plan.FIRST))
     with patch.object(plan, "PLAN", whole), patch.object(solve, "FIRST", first):
         begun = time.process_time()
@@ -112,7 +112,7 @@ if __name__ == "__main__":
                 named = (family.name, str(seed), str(number))
                 if named in done:
                     continue
-                posed = family.posed(seed, number)
+                posed = family.pose(seed, number)
                 measure(posed)  # compiles and loads what it needs
                 found = [measure(posed)]
                 if found[0]["status"] == "solved":

@@ -18,25 +18,25 @@ WHY = "near yield many contacts slide at once: our path has thousands of factori
 def check_bars(rows: Sequence[Row]) -> list[Check]:
     """All bars on a record."""
     checks = []
-    for family in dict.fromkeys(row["family"] for row in reading.races(rows)):
-        checks += _check_family(family, [r for r in reading.races(rows) if r["family"] == family])
-    for row in reading.packings(rows, 500, 5000):
-        error = reading.least_error(row, "Siconos")
+    for family in dict.fromkeys(row["family"] for row in reading.select(rows)):
+        checks += _check_family(family, [r for r in reading.select(rows) if r["family"] == family])
+    for row in reading.list_packings(rows, 500, 5000):
+        error = reading.find_least_error(row, "Siconos")
         if isfinite(error):
-            lead = reading.cost_to(row, "Siconos", error) / reading.cost_to(row, OURS, error)
+            lead = reading.find_cost(row, "Siconos", error) / reading.find_cost(row, OURS, error)
             title = f"{row['part']}: cost of the best of Siconos over ours, residual {error:.1g}"
             checks.append(Check(title, lead, f">= {LEAD:g}", lead >= LEAD))
-    beside = reading.packings(rows, 500, 5000) + reading.races(rows, reading.YIELDING)
+    beside = reading.list_packings(rows, 500, 5000) + reading.select(rows, reading.YIELDING)
     checks += _check_beside(beside, HYBRID)
-    checks += _check_beside(reading.races(rows, "frictionless"), OSQP)
+    checks += _check_beside(reading.select(rows, "frictionless"), OSQP)
     return [*checks, *_check_examination(rows)]
 
 
 def _check_family(family: str, rows: Sequence[Row]) -> list[Check]:
-    missed = [row["part"] for row in rows if isinf(reading.cost_to(row, OURS))]
+    missed = [row["part"] for row in rows if isinf(reading.find_cost(row, OURS))]
     named = f" ({', '.join(missed)})" if missed else ""
     why = WHY if family == reading.YIELDING else ""
-    slowest = max(reading.cost_to(row, OURS) for row in rows)
+    slowest = max(reading.find_cost(row, OURS) for row in rows)
     barred = family in ("stored", "unseen")
     checks = [Check(f"{family}: problems of {len(rows)} not brought to their bar{named}",
                     len(missed), "= 0", not missed, why=why)]  # fmt: skip
@@ -52,7 +52,7 @@ def _check_beside(rows: Sequence[Row], rival: str) -> list[Check]:
     does not reach it at all, is reported as `ENDLESS`."""
     checks = []
     for row in rows:
-        found = reading.cost_ratios([row], rival)
+        found = reading.list_ratios([row], rival)
         for name, ratio in found.items():
             why = WHY if row["family"] == reading.YIELDING else ""
             value = min(ratio, ENDLESS)
@@ -62,7 +62,7 @@ def _check_beside(rows: Sequence[Row], rival: str) -> list[Check]:
 
 
 def _check_examination(rows: Sequence[Row]) -> list[Check]:
-    found = reading.examined(rows)
+    found = reading.join_columns(rows)
     wrong = sum(claims and not ok for claims, ok in zip(found["claims"], found["ok"], strict=True))
     solved, all_of = sum(found["ok"]), len(found["ok"])
     return [

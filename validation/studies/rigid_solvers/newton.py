@@ -23,7 +23,7 @@ SHIFT = 1e-9
 STEPS, HALVINGS = 60, 12
 
 
-def newton_polish(
+def polish_forces(
     problem: FrictionProblem, force: Floats, tolerance: float, budget_s: float
 ) -> tuple[Floats, int]:
     """Better a point r (nc * dim,) until its residual is small, steps stall, or time is up.
@@ -37,7 +37,7 @@ def newton_polish(
     end = time.process_time() + budget_s
     r = best = force.copy()
     least = np.inf
-    value, derivative = _natural_map(problem, r, rho)
+    value, derivative = _evaluate_map(problem, r, rho)
     for step in range(STEPS):
         error = problem.residual(r)
         if error < least:
@@ -55,18 +55,18 @@ def newton_polish(
         share = 1.0
         for _ in range(HALVINGS):
             trial = r + share * move
-            new, new_derivative = _natural_map(problem, trial, rho)
+            new, new_derivative = _evaluate_map(problem, trial, rho)
             if np.linalg.norm(new / np.sqrt(rho)) < (1 - 1e-4 * share) * size:
                 break
             share /= 2
         else:
             trial = r + move
-            new, new_derivative = _natural_map(problem, trial, rho)
+            new, new_derivative = _evaluate_map(problem, trial, rho)
         r, value, derivative = trial, new, new_derivative
     return best, STEPS
 
 
-def _natural_map(
+def _evaluate_map(
     problem: FrictionProblem, r: Floats, rho: Floats
 ) -> tuple[Floats, tuple[sp.csr_array, sp.csr_array]]:
     """F and the block diagonal derivatives of P_K and of ``u + mu |u_T| n``."""
@@ -93,9 +93,9 @@ def _natural_map(
     turn = (m * length / t[edge])[:, None, None]
     block[:, 1:, 1:] += turn * (np.eye(dim - 1) - e[:, :, None] * e[:, None, :])
     slope[edge] = block
-    return r - projected.ravel(), (_diagonal(slope), _diagonal(dual))
+    return r - projected.ravel(), (_build_diagonal(slope), _build_diagonal(dual))
 
 
-def _diagonal(blocks: Floats) -> sp.csr_array:
+def _build_diagonal(blocks: Floats) -> sp.csr_array:
     count = len(blocks)
     return sp.csr_array(sp.bsr_array((blocks, np.arange(count), np.arange(count + 1))))

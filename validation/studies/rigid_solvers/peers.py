@@ -7,7 +7,7 @@ types is not timed.
 ``Siconos`` (Acary et al.)  its solvers that are worth a try, each in a process of its own.
 ``Clarabel``                convex cone programs, |u_T| frozen, again and again (Acary, Cadoux,
                             Lemarechal and Malick, ZAMM 91 (2011) 155), in body space if possible.
-``Clarabel + Newton``       the same to 1e-8 without freezing again, then `newton.newton_polish`.
+``Clarabel + Newton``       the same to 1e-8 without freezing again, then `newton.polish_forces`.
 ``OSQP``                    without friction, the linear complementarity problem, polished.
 """
 
@@ -29,8 +29,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from rigid_lcp.friction.problem.definition import FrictionProblem, friction_problem
-from validation.studies.rigid_solvers.newton import newton_polish
+from rigid_lcp.friction.problem.definition import FrictionProblem, make_problem
+from validation.studies.rigid_solvers.newton import polish_forces
 
 Floats = NDArray[np.float64]
 SYSTEM_PYTHON = "/usr/bin/python3"
@@ -79,7 +79,7 @@ def is_installed(package: str) -> bool:
 # --- Siconos ----------------------------------------------------------------------------------
 
 
-def siconos_solvers(problem: FrictionProblem) -> list[str]:
+def choose_solvers(problem: FrictionProblem) -> list[str]:
     """The solvers that are worth a try on a problem."""
     names = [*SICONOS[problem.dim]]
     if problem.dim == 2 and problem.contacts > SICONOS_SPARSE:
@@ -87,7 +87,7 @@ def siconos_solvers(problem: FrictionProblem) -> list[str]:
     return [name for name in names if problem.contacts <= SICONOS_MOST.get(name, 10**9)]
 
 
-def in_space(problem: FrictionProblem) -> FrictionProblem:
+def lift_to_space(problem: FrictionProblem) -> FrictionProblem:
     """A plane problem as one in space: nothing pushes along t2, so its forces there are zero."""
     contacts = problem.contacts
     wide = np.arange(2 * contacts) // 2 * 3 + np.arange(2 * contacts) % 2
@@ -98,12 +98,12 @@ def in_space(problem: FrictionProblem) -> FrictionProblem:
     offset = np.zeros(3 * contacts)
     offset[wide] = problem.offset
     matrix = sp.csr_array((entries, (rows, columns)), (3 * contacts,) * 2)
-    made: FrictionProblem = friction_problem(matrix, offset, problem.friction, 3)
+    made: FrictionProblem = make_problem(matrix, offset, problem.friction, 3)
     return made
 
 
 @cache
-def siconos_is_installed() -> bool:
+def has_siconos() -> bool:
     """Whether the system's Python has Siconos."""
     words = [SYSTEM_PYTHON, "-c", "import scipy, siconos.numerics"]
     try:
@@ -117,12 +117,12 @@ def solve_by_siconos(
 ) -> list[Answer]:
     """All answers of a solver of Siconos, ``"3D_NSGS"``; none where it kills its process.
 
-    A plane problem for a solver in space: see `in_space`.
+    A plane problem for a solver in space: see `lift_to_space`.
     """
     if problem.dim == 2 and solver.startswith("3D"):
         return [
             replace(answer, force=answer.force.reshape(-1, 3)[:, :2].ravel())
-            for answer in solve_by_siconos(in_space(problem), solver, tolerance, budget_s)
+            for answer in solve_by_siconos(lift_to_space(problem), solver, tolerance, budget_s)
         ]
     with tempfile.TemporaryDirectory() as name:
         folder, w = Path(name), problem.delassus
@@ -160,7 +160,7 @@ def solve_by_clarabel(
     better the best answer, or out of time.  Each program is solved to a hundredth of the tolerance,
     between `FINEST` and 1e-8, W and q scaled to order one.
     """
-    program = (program_of_bodies if problem.bodies is not None else program_of_contacts)(problem)
+    program = (build_by_bodies if problem.bodies is not None else build_by_contacts)(problem)
     frozen = np.zeros(problem.contacts)
     best, least, since, spent = np.zeros(len(problem.offset)), np.inf, 0, 0.0
     for _ in range(outer):
@@ -182,12 +182,12 @@ def solve_by_hybrid(problem: FrictionProblem, tolerance: float, budget_s: float)
     """One convex program to 1e-8, then semismooth Newton steps on the natural map."""
     begun = solve_by_clarabel(problem, 1e-8, budget_s, outer=1)
     start = time.process_time()
-    force, _ = newton_polish(problem, begun.force, tolerance, budget_s - begun.cost_s)
+    force, _ = polish_forces(problem, begun.force, tolerance, budget_s - begun.cost_s)
     cost = begun.cost_s + time.process_time() - start
     return Answer(tolerance, force, cost, problem.residual(force) <= tolerance)
 
 
-def program_of_contacts(problem: FrictionProblem) -> Program:
+def build_by_contacts(problem: FrictionProblem) -> Program:
     """``min r.W r/2 + (q + frozen n).r`` over r in K; W by its symmetric part."""
     library = import_module("clarabel")
     w = problem.delassus * problem.rho
@@ -206,22 +206,20 @@ def program_of_contacts(problem: FrictionProblem) -> Program:
         linear = problem.offset.copy()
         linear[:: problem.dim] += frozen
         size = float(np.linalg.norm(linear)) or 1.0
-        found = _solved(
-            library, upper, linear / size, rows, np.zeros(len(linear)), cones, tolerance
-        )
+        found = _solve(library, upper, linear / size, rows, np.zeros(len(linear)), cones, tolerance)
         return np.asarray(found.x) * size * problem.rho
 
     return solve
 
 
-def program_of_bodies(problem: FrictionProblem) -> Program:
+def build_by_bodies(problem: FrictionProblem) -> Program:
     """Its dual, ``min |y|^2/2`` with ``J L y + q + frozen n`` in K*, where ``M^-1 = L L^T``."""
     library = import_module("clarabel")
     bodies = problem.bodies
     assert bodies is not None
     scale = np.ones((problem.contacts, problem.dim))
     scale[:, 1:] = problem.friction[:, None]
-    factor = inverse_mass_factor(bodies.inverse_mass, bodies.body_size)
+    factor = factor_inverse_mass(bodies.inverse_mass, bodies.body_size)
     rows = sp.csc_matrix(-(sp.diags_array(scale.ravel()) @ bodies.jacobian @ factor))
     rows *= np.sqrt(problem.rho)
     identity = sp.csc_matrix(sp.eye_array(rows.shape[1]))
@@ -234,7 +232,7 @@ def program_of_bodies(problem: FrictionProblem) -> Program:
         offset = problem.offset.copy()
         offset[:: problem.dim] += frozen
         size = float(np.linalg.norm(offset)) or 1.0
-        found = _solved(
+        found = _solve(
             library, identity, np.zeros(rows.shape[1]), rows, scale.ravel() * offset / size, cones,
             tolerance,
         )  # fmt: skip
@@ -243,7 +241,7 @@ def program_of_bodies(problem: FrictionProblem) -> Program:
     return solve
 
 
-def inverse_mass_factor(inverse_mass: Any, size: int) -> sp.csr_array:
+def factor_inverse_mass(inverse_mass: Any, size: int) -> sp.csr_array:
     """L with ``M^-1 = L L^T``, block after block."""
     blocks = sp.bsr_array(inverse_mass, blocksize=(size, size)).tobsr()
     if (blocks.indices != np.arange(len(blocks.indices))).any():
@@ -253,7 +251,7 @@ def inverse_mass_factor(inverse_mass: Any, size: int) -> sp.csr_array:
     )
 
 
-def _solved(
+def _solve(
     library: Any, quadratic: Any, linear: Floats, rows: Any, bound: Floats, cones: list[Any],
     tolerance: float,
 ) -> Any:  # fmt: skip

@@ -24,14 +24,14 @@ from rigid_lcp.friction.auto.solve import solve_friction
 from rigid_lcp.friction.problem.definition import FrictionProblem
 from rigid_lcp.friction.problem.proofs import gives_energy
 from validation.bench.rigid.examination import FAMILIES, Family
-from validation.bench.rigid.friction_problems import NamedProblem, all_problems, bodies_anew
-from validation.bench.rigid.judge import residual_extended
-from validation.bench.rigid.packings import tower
+from validation.bench.rigid.friction_problems import NamedProblem, list_problems, renew_bodies
+from validation.bench.rigid.judge import measure_residual
+from validation.bench.rigid.packings import build_tower
 from validation.studies.rigid_solvers.peers import (
     Answer,
+    choose_solvers,
+    has_siconos,
     is_installed,
-    siconos_is_installed,
-    siconos_solvers,
     solve_by_clarabel,
     solve_by_hybrid,
     solve_by_osqp,
@@ -60,7 +60,7 @@ SEEDS = (2026, 42, 77, 101)
 OTHER_FAMILIES = ("beds kicked", "beds tilted", "large packings")
 
 
-def limited(job: Callable[[], Row], seconds: float) -> Row | None:
+def run_limited(job: Callable[[], Row], seconds: float) -> Row | None:
     """Do a job in a process that ends when it has used so many processor seconds; None then."""
     context = multiprocessing.get_context("fork")
     ours, theirs = context.Pipe(duplex=False)
@@ -80,7 +80,7 @@ def limited(job: Callable[[], Row], seconds: float) -> Row | None:
         process.join()
 
 
-def timed(solve: Callable[[], Answer]) -> Answer:
+def time_answer(solve: Callable[[], Answer]) -> Answer:
     """An answer, its cost the median of many where it is short, without that of compiling."""
     with install_recorder("numba:compile") as compiled:
         answer = solve()
@@ -98,7 +98,7 @@ def timed(solve: Callable[[], Answer]) -> Answer:
 
 def solve_by_ours(problem: FrictionProblem, tolerance: float, _: float = 0.0) -> Answer:
     """`solve_friction` by its default settings."""
-    w = problem.delassus if problem.bodies is None else bodies_anew(problem)
+    w = problem.delassus if problem.bodies is None else renew_bodies(problem)
     start = time.process_time()
     found = solve_friction(
         w, problem.offset, problem.friction, problem.dim, tolerance=tolerance
@@ -109,7 +109,7 @@ def solve_by_ours(problem: FrictionProblem, tolerance: float, _: float = 0.0) ->
 def load_kernels() -> None:
     """Compile, or load, what is timed later."""
     for dim in (2, 3):
-        small = tower(2, dim)
+        small = build_tower(2, dim)
         for w in (small.bodies, small.delassus):
             solve_friction(w, small.offset, small.friction, dim)
 
@@ -140,12 +140,12 @@ def race(named: NamedProblem) -> Row:
         most = YIELD_S if kind == "near" else BUDGET_S[name]
         for tolerance in asked:
             solve = partial(SOLVERS[name], problem, tolerance, most)
-            made = limited(partial(_measured, problem, solve), 2 * most + 10)
+            made = run_limited(partial(_measure, problem, solve), 2 * most + 10)
             runs.setdefault(name, []).append([tolerance, *(made["run"] if made else [None] * 3)])
-    if friction and siconos_is_installed() and (kind not in FEW or (kind == "other" and large)):
+    if friction and has_siconos() and (kind not in FEW or (kind == "other" and large)):
         answers = [
-            [tolerance, *_judged(problem, answer)["run"]]
-            for solver in siconos_solvers(problem)
+            [tolerance, *_judge(problem, answer)["run"]]
+            for solver in choose_solvers(problem)
             for tolerance in asked
             for answer in solve_by_siconos(problem, solver, tolerance, BUDGET_S["Siconos"])
         ]
@@ -154,11 +154,11 @@ def race(named: NamedProblem) -> Row:
             "bar": named.bar, "runs": runs}  # fmt: skip
 
 
-def _measured(problem: FrictionProblem, solve: Callable[[], Answer]) -> Row:
-    return _judged(problem, timed(solve))
+def _measure(problem: FrictionProblem, solve: Callable[[], Answer]) -> Row:
+    return _judge(problem, time_answer(solve))
 
 
-def _judged(problem: FrictionProblem, answer: Answer) -> Row:
+def _judge(problem: FrictionProblem, answer: Answer) -> Row:
     finite = np.isfinite(answer.force).all()
     error = float(f"{problem.residual(answer.force):.3g}") if finite else None
     return {"run": [float(f"{answer.cost_s:.4g}"), error, bool(answer.claims)]}
@@ -182,32 +182,32 @@ def examine(family: Family, seed: int) -> Row:
     load_kernels()
     posed: dict[str, list[Any]] = {}
     for index in range(family.count):
-        problem = family.posed(seed, index)
+        problem = family.pose(seed, index)
         row = {"index": index, "contacts": problem.problem.contacts, "cpu_s": None,
                "residual": None, "ok": False, "claims": False, "status": "out of time",
                "rival_s": None, "rival_ok": False}  # fmt: skip
-        row |= limited(partial(_examined, problem), 2 * BUDGET_S[OURS]) or {}
+        row |= run_limited(partial(_solve_posed, problem), 2 * BUDGET_S[OURS]) or {}
         if is_installed("clarabel"):
-            row |= limited(partial(_rivalled, problem), 4 * BUDGET_S[HYBRID]) or {}
+            row |= run_limited(partial(_solve_by_rival, problem), 4 * BUDGET_S[HYBRID]) or {}
         for name, value in row.items():
             posed.setdefault(name, []).append(value)
     return {"family": family.name, "belongs": family.belongs, "seed": seed, "posed": posed}
 
 
-def _examined(posed: Any) -> Row:
+def _solve_posed(posed: Any) -> Row:
     problem, bar = posed.problem, posed.bar
     status = ""
 
     def solve() -> Answer:
         nonlocal status
-        w = problem.delassus if problem.bodies is None else bodies_anew(problem)
+        w = problem.delassus if problem.bodies is None else renew_bodies(problem)
         start = time.process_time()
         found = solve_friction(w, problem.offset, problem.friction, problem.dim, posed.start)
         status = found.status
         return Answer(bar, found.r, time.process_time() - start, found.solved)
 
-    answer = timed(solve)
-    residual, left = residual_extended(problem, answer.force)
+    answer = time_answer(solve)
+    residual, left = measure_residual(problem, answer.force)
     ok = residual <= bar and left <= SHARE_LEFT
     if not ok and gives_energy(problem):
         status += ", W gives energy"
@@ -215,14 +215,14 @@ def _examined(posed: Any) -> Row:
             "claims": answer.claims, "status": status}  # fmt: skip
 
 
-def _rivalled(posed: Any) -> Row:
-    answer = timed(lambda: solve_by_hybrid(posed.problem, posed.bar, BUDGET_S[HYBRID]))
-    residual, left = residual_extended(posed.problem, answer.force)
+def _solve_by_rival(posed: Any) -> Row:
+    answer = time_answer(lambda: solve_by_hybrid(posed.problem, posed.bar, BUDGET_S[HYBRID]))
+    residual, left = measure_residual(posed.problem, answer.force)
     return {"rival_s": answer.cost_s, "rival_ok": bool(residual <= posed.bar and left < SHARE_LEFT)}
 
 
 PARTS: dict[str, Callable[[], Row]] = {
-    **{named.name: partial(race, named) for named in all_problems()},
+    **{named.name: partial(race, named) for named in list_problems()},
     **{
         f"seed {seed}: {family.name}": partial(examine, family, seed)
         for seed in SEEDS

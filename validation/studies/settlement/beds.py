@@ -11,7 +11,7 @@ from adapters.procedure.run import CONTROL
 from adapters.procedure.stages import Variant
 from adapters.scene.file import load_scene
 from adapters.scene.tables import Scene
-from trackbed.scenes import scene_path
+from trackbed.scenes import find_scene_file
 
 STEP = 1e-10
 """Displacement [m] of one grain at k_i, times the number of the member."""
@@ -46,7 +46,7 @@ class Kind:
         total = "procedure.total_cycles"
         if not any(key.startswith(total) for key in settings):
             own.append(f"{total}={self.end}")
-        return load_scene(scene_path(self.scene_name), [*self.settings, *own, *settings])
+        return load_scene(find_scene_file(self.scene_name), [*self.settings, *own, *settings])
 
 
 CONFINED = Kind("confined", "paper's bed: 1,085 grains", "karrech", (), 3, 2, 50, 500)
@@ -92,14 +92,14 @@ class Method:
 JUMPING = Variant()
 
 
-def jumping(jumps: int, *settings: str, suffix: str = "", runs: int = 1) -> Method:
+def jump(jumps: int, *settings: str, suffix: str = "", runs: int = 1) -> Method:
     """So many equal jumps by the law of the last window."""
     name = f"{jumps} jumps{suffix}"
     family = "nothing moved" if "nothing" in suffix else "jumps by the law"
     return Method(name, family, settings, JUMPING, jumps, runs=runs)
 
 
-def remembering(jumps: int, move: str = "", runs: int = 1) -> Method:
+def jump_by_history(jumps: int, move: str = "", runs: int = 1) -> Method:
     """So many jumps that settle by the slopes of all cycles computed; ``move``: how, if not by the
     default."""
     keys = ('procedure.settlement="history"', *([f'procedure.move="{move}"'] if move else []))
@@ -108,7 +108,7 @@ def remembering(jumps: int, move: str = "", runs: int = 1) -> Method:
     return Method(name, family, keys, JUMPING, jumps, runs=runs)
 
 
-def growing(method: Method, window: int, runs: int = 1) -> Method:
+def grow_jumps(method: Method, window: int, runs: int = 1) -> Method:
     """The same number of jumps, each longer than the one before."""
     name = method.name.replace("jumps", "growing jumps", 1)
     return replace(method, name=name, growing=True, window=window, runs=runs)
@@ -117,9 +117,9 @@ def growing(method: Method, window: int, runs: int = 1) -> Method:
 STILL = ('procedure.move="still"',)
 
 
-def still(jumps: int, runs: int = 1) -> Method:
+def jump_still(jumps: int, runs: int = 1) -> Method:
     """Jumps that move nothing."""
-    return jumping(jumps, *STILL, suffix=", nothing moved", runs=runs)
+    return jump(jumps, *STILL, suffix=", nothing moved", runs=runs)
 
 
 def soften(factor: int, kind: Kind) -> Method:
@@ -174,20 +174,21 @@ def tolerate(tolerance: float) -> Method:
 def list_methods(kind: Kind) -> tuple[Method, ...]:
     """The ways that are judged on a bed, beside every cycle and the laws."""
     profile = "profile"
-    best = growing(remembering(5, profile), 10, runs=4)
+    best = grow_jumps(jump_by_history(5, profile), 10, runs=4)
     if kind is CONFINED:
         both = (*best.settings, "engine.rayleigh_share=0.4")
         step = replace(best, name=f"{best.name}, step x 2", settings=both, runs=2)
         return (
-            jumping(2, runs=2), still(2, runs=2), lengthen(0.4), remembering(2, profile, runs=2),
-            soften(10, kind), soften(100, kind), quicken(2), weigh(10, kind), tolerate(0.02), best,
-            growing(still(5), 10), growing(remembering(3, profile), 18, runs=2), step,
+            jump(2, runs=2), jump_still(2, runs=2), lengthen(0.4),
+            jump_by_history(2, profile, runs=2), soften(10, kind), soften(100, kind), quicken(2),
+            weigh(10, kind), tolerate(0.02), best, grow_jumps(jump_still(5), 10),
+            grow_jumps(jump_by_history(3, profile), 18, runs=2), step,
         )  # fmt: skip
     return (
-        *(jumping(jumps) for jumps in (2, 5)), *(still(jumps) for jumps in (2, 5, 10)),
-        *(remembering(jumps) for jumps in (2, 5, 10)),
-        *(remembering(jumps, profile) for jumps in (2, 5)), tolerate(0.1),
-        jumping(10), *map(lengthen, (0.3, 0.4, 0.6, 0.8, 1.0)),
+        *(jump(jumps) for jumps in (2, 5)), *(jump_still(jumps) for jumps in (2, 5, 10)),
+        *(jump_by_history(jumps) for jumps in (2, 5, 10)),
+        *(jump_by_history(jumps, profile) for jumps in (2, 5)), tolerate(0.1),
+        jump(10), *map(lengthen, (0.3, 0.4, 0.6, 0.8, 1.0)),
         *(soften(factor, kind) for factor in (10, 30, 100)), quicken(2), quicken(4),
         weigh(10, kind), weigh(100, kind),
         Method("h = 0", "h = 0", (), Variant("h = 0", still=True)),

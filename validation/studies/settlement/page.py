@@ -13,16 +13,16 @@ from adapters.procedure.history import sum_cost
 from validation.studies.settlement.bars import check_bars
 from validation.studies.settlement.beds import COARSE, EVERY, KINDS, LAWS, Kind, list_methods
 from validation.studies.settlement.reading import (
-    by_packing,
-    cheaper_at_equal_step,
-    cheaper_by,
-    errors_of,
-    mean_cost,
+    find_cost,
+    find_errors,
+    find_speedup,
+    find_step_speedup,
+    group_runs,
     nest,
     select_rows,
     summarise_reference,
 )
-from validation.study import describe_commits, format_table, mean_interval, summarise_bars
+from validation.study import describe_commits, estimate_mean, format_table, summarise_bars
 
 Row = dict[str, Any]
 SHOWN = (
@@ -50,7 +50,7 @@ def list_ways(kind: Kind) -> list[tuple[str, str]]:
 
 def format_error(errors: FloatArray) -> str:
     """Mean and half of Student's interval over packings [%], bold where it excludes zero."""
-    mean, half = mean_interval(errors)
+    mean, half = estimate_mean(errors)
     text = f"{100 * mean:+.0f} ± {100 * half:.0f} %" if half == half else f"{100 * mean:+.0f} %"
     return f"**{text}**" if abs(mean) > half else text
 
@@ -64,7 +64,7 @@ def tabulate_reference(rows: Sequence[Row]) -> str:
             kind.title, str(kind.k_i), str(kind.packings), str(len(runs)),
             f"{1e6 * found.mean:.0f} ± {1e6 * found.half:.0f} µm",
             f"{1e6 * found.between:.0f} µm", f"{1e6 * found.within:.0f} µm",
-            f"{mean_cost(runs) / 3600:.2f} h",
+            f"{find_cost(runs) / 3600:.2f} h",
         ])  # fmt: skip
     head = [
         "bed", "kᵢ", "packings", "full runs", "settlement", "deviation between packings",
@@ -87,10 +87,10 @@ def tabulate_ways(rows: Sequence[Row]) -> str:
             if not mine:
                 cells += ["", "", ""]
                 continue
-            equal = cheaper_at_equal_step(rows, kind, name)
+            equal = find_step_speedup(rows, kind, name)
             cells += [
-                f"{cheaper_by(rows, kind, name):.1f} ({equal:.1f})",
-                *(format_error(errors_of(rows, kind, name, figure))
+                f"{find_speedup(rows, kind, name):.1f} ({equal:.1f})",
+                *(format_error(find_errors(rows, kind, name, figure))
                   if "state" in mine[0] or figure == "settlement" else "" for figure in figures),
             ]  # fmt: skip
         lines.append([name, *cells])
@@ -117,7 +117,7 @@ def describe(rows: Sequence[Row]) -> dict[str, str]:
     ratios = {}
     for name, kind in KINDS.items():
         full = select_rows(rows, kind, EVERY)
-        piston = nest(list(by_packing(full, lambda row: float(row["piston"])).values()))
+        piston = nest(list(group_runs(full, lambda row: float(row["piston"])).values()))
         mean = summarise_reference(rows, kind, "settlement").mean
         ratios[f"{name.upper()}_RATIO"] = f"{piston.mean / mean:.1f}"
     engines = ", ".join(dict.fromkeys(row["engine"] for row in rows if row.get("engine")))
@@ -127,7 +127,7 @@ def describe(rows: Sequence[Row]) -> dict[str, str]:
         "REFERENCE": tabulate_reference(rows),
         "WAYS": tabulate_ways(rows),
         "REFUSED": list_refused(rows),
-        "STIFFNESS": format_error(errors_of(rows, COARSE, "tolerance 0.1", "piston stiffness")),
+        "STIFFNESS": format_error(find_errors(rows, COARSE, "tolerance 0.1", "piston stiffness")),
         "BARS": summarise_bars(check_bars(rows)),
         "SPENT": f"{spent / 3600:.0f}",
         "ORIGIN": f"{engines}; {machines}; commits "
@@ -168,8 +168,8 @@ def draw_errors(axis: Any, rows: Sequence[Row], kind: Kind) -> None:
     for number, (name, family) in enumerate(list_ways(kind), 1):
         if not select_rows(rows, kind, name):
             continue
-        mean, half = mean_interval(100 * errors_of(rows, kind, name, "settlement"))
-        cost = 1 / cheaper_by(rows, kind, name)
+        mean, half = estimate_mean(100 * find_errors(rows, kind, name, "settlement"))
+        cost = 1 / find_speedup(rows, kind, name)
         axis.errorbar(
             cost, mean, half, fmt="o", ms=4, lw=0.7, color=COLOURS[family], label=f"{number} {name}"
         )

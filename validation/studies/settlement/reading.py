@@ -12,7 +12,7 @@ from scipy.stats import t as student
 from adapters.bed.state import FloatArray
 from adapters.procedure.history import sum_cost
 from validation.studies.settlement.beds import EVERY, Kind
-from validation.study import mean_interval
+from validation.study import estimate_mean
 
 Row = dict[str, Any]
 FIGURES: dict[str, Callable[[Row], float]] = {
@@ -59,7 +59,7 @@ def nest(values: Sequence[FloatArray]) -> Nested:
     quantile = float(student.ppf(0.975, freedom))
     return Nested(
         mean=float(means.mean()),
-        half=mean_interval(means)[1],
+        half=estimate_mean(means)[1],
         half_given=quantile * (from_within / packings) ** 0.5,
         between=max(variance - from_within, 0.0) ** 0.5,
         within=within**0.5,
@@ -76,7 +76,7 @@ def select_rows(rows: Sequence[Row], kind: Kind, method: str) -> list[Row]:
     ]
 
 
-def by_packing(rows: Iterable[Row], value: Callable[[Row], float]) -> dict[int, FloatArray]:
+def group_runs(rows: Iterable[Row], value: Callable[[Row], float]) -> dict[int, FloatArray]:
     """A figure of all runs of each packing."""
     found: dict[int, list[float]] = {}
     for row in rows:
@@ -86,19 +86,19 @@ def by_packing(rows: Iterable[Row], value: Callable[[Row], float]) -> dict[int, 
 
 def summarise_reference(rows: Sequence[Row], kind: Kind, figure: str) -> Nested:
     """A figure of the full runs."""
-    return nest(list(by_packing(select_rows(rows, kind, EVERY), FIGURES[figure]).values()))
+    return nest(list(group_runs(select_rows(rows, kind, EVERY), FIGURES[figure]).values()))
 
 
-def errors_of(rows: Sequence[Row], kind: Kind, method: str, figure: str) -> FloatArray:
+def find_errors(rows: Sequence[Row], kind: Kind, method: str, figure: str) -> FloatArray:
     """Errors of a way: a value a packing that it finished, over the full runs' mean of all."""
     mine, truth = (
-        {seed: float(each.mean()) for seed, each in by_packing(found, FIGURES[figure]).items()}
+        {seed: float(each.mean()) for seed, each in group_runs(found, FIGURES[figure]).items()}
         for found in (select_rows(rows, kind, method), select_rows(rows, kind, EVERY))
     )
     return np.array([mine[seed] - truth[seed] for seed in mine]) / np.mean(list(truth.values()))
 
 
-def profile_error(rows: Sequence[Row], kind: Kind, method: str) -> float:
+def judge_layers(rows: Sequence[Row], kind: Kind, method: str) -> float:
     """Rms over layers of the error of the relative density over its mean, mean over runs."""
     truth = {
         seed: np.mean([row["profile"] for row in select_rows(rows, kind, EVERY)
@@ -112,18 +112,18 @@ def profile_error(rows: Sequence[Row], kind: Kind, method: str) -> float:
     return float(np.mean(found))
 
 
-def mean_cost(rows: Sequence[Row]) -> float:
+def find_cost(rows: Sequence[Row]) -> float:
     """CPU time behind k_i [s], each packing counting once."""
-    found = by_packing(rows, lambda row: sum_cost(row["cost"]))
+    found = group_runs(rows, lambda row: sum_cost(row["cost"]))
     return float(np.mean([each.mean() for each in found.values()]))
 
 
-def cheaper_by(rows: Sequence[Row], kind: Kind, method: str) -> float:
+def find_speedup(rows: Sequence[Row], kind: Kind, method: str) -> float:
     """CPU time of every cycle over that of a way [-]."""
-    return mean_cost(select_rows(rows, kind, EVERY)) / mean_cost(select_rows(rows, kind, method))
+    return find_cost(select_rows(rows, kind, EVERY)) / find_cost(select_rows(rows, kind, method))
 
 
-def cheaper_at_equal_step(rows: Sequence[Row], kind: Kind, method: str) -> float:
+def find_step_speedup(rows: Sequence[Row], kind: Kind, method: str) -> float:
     """The same had a time step cost the same in both [-]: machine and hour do not count.
 
     Every step of the full runs is taken at what the engine spent on one of the way's, its starts
@@ -133,10 +133,10 @@ def cheaper_at_equal_step(rows: Sequence[Row], kind: Kind, method: str) -> float
     cycle = truth[0]["steps_per_cycle"]
     steps = sum(row["computed"] * row.get("steps_per_cycle", cycle) for row in mine)
     spent = sum(row["cost"]["engine"] - row["cost"].get("start_up", 0.0) for row in mine)
-    return truth[0]["computed"] * cycle * (spent / steps) / mean_cost(mine)
+    return truth[0]["computed"] * cycle * (spent / steps) / find_cost(mine)
 
 
-def measure_spread(rows: Sequence[Row], kind: Kind, method: str) -> float:
+def find_spread(rows: Sequence[Row], kind: Kind, method: str) -> float:
     """Standard deviation of the settlement over all runs, over the full runs' [-]."""
     mine, truth = (
         np.array([FIGURES["settlement"](row) for row in select_rows(rows, kind, name)])

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from adapters.bed.sample import relative_density
+from adapters.bed.sample import measure_relative_density
 from adapters.bed.state import FloatArray
 from adapters.engines.contract import EngineStart
 from adapters.engines.liggghts import LiggghtsEngine
@@ -20,7 +20,7 @@ from adapters.errors import SceneError, TrackbedError
 from adapters.files.run_folder import RunFolder
 from adapters.files.window import PistonTrack, load_window
 from adapters.laws import get_law
-from adapters.laws.fit.outlook import outlook
+from adapters.laws.fit.outlook import find_outlook
 from adapters.procedure.progress import Progress
 from adapters.procedure.run import CONTROL, settle
 from adapters.procedure.stages import Run, Variant, compute, prepare
@@ -88,7 +88,7 @@ def begin_run(
     return Run(scene, RunFolder(path), Changed(lines or {}), variant, Progress(quiet=True), True)
 
 
-def go_to_end(kind: Kind, method: Method | None, seed: int, member: int) -> tuple[Run, str]:
+def run_to_end(kind: Kind, method: Method | None, seed: int, member: int) -> tuple[Run, str]:
     """A way from its packing's state to its end, or why it was refused or failed there.
 
     ``method`` None: every cycle.  Raises `SceneError` where a scene may not be as the way asks.
@@ -103,12 +103,12 @@ def go_to_end(kind: Kind, method: Method | None, seed: int, member: int) -> tupl
             lines = keep_weights(scene, method.heavier)
     home = Path(os.environ.get("TRACKBED_VALIDATION", "validation-runs")) / "settlement"
     packing = begin_run(kind.scene(seed), home / f"{kind.name}-{seed}", CONTROL)
-    with packing.folder.locked():
+    with packing.folder.lock():
         compute(packing, prepare(packing), kind.k_i)
     name = f"{kind.name}-{seed}-{member}-{method.name if method else EVERY}"
     perturbed = replace(variant, perturbation=member * STEP)
     run = begin_run(scene, home / name.translate(str.maketrans(" ,/=", "----")), perturbed, lines)
-    with run.folder.locked():
+    with run.folder.lock():
         run.folder.share_start(packing.folder, kind.k_i)
         try:
             settle(run)
@@ -129,7 +129,7 @@ def compute_way(kind: Kind, method: Method | None, seed: int, member: int) -> Ro
     """What is kept of a way; one that was refused or failed says why, with what it reached."""
     head = name_way(kind, method.name if method else EVERY, seed, member)
     try:
-        run, refused = go_to_end(kind, method, seed, member)
+        run, refused = run_to_end(kind, method, seed, member)
     except SceneError as error:
         return head | {"refused": str(error).splitlines()[0], "computed": 0, "cost": {}}
     head |= {"refused": refused, "steps_per_cycle": run.scene.steps_per_cycle}
@@ -158,7 +158,7 @@ def measure_run(run: Run, kind: Kind, whole: bool) -> Row:
     if kind.last not in known:
         return row
     begun, ended = (
-        {name: mean_block(known, end, name) for name in (*STATE, "settlement", "piston_height")}
+        {name: average_block(known, end, name) for name in (*STATE, "settlement", "piston_height")}
         for end in (kind.k_i, kind.last)
     )
     row |= {
@@ -202,12 +202,14 @@ def measure_layers(run: Run, cycle: int) -> list[float]:
     window = load_window(run.folder.path / name / "states.npz")
     at = int(np.flatnonzero(window.cycle == cycle)[0])
     return [
-        relative_density(window.position[at], window.radius, run.scene.container, top, bottom)
+        measure_relative_density(
+            window.position[at], window.radius, run.scene.container, top, bottom
+        )
         for bottom, top in pairwise(edges)
     ]
 
 
-def mean_block(found: Mapping[int, Mapping[str, float]], end: int, column: str) -> float:
+def average_block(found: Mapping[int, Mapping[str, float]], end: int, column: str) -> float:
     """Mean of a column over the computed cycles of the block up to ``end``."""
     cycles = range(end - BLOCK + 1, end + 1)
     return float(np.mean([found[cycle][column] for cycle in cycles if cycle in found]))
@@ -251,20 +253,20 @@ def fit_law(kind: Kind, law: str, cycles: int, seed: int, member: int) -> Row:
     that
     law's value, fitted to the ``cycles`` behind k_i.
     """
-    run, _ = go_to_end(kind, None, seed, member)
+    run, _ = run_to_end(kind, None, seed, member)
     found = tabulate_cycles(run, kind)
     first, end = (1 if law == "auto" else kind.k_i + 1), kind.k_i + cycles
     cycle = np.arange(first, end + 1, dtype=float)
     path = np.array([found[int(one)]["settlement"] for one in cycle])
     if law == "auto":
-        predicted = float(outlook(cycle, path[:, None], kind.last).prediction[0])
+        predicted = float(find_outlook(cycle, path[:, None], kind.last).prediction[0])
     else:
         chosen = get_law(law)
         ends = np.arange(kind.last - BLOCK + 1.0, kind.last + 1)
         predicted = float(np.mean(chosen.value(chosen.fit(cycle, path), ends)))
     cost = {"engine": sum(found[one]["cpu_s"] for one in range(kind.k_i + 1, end + 1))}
     head = name_way(kind, f"law {law}, {cycles} cycles", seed, member)
-    gain = predicted - mean_block(found, kind.k_i, "settlement")
+    gain = predicted - average_block(found, kind.k_i, "settlement")
     return head | {"refused": "", "computed": cycles, "cost": cost, "settlement": gain}
 
 
