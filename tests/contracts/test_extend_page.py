@@ -18,7 +18,8 @@ FILES = re.findall(r"^\+\+\+ b/(\S+)$", PAGE, re.MULTILINE)
 NAMES = [Path(file).stem.replace("_", "-") for file in FILES]
 BREAKS = (
     ("    minimum_cycles = 2\n", "", "the law square-root lacks minimum_cycles"),
-    ('Move("cut", find_displacement)', "find_displacement", "MOVE of cut is no Move(name, displacement)"),
+    ('Move("cut", find_displacement)', "find_displacement",
+     "MOVE of cut is no Move(name, displacement)"),
     ("(FakeEngine)", "", "the engine creep lacks command(scene, deck), "),
     ("start=None, ", "", "uzawa takes ['problem', 'tolerance']"),
     ("compute_stored_energy", "energy", "the strain measure murnaghan lacks compute_stored_energy"),
