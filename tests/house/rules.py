@@ -27,6 +27,9 @@ PRIVATE_WORDS = re.compile(
 """Words of this project's builders that a native technical editor would not leave."""
 
 
+VERBS = set(re.sub("#.*", "", Path(__file__).with_name("verbs.txt").read_text()).split())
+
+
 @dataclass(frozen=True)
 class Breach:
     """A place where a rule is broken."""
@@ -332,7 +335,16 @@ def check_words(house: House) -> Iterator[Breach]:
                 yield Breach(file, number, "plain words", f"{found[0]!r}")
 
 
+def check_verbs(house: House) -> Iterator[Breach]:
+    """A function of a module begins with a verb of ``verbs.txt``."""
+    for file, tree in house.trees.items():
+        for node in (one for one in tree.body if isinstance(one, ast.FunctionDef)):
+            word = node.name.lstrip("_").split("_")[0]
+            if word not in VERBS and not node.name.startswith("__"):
+                yield Breach(file, node.lineno, "verbs", f"{node.name} begins with no verb")
+
+
 RULES = (
     check_rooms, check_circles, check_public_words, check_floor, check_studies, check_constants,
-    check_words,
+    check_verbs, check_words,
 )  # fmt: skip

@@ -18,6 +18,7 @@ from tests.house.rules import (
     check_public_words,
     check_rooms,
     check_studies,
+    check_verbs,
     check_words,
     weigh,
 )
@@ -113,6 +114,7 @@ def test_a_sound_house_has_no_breach(tmp_path: Path) -> None:
             "\nrows = open('validation/studies/laws/record.jsonl')\n", "test_one.py:2: rule 5",
         ),
         (check_constants, "adapters/bed/radii.py", "SMALL = 1e-9\n", ""),
+        (check_verbs, "adapters/bed/radii.py", "def radii_of(): ...\n", "radii.py:1: verbs"),
         (check_words, "adapters/bed/radii.py", '"""What is made anew."""\n', "radii.py:1: plain"),
     ],
 )  # fmt: skip
