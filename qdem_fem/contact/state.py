@@ -153,7 +153,7 @@ class Contacts(ABC):
         self._allowed = self._near = None
 
     def find_near_step(self, elements: float) -> float:
-        """`qdem_fem.contact.find_near_step` of the present list of pairs [s].
+        """`qdem_fem.contact.bounds.find_near_step` of the present list of pairs [s].
 
         ``elements``: critical step of bodies that touch nothing [s].
         """

@@ -1,7 +1,7 @@
 """The compiled loop over time steps with rigid bodies or contact beside the elements' own step.
 
-The step itself is `qdem_fem.kernel.cpu.build_window`'s, of one step, as it is without contact: what
-a scene without both runs is not touched.  Contact forces of a displacement are found when that
+The step itself is `qdem_fem.kernel.cpu.step.build_window`'s, of one step, as it is without contact:
+what a scene without both runs is not touched.  Contact forces of a displacement are found when that
 displacement is, and wait for the next step; so the springs and the fields are of one time.
 """
 
@@ -140,7 +140,8 @@ def run_window(
 ) -> tuple[int, float, int]:
     """Run the loop on a simulation: steps done, bad elements, what the last contact said.
 
-    Arguments as of `qdem_fem.bodies.Assembly.window`; ``contact``: arrays of its model, or None.
+    Arguments as of `qdem_fem.bodies.Assembly.advance_window`; ``contact``: arrays of its model, or
+    None.
     """
     assembly = run.assembly
     place, *forces = list_forces(contact)

@@ -138,7 +138,7 @@ class Simulation(ConditionedBodies):
         """Bring deformable bodies to rest in equilibrium with the loads of the present time.
 
         Until the residual is below ``tolerance`` of the loads; time stands still, and `advance`
-        goes on from there.  See `qdem_fem.march.relax` for what is raised.
+        goes on from there.  See `qdem_fem.march.dynamic_relaxation.relax` for what is raised.
         """
         for there, what, remedy in (
             (self.contact, "bodies in contact", "march, with viscosity, until they rest"),

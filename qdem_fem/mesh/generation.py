@@ -44,7 +44,8 @@ def make_box_mesh(
     if not (whole and all(0 < length < np.inf for length in size) and pattern in PATTERNS):
         raise MeshError(
             f"a box of size {tuple(size)}, cells {tuple(cells)}, pattern {pattern!r}",
-            where="box_mesh", remedy="give lengths in metres, three numbers of cells, kuhn or five",
+            where="make_box_mesh",
+            remedy="give lengths in metres, three numbers of cells, kuhn or five",
         )  # fmt: skip
     nx, ny, nz = (int(n) for n in cells)
     axes = [

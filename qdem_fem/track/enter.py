@@ -238,7 +238,7 @@ def find_watched_points(
     """Bodies and nodes that are watched: grains at B1 to B3, S1 to S3 on the sleeper, all of it.
 
     A grain is the one whose centre is nearest to `BELOW` the sleeper's bottom, in the plane of its
-    middle, at `TrackLayout.watched`; ``B2a`` is the nearest to B2's, as in the paper.
+    middle, at `TrackLayout.list_watched`; ``B2a`` is the nearest to B2's, as in the paper.
     """
     positions = bed.positions
     centres = np.array([x.mean(axis=0) for x in positions[: recipe.below]])

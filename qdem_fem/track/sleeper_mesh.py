@@ -105,7 +105,7 @@ def _share_cells(shares: Floats, count: int) -> Integers:
     """``count`` whole cells by shares that add up to one, one each at least."""
     if count < len(shares):
         raise MeshError(
-            f"{count} cells along", where="sleeper_mesh", remedy=f"use {len(shares)} or more"
+            f"{count} cells along", where="make_sleeper_mesh", remedy=f"use {len(shares)} or more"
         )
     cells = np.ones(len(shares), np.int64)
     for _ in range(count - len(shares)):

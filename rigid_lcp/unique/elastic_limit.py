@@ -102,7 +102,7 @@ def find_elastic_limit(
 ) -> ElasticForces:  # fmt: skip
     """Forces that springs at the contacts choose, in the limit of stiff springs.
 
-    ``problem`` with bodies; ``stiffness`` [N/m], see `contact_stiffness` (ratios matter only);
+    ``problem`` with bodies; ``stiffness`` [N/m], see `find_contact_stiffness` (ratios matter only);
     ``tolerance``: on the scale-free residual and on the relative change of the forces in a last
     step (where bodies accelerate, the change may stall at 1e-11 by round-off and is then accepted).
     ``iterations_max`` counts Newton steps.  ``begin``: displacements (ndof,) [m, rad] at which the

@@ -164,7 +164,7 @@ def relax_displacements(
 ) -> ElasticForces:  # fmt: skip
     """Contact forces by the paper's overdamped relaxation of micro-displacements, from none.
 
-    ``problem`` with bodies; ``stiffness`` [N/m], see `contact_stiffness`; ``step`` h [s^2]
+    ``problem`` with bodies; ``stiffness`` [N/m], see `find_contact_stiffness`; ``step`` h [s^2]
     (default: `find_stable_step`); ``tolerance`` on the scale-free residual; ``law``: eq. 38.  Never
     raises for want of convergence: see ``status``.  When not to use it: for many grains, where
     `rigid_lcp.unique.elastic_limit` has the same answer at a fraction of the cost.

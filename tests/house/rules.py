@@ -344,7 +344,23 @@ def check_verbs(house: House) -> Iterator[Breach]:
                 yield Breach(file, node.lineno, "verbs", f"{node.name} begins with no verb")
 
 
+def check_references(house: House) -> Iterator[Breach]:
+    """What a docstring of the product refers to, as in `House`, has that name somewhere in it."""
+    known = set(re.findall(r"\w+", " ".join(house.modules.values())))
+    documented: list[tuple[str, int, str]] = []
+    for file, tree in house.trees.items():
+        for node in ast.walk(tree):
+            known.update(value for _, value in ast.iter_fields(node) if isinstance(value, str))
+            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
+                place = getattr(node, "lineno", 1)
+                documented.append((file, place, ast.get_docstring(node) or ""))
+    for file, line, text in documented:
+        for name in re.findall(r"(?<!`)`([A-Za-z_][\w.]*)`(?!`)", text):
+            if name.split(".")[-1] not in known and not name.startswith(("scipy.", "skfem.")):
+                yield Breach(file, line, "references", f"there is no {name}")
+
+
 RULES = (
     check_rooms, check_circles, check_public_words, check_floor, check_studies, check_constants,
-    check_verbs, check_words,
+    check_verbs, check_references, check_words,
 )  # fmt: skip

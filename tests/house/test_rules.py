@@ -16,6 +16,7 @@ from tests.house.rules import (
     check_constants,
     check_floor,
     check_public_words,
+    check_references,
     check_rooms,
     check_studies,
     check_verbs,
@@ -115,6 +116,7 @@ def test_a_sound_house_has_no_breach(tmp_path: Path) -> None:
         ),
         (check_constants, "adapters/bed/radii.py", "SMALL = 1e-9\n", ""),
         (check_verbs, "adapters/bed/radii.py", "def radii_of(): ...\n", "radii.py:1: verbs"),
+        (check_references, "adapters/bed/radii.py", '"""As `sift`."""\n', "radii.py:1: references"),
         (check_words, "adapters/bed/radii.py", '"""What is made anew."""\n', "radii.py:1: plain"),
     ],
 )  # fmt: skip

@@ -34,7 +34,7 @@ def run_grains(
     scene: Scene, position: FloatArray, velocity: FloatArray, motion: Sequence[str], *,
     time_step: float, every: int = 1, materials: Callable[[str], str] = str,
 ) -> Track:  # fmt: skip
-    """Run LAMMPS, without gravity; as `validation.bench.few_grains.track_run`.
+    """Run LAMMPS, without gravity; as `validation.bench.few_grains.run_grains`.
 
     Raises as `LammpsEngine.run`.
     """

@@ -64,7 +64,7 @@ class DeviceContact:
     def launch_step(
         self, displacement: Any, velocity: Any, status: Any, step: float, k: int
     ) -> None:
-        """Contact at the new displacement, as `qdem_fem.contact.spheres.build_advance`'s."""
+        """Contact at the new displacement, as `qdem_fem.contact.spheres.law.build_advance`'s."""
         c, (s, p, w, *_), few = self.on, self.on, choose_grid(self.acting)
         move_spheres[choose_grid(self.size)](
             s.reference, s.place, displacement, c.start, c.half_skin, c.position, status, k

@@ -1,4 +1,5 @@
-"""Cells of spheres on a GPU: the twin of `qdem_fem.contact.search.fill_cells`, a thread a sphere.
+"""Cells of spheres on a GPU: the twin of `qdem_fem.contact.search.cells.fill_cells`, a thread a
+sphere.
 
 Spheres are put into the buckets of their hashed cells by a counting sort (Green, "Particle
 simulation using CUDA", NVIDIA 2010).  Atomics do it: hardware settles the order within a bucket,

@@ -62,7 +62,7 @@ def build_pairs_forces(periodic: bool) -> Any:
         image: Any, position: Any, radius: Any, normal: Any, tangential: Any, place: Any,
         velocity: Any, friction: Any, force: Any, slid: Any, status: Any, step: Any, k: Any,
     ) -> None:  # fmt: skip
-        """`qdem_fem.contact.spheres.compute_pairs_forces`, of one sphere."""
+        """`qdem_fem.contact.spheres.law.compute_pairs_forces`, of one sphere."""
         q = cuda.grid(1)
         if q >= count or k >= status[LIMIT] or status[AGAIN] > 0:
             return
@@ -114,7 +114,7 @@ def compute_walls_forces(
     spring: Any, pull: Any, position: Any, radius: Any, normal: Any, tangential: Any, place: Any,
     velocity: Any, force: Any, slid: Any, status: Any, step: Any, k: Any,
 ) -> None:  # fmt: skip
-    """`qdem_fem.contact.spheres.compute_planes_forces`, of one sphere."""
+    """`qdem_fem.contact.spheres.law.compute_planes_forces`, of one sphere."""
     q = cuda.grid(1)
     if q >= count or k >= status[LIMIT] or status[AGAIN] > 0:
         return

@@ -112,7 +112,7 @@ def bound_greatest(
     first: Any, second: Any, touching: Any, total: Any, walled: Any, inverse_mass: Any,
     greatest: Any,
 ) -> None:  # fmt: skip
-    """`qdem_fem.contact.bound_spring_network` of the springs summed at each sphere."""
+    """`qdem_fem.contact.bounds.bound_spring_network` of the springs summed at each sphere."""
     i = cuda.grid(1)
     if i >= walled.size:
         return
@@ -168,7 +168,7 @@ def count_idle(c: Contact) -> int:
 
 
 def bound_present(c: Contact, walls: int, inverse_mass: Any) -> float:
-    """`qdem_fem.contact.bound_spring_network` of all that touches [1/s^2], no body rigid.
+    """`qdem_fem.contact.bounds.bound_spring_network` of all that touches [1/s^2], no body rigid.
 
     ``inverse_mass`` (c,) [1/kg], on the GPU.
     """

@@ -245,7 +245,7 @@ def build_surface_step(made_from: str) -> Any:
     def advance_surface(
         c: Any, displacement: Any, velocity: Any, step: float
     ) -> int:  # pragma: no cover
-        """Contact at the new displacement; as `qdem_fem.contact.spheres.advance`."""
+        """Contact at the new displacement; as `qdem_fem.contact.spheres.law.build_advance`."""
         stamp = made_from  # noqa: F841  (makes it a part of the key)
         far = 0.0
         for i in range(c.position.shape[0]):

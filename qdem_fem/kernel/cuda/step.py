@@ -84,8 +84,8 @@ def add_forces(forces: Any, at: Any, x: Any, y: Any, z: Any) -> None:
 def build_pulls_function(strain: Strain, viscous: bool) -> Any:
     """The device function ``(h, w, g, rows, e, half) -> (pulls, J, power)`` of a strain measure.
 
-    The same composition as `qdem_fem.kernel.cpu.compute_elastic_stress` and
-    `qdem_fem.kernel.cpu.compute_viscous_pulls`.
+    The same composition as `qdem_fem.kernel.cpu.step.compute_elastic_stress` and
+    `qdem_fem.kernel.cpu.step.compute_viscous_pulls`.
     """
     measure = MEASURES[strain]
     elastic = cuda.jit(device=True)(measure.compute_stress_numbers)
