@@ -31,14 +31,7 @@ from numpy.typing import ArrayLike
 from qdem_fem.element.kinematics import apply_hooke
 from qdem_fem.files import Floats, Integers
 
-INTERFACES = (
-    (0, 1, 2, 3),
-    (0, 2, 3, 1),
-    (0, 3, 1, 2),
-    (1, 2, 0, 3),
-    (1, 3, 2, 0),
-    (2, 3, 0, 1),
-)
+INTERFACES = ((0, 1, 2, 3), (0, 2, 3, 1), (0, 3, 1, 2), (1, 2, 0, 3), (1, 3, 2, 0), (2, 3, 0, 1))
 """The cells of vertices i and j meet in the kite <ec_ij, fc_ijk, vc, fc_ijl>.  Each (i, j, k, l)
 is an even permutation, so that the normal of the kite run through in this order is towards j."""
 

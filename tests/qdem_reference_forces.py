@@ -24,11 +24,7 @@ from qdem_fem.element.kinematics import (
     transpose,
 )
 from qdem_fem.element.small import compute_nominal_stress as stress_small
-from qdem_fem.element.strain_measures import (
-    MEASURES,
-    Strain,
-    compute_cauchy_stress,
-)
+from qdem_fem.element.strain_measures import MEASURES, Strain, compute_cauchy_stress
 from qdem_fem.files import Floats, Integers
 from tests.qdem_construction import particle_forces, strain_rate
 

@@ -16,12 +16,7 @@ from rigid_lcp.arrays import Bools, Floats, Ints
 from rigid_lcp.contact import Contacts, detect_2d, detect_3d, pack_shapes_2d, pack_shapes_3d
 from rigid_lcp.errors import SceneError
 from rigid_lcp.friction.problem import MOST_FRICTION
-from rigid_lcp.motion.checks import (
-    BOUNDS,
-    check_half_space,
-    require_density,
-    require_number_in,
-)
+from rigid_lcp.motion.checks import BOUNDS, check_half_space, require_density, require_number_in
 from rigid_lcp.motion.gyroscopic import (
     find_principal_axes,
     find_spin_acceleration,

@@ -1,13 +1,6 @@
 """Wear and breakage of grains."""
 
-from rigid_lcp.wear.abrasion import (
-    Wear,
-    WearState,
-    replace_worn,
-    split_wear,
-    start_wear,
-    step_wear,
-)
+from rigid_lcp.wear.abrasion import Wear, WearState, replace_worn, split_wear, start_wear, step_wear
 from rigid_lcp.wear.breakage import Breakage, Broken, break_scene, find_breaks, refuse_dust
 from rigid_lcp.wear.cuts import WornShape
 from rigid_lcp.wear.fragmentation import split_body

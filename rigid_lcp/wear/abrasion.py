@@ -30,12 +30,7 @@ from rigid_lcp.motion import (
     require_whole_in,
 )
 from rigid_lcp.shapes import Polygon, Polyhedron, rotate_back
-from rigid_lcp.wear.cuts import (
-    WornShape,
-    make_unworn,
-    rub_corners,
-    wear_shape,
-)
+from rigid_lcp.wear.cuts import WornShape, make_unworn, rub_corners, wear_shape
 from rigid_lcp.wear.fragmentation import make_part, restart_scene
 
 

@@ -15,11 +15,7 @@ from rigid_lcp import solve_friction
 from rigid_lcp.errors import RigidError
 from rigid_lcp.friction.auto.solve import find_methods
 from rigid_lcp.friction.problem.cones import find_natural_residual
-from rigid_lcp.friction.problem.definition import (
-    FrictionProblem,
-    FrictionSolution,
-    make_problem,
-)
+from rigid_lcp.friction.problem.definition import FrictionProblem, FrictionSolution, make_problem
 from tests.rigid_static_problems import beam, pyramid, table, tower
 
 pytestmark = pytest.mark.lowest

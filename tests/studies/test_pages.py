@@ -4,14 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from validation.study import (
-    DOCS,
-    fill_page,
-    find_record,
-    import_part,
-    list_studies,
-    read_record,
-)
+from validation.study import DOCS, fill_page, find_record, import_part, list_studies, read_record
 
 pytestmark = pytest.mark.studies
 

@@ -17,10 +17,7 @@ from qdem_fem.files.series import Driver, is_real
 numbers = st.floats(-1e6, 1e6)
 
 
-@given(
-    st.lists(st.tuples(st.floats(1e-3, 10), numbers), min_size=1, max_size=8),
-    st.floats(-5, 90),
-)
+@given(st.lists(st.tuples(st.floats(1e-3, 10), numbers), min_size=1, max_size=8), st.floats(-5, 90))
 def test_table_is_linear_between_its_rows_and_constant_outside(
     rows: list[tuple[float, float]], time: float
 ) -> None:

@@ -7,15 +7,7 @@ import pytest
 import scipy.sparse as sp
 from scipy.sparse.linalg import aslinearoperator
 
-from rigid_lcp import (
-    BodySpace,
-    Disc,
-    Polygon,
-    Polyhedron,
-    Scene,
-    collide,
-    solve_friction,
-)
+from rigid_lcp import BodySpace, Disc, Polygon, Polyhedron, Scene, collide, solve_friction
 from rigid_lcp.errors import ProblemError, SceneError, ShapeError, UsageError
 from rigid_lcp.friction.problem.definition import make_problem
 

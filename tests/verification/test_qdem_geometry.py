@@ -65,9 +65,7 @@ def divergence_volume(nodes: np.ndarray, faces: np.ndarray) -> float:
     return float((middle * find_area_vectors(nodes, faces)).sum() / 3)
 
 
-def test_volumes_fill_the_body_and_agree_with_its_surface(
-    body: tuple[TetMesh, float, int],
-) -> None:
+def test_volumes_fill_the_body_and_agree_with_its_surface(body: tuple[TetMesh, float, int]) -> None:
     mesh, volume, _ = body
     _, volumes = find_gradients(mesh.nodes, mesh.elements)
     faces = find_surface_faces(mesh.elements)
@@ -100,9 +98,7 @@ def test_surface_is_every_face_of_one_element_only(body: tuple[TetMesh, float, i
     assert all((b, a) in walked for a, b in walked)
 
 
-def test_surface_does_not_depend_on_the_order_of_elements(
-    body: tuple[TetMesh, float, int],
-) -> None:
+def test_surface_does_not_depend_on_the_order_of_elements(body: tuple[TetMesh, float, int]) -> None:
     elements = body[0].elements
     faces = find_surface_faces(elements)
     np.testing.assert_array_equal(faces, find_surface_faces(elements[::-1]))

@@ -34,10 +34,7 @@ from qdem_fem.grains.measures import (
     integrate_polyhedron,
     quarter_faces,
 )
-from qdem_fem.grains.meshing import (
-    find_radius_ratios,
-    make_grain_tetrahedra,
-)
+from qdem_fem.grains.meshing import find_radius_ratios, make_grain_tetrahedra
 from qdem_fem.grains.sets import GrainSet, load_grains, make_grains, save_grains
 from qdem_fem.grains.sieve import find_sieve_size
 from qdem_fem.mesh.surface import find_surface_faces
@@ -210,11 +207,7 @@ def test_a_curve_that_is_none_is_refused(sieves: list[float], passing: list[floa
 
 
 @settings(max_examples=12)
-@given(
-    seed=st.integers(0, 10**6),
-    psi=st.floats(0.78, 0.86),
-    roundness=st.floats(0.64, 0.7),
-)
+@given(seed=st.integers(0, 10**6), psi=st.floats(0.78, 0.86), roundness=st.floats(0.64, 0.7))
 def test_a_grain_is_what_was_asked(seed: int, psi: float, roundness: float) -> None:
     """Sphericity to the last digits, roundness to its tolerance; convex; no sliver;
     tetrahedra fill the polyhedron and share its surface."""

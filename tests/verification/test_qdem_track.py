@@ -19,9 +19,7 @@ from qdem_fem.grains.grading import Grading
 from qdem_fem.grains.sets import make_grains
 from qdem_fem.march import energies, kinetic_damping
 from qdem_fem.mesh.generation import make_box_mesh
-from qdem_fem.report.track import (
-    find_grain_mobility,
-)
+from qdem_fem.report.track import find_grain_mobility
 from qdem_fem.scene.build import make_simulation
 from qdem_fem.scene.checks import load_scene
 from qdem_fem.scene.energy_account import EnergyAccount, list_energy_facts

@@ -18,12 +18,7 @@ from rigid_lcp.shapes.rotations import (
     rotate,
 )
 from tests.rigid_solids import CUBE, coal_distance, contacts
-from tests.verification.test_rigid_hard_geometry_3d import (
-    FAMILIES,
-    Pair,
-    family,
-    placed_corners,
-)
+from tests.verification.test_rigid_hard_geometry_3d import FAMILIES, Pair, family, placed_corners
 
 FORMS = ["corner on corner", "corner on edge", "edge under corner"]
 

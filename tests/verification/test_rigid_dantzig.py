@@ -24,11 +24,7 @@ from rigid_lcp.friction.pivots.updates import (
     refresh_reduced,
     shrink_inverse,
 )
-from rigid_lcp.friction.problem.definition import (
-    FrictionProblem,
-    FrictionSolution,
-    make_problem,
-)
+from rigid_lcp.friction.problem.definition import FrictionProblem, FrictionSolution, make_problem
 from tests.rigid_networks import network, stored
 
 TOLERANCE = 1e-12

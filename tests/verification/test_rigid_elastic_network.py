@@ -7,11 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_lcp.unique.elastic_network import (
-    ElasticNetwork,
-    find_slider_slope,
-    find_spring_forces,
-)
+from rigid_lcp.unique.elastic_network import ElasticNetwork, find_slider_slope, find_spring_forces
 from rigid_lcp.unique.micro_displacements import find_free_motion, scale_jacobian
 from tests.rigid_static_problems import pyramid
 

@@ -15,11 +15,7 @@ from rigid_lcp.motion import runge_kutta
 from rigid_lcp.motion.lasting_contacts import find_first_fall
 from rigid_lcp.motion.state import Motion
 from rigid_lcp.scene.simulation import Method
-from tests.rigid_motions import (
-    bouncing_time,
-    falling_box,
-    grains_in_a_box,
-)
+from tests.rigid_motions import bouncing_time, falling_box, grains_in_a_box
 from validation.bench.rigid.scenes import (
     G,
     drop_disc,

@@ -19,10 +19,7 @@ from rigid_lcp.friction.attempts.smoothed_path import (
 )
 from rigid_lcp.friction.linear.factorisation import choose_factorisation
 from rigid_lcp.friction.methods.interior_point import Path, solve_interior_point
-from rigid_lcp.friction.problem.definition import (
-    FrictionProblem,
-    make_problem,
-)
+from rigid_lcp.friction.problem.definition import FrictionProblem, make_problem
 from validation.bench.rigid.packings import build_packing, build_tower
 
 

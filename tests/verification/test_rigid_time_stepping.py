@@ -13,10 +13,7 @@ from rigid_lcp.contact.arrays import build_frames
 from rigid_lcp.errors import NotConverged
 from rigid_lcp.scene import simulation
 from rigid_lcp.scene.simulation import Method
-from tests.rigid_motions import (
-    bouncing_time,
-    disc_on_incline_acceleration,
-)
+from tests.rigid_motions import bouncing_time, disc_on_incline_acceleration
 from validation.bench.rigid.scenes import (
     G,
     drop_disc,

@@ -27,11 +27,7 @@ from scipy.sparse.linalg import splu
 
 from rigid_lcp.arrays import Bools, Floats
 from rigid_lcp.errors import ProblemError
-from rigid_lcp.friction.problem import (
-    FrictionProblem,
-    FrictionSolution,
-    judge_forces,
-)
+from rigid_lcp.friction.problem import FrictionProblem, FrictionSolution, judge_forces
 from rigid_lcp.friction.sweeps import build_band, find_bandwidth, multiply_normals, sweep_normals
 from rigid_lcp.sparse import split_csr
 
@@ -67,9 +63,7 @@ NUMBERS = FrictionlessNumbers()
 
 
 def solve_frictionless(
-    problem: FrictionProblem,
-    start: Floats | None = None,
-    tolerance: float = 1e-12,
+    problem: FrictionProblem, start: Floats | None = None, tolerance: float = 1e-12
 ) -> FrictionSolution:
     """Solve a friction problem without friction (mu = 0), in 2D or 3D.
 

@@ -25,12 +25,7 @@ from rigid_lcp.friction.pivots.drive import (
     drive,
     settle_values,
 )
-from rigid_lcp.friction.pivots.updates import (
-    LISTS,
-    Geometry,
-    Reduced,
-    start_reduced,
-)
+from rigid_lcp.friction.pivots.updates import LISTS, Geometry, Reduced, start_reduced
 from rigid_lcp.friction.problem import (
     FrictionProblem,
     FrictionSolution,

@@ -2,11 +2,7 @@
 
 from rigid_lcp.friction.sweeps.blocks import add_impulses, lay_out_bodies, lay_out_matrix
 from rigid_lcp.friction.sweeps.body_kernel import pack_contacts
-from rigid_lcp.friction.sweeps.contact_kernel import (
-    Momentum,
-    SweepBlocks,
-    sweep_until_small,
-)
+from rigid_lcp.friction.sweeps.contact_kernel import Momentum, SweepBlocks, sweep_until_small
 from rigid_lcp.friction.sweeps.local_contact import NONE, solve_contacts_apart
 from rigid_lcp.friction.sweeps.normal_matrices import (
     build_band,

@@ -193,12 +193,7 @@ def solve_static(
     solve: Callable[[FloatArray], FloatArray]
     if nodes is not None and method == "amg":
         hierarchy = build_multigrid(inner, make_rigid_motions(nodes)[dof])
-        solve = partial(
-            hierarchy.solve,
-            tol=PASS_TOLERANCE,
-            maxiter=60,
-            accel="cg",
-        )
+        solve = partial(hierarchy.solve, tol=PASS_TOLERANCE, maxiter=60, accel="cg")
     else:
         solve = factorise(inner)
     force = load.reshape(-1)[dof].astype(np.longdouble)

@@ -147,12 +147,7 @@ def pour_bed(seed: int, folder: Path) -> tuple[FloatArray, FloatArray]:
 
 
 def run_way(
-    way: Way,
-    seed: int,
-    start: FloatArray,
-    radius: FloatArray,
-    folder: Path,
-    cycles: int = CYCLES,
+    way: Way, seed: int, start: FloatArray, radius: FloatArray, folder: Path, cycles: int = CYCLES
 ) -> tuple[Figures, float]:
     """One way from the common ``start`` [m], (n, 3): its figures and the engine's CPU time [s].
 
