@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from qdem_fem.contact.bounds import bound_spring_network
 from qdem_fem.contact.search.pairs import Pairs
 from qdem_fem.contact.search.periodic import find_extents
-from qdem_fem.contact.spheres.options import compute_pair_stiffness
+from qdem_fem.contact.spheres.options import find_pair_stiffness
 from validation.bench.qdem_gpu.contact import STEPS, stack_cubes
 from validation.bench.qdem_gpu.search import Cloud, find_pairs_gpu, make_contact
 
@@ -87,7 +87,7 @@ def sums_processor(given: Cloud, seed: int, first: Integers) -> Sums:
     return Sums(
         np.concatenate(gaps).max(initial=0.0),
         bound_spring_network(
-            ends, compute_pair_stiffness(*stiffness[ends.T]), 2 * stiffness * walls.sum(axis=0),
+            ends, find_pair_stiffness(*stiffness[ends.T]), 2 * stiffness * walls.sum(axis=0),
             1 + given.radius,
         ),
         find_extents(x[:, 1], first),

@@ -15,12 +15,12 @@ from qdem_fem.element.finger import compute_strain as strain_finger
 from qdem_fem.element.kinematics import (
     IDENTITY,
     apply_hooke,
-    compute_displacement_gradient,
-    compute_volume_change,
     compute_von_mises,
     contract,
     find_cofactor,
+    find_displacement_gradient,
     find_trace,
+    find_volume_change,
     transpose,
 )
 from qdem_fem.element.small import compute_nominal_stress as stress_small
@@ -30,8 +30,8 @@ from tests.qdem_construction import particle_forces, strain_rate
 
 __all__ = [
     "IDENTITY", "STRESS", "Elements", "Strain", "apply_hooke", "compute_cauchy_stress",
-    "compute_displacement_gradient", "compute_elastic_energy", "compute_volume_change",
-    "compute_von_mises", "contract", "find_cofactor", "find_trace", "internal_forces",
+    "compute_elastic_energy", "compute_von_mises", "contract", "find_cofactor",
+    "find_displacement_gradient", "find_trace", "find_volume_change", "internal_forces",
     "strain_finger", "stress_finger", "stress_small", "stress_viscous", "stress_viscous_small",
     "transpose",
 ]  # fmt: skip
@@ -89,10 +89,10 @@ def internal_forces(
     ``displacement`` (n, 3) [m], ``velocity`` (n, 3) [m/s]; ``lame`` = (lambda_E, mu_E) [Pa],
     ``viscous`` = (lambda_D, mu_D) [Pa s], each a float or (m,).  No limit is put on lambda_D.
     """
-    H = compute_displacement_gradient(elements.gradients, elements.nodes, displacement)
+    H = find_displacement_gradient(elements.gradients, elements.nodes, displacement)
     P = STRESS[strain](H, *lame)
     if any(np.any(value) for value in viscous):
-        H_rate = compute_displacement_gradient(elements.gradients, elements.nodes, velocity)
+        H_rate = find_displacement_gradient(elements.gradients, elements.nodes, velocity)
         if strain == "small":
             P = P + stress_viscous_small(H_rate, *viscous)
         else:

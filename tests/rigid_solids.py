@@ -11,7 +11,7 @@ from rigid_lcp import HalfSpace, Polyhedron, make_box
 from rigid_lcp.contact import detect_3d, pack_shapes_3d
 from rigid_lcp.contact.arrays import Contacts
 from rigid_lcp.motion.gyroscopic import turn_inertia
-from rigid_lcp.shapes.rotations import Floats, make_rotation, normalise_quaternion
+from rigid_lcp.shapes.rotations import Floats, make_rotation, normalise
 
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 FLOOR = HalfSpace([0.0, 0.0, 1.0], 0.0)
@@ -75,7 +75,7 @@ def near_pair(seed: int, gap: float = 1e-4) -> Placed:
     """Two stones at random angles, moved together until the least gap is about ``gap`` [m]."""
     generator = np.random.default_rng(seed)
     shapes = [ballast_stone(generator, 1.0), ballast_stone(generator, 0.7, 12)]
-    quaternion = normalise_quaternion(generator.normal(size=(2, 4)))
+    quaternion = normalise(generator.normal(size=(2, 4)))
     direction = generator.normal(size=3)
     direction /= np.linalg.norm(direction)
     arrays = pack_shapes_3d(shapes, np.array([True, True]))

@@ -10,7 +10,7 @@ import numpy as np
 from adapters.bed.container import Container
 from adapters.bed.state import FloatArray
 
-PAPER_RELATIVE_DENSITY = 0.5615
+PAPER_DENSITY = 0.5615
 """Relative density of a rained bed below its free surface: Karrech et al. (2007), Table 1."""
 
 
@@ -91,13 +91,13 @@ def find_radius_that_fits(container: Container) -> float:
     return container.radius / (1, 2, 1 + sqrt(2))[len(container.symmetry)]
 
 
-def expect_grain_count(
+def expect_grains(
     distribution: RadiusDistribution, container: Container, fill_height: float
 ) -> int:
     """Number of grains that fill ``container`` to ``fill_height`` [m] after the rain.
 
-    At `PAPER_RELATIVE_DENSITY`, that of a bed of friction 0.5 without load; a frictionless bed
+    At `PAPER_DENSITY`, that of a bed of friction 0.5 without load; a frictionless bed
     packs to 0.64 and ends an eighth lower.
     """
-    volume = PAPER_RELATIVE_DENSITY * container.area * fill_height
+    volume = PAPER_DENSITY * container.area * fill_height
     return round(volume / distribution.volume_mean)

@@ -11,7 +11,7 @@ from typing import Any
 from adapters.errors import UsageError
 
 
-def add_json_flag(parser: argparse.ArgumentParser) -> None:
+def add_json(parser: argparse.ArgumentParser) -> None:
     """Add ``--json``."""
     parser.add_argument("--json", action="store_true", help="print JSON on standard output")
 

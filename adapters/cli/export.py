@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from adapters.cli.arguments import add_json_flag, add_run_argument, print_json
+from adapters.cli.arguments import add_json, add_run_argument, print_json
 
 OPENED_BY = {
     "vtu": "ParaView; colour grains by displacement, glyph: sphere, scale: radius, factor 2",
@@ -30,7 +30,7 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--variant", default="", metavar="NAME", help="a run beside it, such as control"
     )
-    add_json_flag(parser)
+    add_json(parser)
     parser.set_defaults(command=run_export)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from adapters.cli.arguments import add_json_flag, print_json
+from adapters.cli.arguments import add_json, print_json
 
 
 def register(verb: str, parser: argparse.ArgumentParser) -> None:
@@ -54,7 +54,7 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
         "--probability", type=float, default=0.9, metavar="P",
         help="that the band should hold the truth; default: 0.9; refusals do not depend on it",
     )  # fmt: skip
-    add_json_flag(parser)
+    add_json(parser)
     parser.set_defaults(command=run_fit)
 
 

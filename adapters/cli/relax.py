@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from adapters.cli.arguments import add_json_flag, print_json
+from adapters.cli.arguments import add_json, print_json
 from adapters.errors import UsageError
 
 
@@ -26,7 +26,7 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
         "--method", default="smallest-move", metavar="NAME",
         help="smallest-move (default) or karrech2007",
     )  # fmt: skip
-    add_json_flag(parser)
+    add_json(parser)
     parser.set_defaults(command=run_relax)
 
 

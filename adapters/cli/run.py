@@ -5,12 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from adapters.cli.arguments import (
-    add_json_flag,
-    add_run_argument,
-    add_scene_arguments,
-    list_overrides,
-)
+from adapters.cli.arguments import add_json, add_run_argument, add_scene_arguments, list_overrides
 from adapters.errors import UsageError
 from trackbed.run_verbs import print_fields, show_page
 
@@ -31,7 +26,7 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
             "its shorter tries failed, compute cycles instead of stopping with exit code 6",
         )  # fmt: skip
     elif verb == "status":
-        add_json_flag(parser)
+        add_json(parser)
     else:
         parser.add_argument("--open", action="store_true", help="show it, when there is a display")
     commands = {

@@ -6,7 +6,7 @@ import argparse
 import shlex
 from pathlib import Path
 
-from adapters.cli.arguments import add_json_flag, print_json
+from adapters.cli.arguments import add_json, print_json
 from adapters.errors import EngineMissing, UsageError
 
 
@@ -15,7 +15,7 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
     from trackbed.scenes import list_scenes
 
     if verb == "doctor":
-        add_json_flag(parser)
+        add_json(parser)
     elif verb == "new":
         parser.add_argument("name", metavar="NAME", help="; ".join(list_scenes()))
         parser.add_argument("folder", metavar="FOLDER", type=Path, help="made when it is not there")

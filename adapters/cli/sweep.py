@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from adapters.cli.arguments import add_json_flag, add_scene_arguments, list_overrides, print_json
+from adapters.cli.arguments import add_json, add_scene_arguments, list_overrides, print_json
 from adapters.errors import SweepIncomplete, UsageError
 
 
@@ -40,7 +40,7 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--dry-run", action="store_true", help="check every member and print its command"
     )
-    add_json_flag(parser)
+    add_json(parser)
     parser.set_defaults(command=run_sweep_command, overrides=[])
 
 

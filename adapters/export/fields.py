@@ -13,7 +13,7 @@ from adapters.export.instants import ExportedRun, Instant
 Array = NDArray[np.float64] | NDArray[np.int64]
 
 
-def gather_grain_fields(run: ExportedRun, instant: Instant) -> dict[str, Array]:
+def gather_grains(run: ExportedRun, instant: Instant) -> dict[str, Array]:
     """Fields of the grains by name, shape (n,) or (n, 3).
 
     ``id``; ``radius`` [m]; ``displacement`` since cycle 0 [m], where there are load cycles;
@@ -26,13 +26,13 @@ def gather_grain_fields(run: ExportedRun, instant: Instant) -> dict[str, Array]:
     return fields | {"velocity": state.velocity, "coordination": instant.coordination}
 
 
-def gather_placed_grain_fields(run: ExportedRun, instant: Instant) -> dict[str, Array]:
-    """`gather_grain_fields` with the places of the centres [m] behind ``id``, without a name."""
-    fields = gather_grain_fields(run, instant)
+def gather_placed_grains(run: ExportedRun, instant: Instant) -> dict[str, Array]:
+    """`gather_grains` with the places of the centres [m] behind ``id``, without a name."""
+    fields = gather_grains(run, instant)
     return {"id": fields.pop("id"), "": instant.state.position} | fields
 
 
-def gather_contact_fields(run: ExportedRun, instant: Instant) -> dict[str, Array]:
+def gather_contacts(run: ExportedRun, instant: Instant) -> dict[str, Array]:
     """Fields of the contacts between grains by name, shape (m,) or (m, 3).
 
     ``normal_force`` [N], positive where it pushes the grains apart; ``tangential_force`` on the

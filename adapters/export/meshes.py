@@ -9,7 +9,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from adapters.bed import FloatArray, IntArray
-from adapters.export.fields import Array, gather_contact_fields, gather_grain_fields, list_contacts
+from adapters.export.fields import Array, gather_contacts, gather_grains, list_contacts
 from adapters.export.instants import ExportedRun
 from trackbed.run_files import replace_file, write_whole
 
@@ -17,8 +17,8 @@ from trackbed.run_files import replace_file, write_whole
 def export_vtu(run: ExportedRun, into: Path, every: int) -> list[Path]:
     """``grains.pvd`` and ``contacts.pvd``, series over the cycles, and their files in ``vtu/``.
 
-    Grains are points with `gather_grain_fields`; contacts are lines from centre to centre with
-    `gather_contact_fields`.
+    Grains are points with `gather_grains`; contacts are lines from centre to centre with
+    `gather_contacts`.
     """
     folder = into / "vtu"
     folder.mkdir(exist_ok=True)
@@ -28,9 +28,9 @@ def export_vtu(run: ExportedRun, into: Path, every: int) -> list[Path]:
         contacts.append((instant.cycle, folder / f"contacts_{instant.cycle:06d}.vtu"))
         centres = instant.state.position
         points = np.arange(len(centres))[:, None]
-        of_grains = gather_grain_fields(run, instant)
+        of_grains = gather_grains(run, instant)
         write_mesh(grains[-1][1], centres, "vertex", points, point_data=of_grains)
-        of_contacts = gather_contact_fields(run, instant)
+        of_contacts = gather_contacts(run, instant)
         lines = list_contacts(instant)
         write_mesh(contacts[-1][1], centres, "line", lines, cell_data=of_contacts)
     write_pvd(into / "grains.pvd", grains)

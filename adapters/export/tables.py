@@ -9,12 +9,7 @@ import numpy as np
 
 from adapters.bed import FloatArray
 from adapters.engines import bound_section
-from adapters.export.fields import (
-    Array,
-    gather_contact_fields,
-    gather_placed_grain_fields,
-    split_columns,
-)
+from adapters.export.fields import Array, gather_contacts, gather_placed_grains, split_columns
 from adapters.export.instants import ExportedRun, Instant
 from adapters.files import Frame, Kind, write_dump
 from trackbed.run_files import replace_file
@@ -34,7 +29,7 @@ def export_ovito(run: ExportedRun, into: Path, every: int) -> list[Path]:
 
     def make_grain_frames() -> Iterator[Frame]:
         for instant in run.instants(every):
-            fields = gather_placed_grain_fields(run, instant)
+            fields = gather_placed_grains(run, instant)
             named = {ENGINE_NAME.get(name, name): values for name, values in fields.items()}
             yield _make_frame(instant, dict(split_columns(named, "")), box, "atoms")
 
@@ -48,7 +43,7 @@ def export_ovito(run: ExportedRun, into: Path, every: int) -> list[Path]:
 
 
 def _gather_contact_columns(run: ExportedRun, instant: Instant) -> dict[str, Array]:
-    fields = gather_contact_fields(run, instant)
+    fields = gather_contacts(run, instant)
     if run.frictional:
         fields["tangential_force"] = np.linalg.norm(fields["tangential_force"], axis=1)
     first, second = instant.state.contacts.pair.T
@@ -79,13 +74,13 @@ def export_csv(run: ExportedRun, into: Path, every: int) -> list[Path]:
 
     def list_grain_columns() -> Iterator[dict[str, Array]]:
         for instant in run.instants(every):
-            fields = split_columns(gather_placed_grain_fields(run, instant), "_")
+            fields = split_columns(gather_placed_grains(run, instant), "_")
             yield _add_cycle(instant, dict(fields))
 
     def list_contact_columns() -> Iterator[dict[str, Array]]:
         for instant in run.instants(every):
             first, second = instant.state.contacts.pair.T
-            fields = split_columns(gather_contact_fields(run, instant), "_")
+            fields = split_columns(gather_contacts(run, instant), "_")
             yield _add_cycle(instant, {"id1": first, "id2": second, **dict(fields)})
 
     tables = {"grains": list_grain_columns(), "contacts": list_contact_columns()}

@@ -21,7 +21,7 @@ from adapters.jumps.control import (
     trace_curve,
 )
 from adapters.jumps.forecast import Forecast, fit_forecast, integrate_gain
-from adapters.jumps.rates import Stretch, count_blocks, estimate_noise, measure_rates
+from adapters.jumps.rates import Stretch, count_blocks, find_noise, find_rates
 from adapters.jumps.slopes import Landing, estimate_slopes, find_reseating, remove_moves
 
 ROLL_BACK = 2.0
@@ -77,8 +77,8 @@ def judge(
     landings, windows, behind = join_by_jump(control, decision, settings, stretch)
     kappa, kappa_error = estimate_slopes(behind, landings).kappa()
     every = tuple(remove_moves(one, landings, kappa) for one in windows)
-    window, noises = every[-1], estimate_noise(every).variance
-    before, both = fit_forecast(measure_rates(every[:-1])), fit_forecast(measure_rates(every))
+    window, noises = every[-1], find_noise(every).variance
+    before, both = fit_forecast(find_rates(every[:-1])), fit_forecast(find_rates(every))
     start, end = float(control.cycle), float(window.first_cycle)
     deviation = compare_rate(before, every[:-1], window)
     drift = sum_drift(control.drift, deviation)
@@ -133,7 +133,7 @@ def compare_rate(before: Forecast, past: Sequence[Stretch], window: Stretch) -> 
     expected = float(before.gain(start, end)) / k
     known = np.array(before.half_widths(start, end, JUMP_PROBABILITY)) / k
     student = float(stdtrit(before.freedom, (1 + JUMP_PROBABILITY) / 2))
-    noise = float(estimate_noise(past).variance[-1]) / k
+    noise = float(find_noise(past).variance[-1]) / k
     error = sqrt(noise + float((known / student) @ (known / student)))
     difference = window.rate - expected
     return difference / error if error > 0 else (inf if difference else 0.0)

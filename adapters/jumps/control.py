@@ -28,13 +28,7 @@ from scipy.special import stdtrit
 
 from adapters.bed import FloatArray
 from adapters.jumps.forecast import Forecast, bound_gain_by_laws, fit_forecast
-from adapters.jumps.rates import (
-    Stretch,
-    estimate_noise,
-    fit_slope_trend,
-    fit_state_trend,
-    measure_rates,
-)
+from adapters.jumps.rates import Stretch, find_noise, find_rates, fit_slope_trend, fit_state_trend
 from adapters.jumps.slopes import Landing, estimate_slopes, find_reseating, remove_moves
 from adapters.laws.fit import FIRST_WINDOW, WHY_NOT, WHY_NOT_PISTON, BoolArray, Regime
 
@@ -218,7 +212,7 @@ def decide(control: Control, settings: Settings, piston: Regime | None = None) -
         return Decision(
             control.cycle, "compute", min(FIRST_WINDOW, left), why="the first cycles to be fitted"
         )
-    forecast = fit_forecast(measure_rates(control.stretches))
+    forecast = fit_forecast(find_rates(control.stretches))
     regime = forecast.regime
     known = Decision(
         control.cycle,
@@ -297,7 +291,7 @@ def find_limits(
     here = float(control.cycle)
     gains = forecast.gain(here, here + grid)
     allowed = SAFETY * settings.tolerance * np.abs(control.settlement + gains)
-    slope, slope_error = fit_slope_trend(measure_rates(control.stretches))
+    slope, slope_error = fit_slope_trend(find_rates(control.stretches))
     curvature = max(abs(slope) - slope_error, 0.0)
     missed = 0.5 * curvature * np.log1p(grid / here) ** 2
     noise, law = widths
@@ -362,7 +356,7 @@ def choose_window(
     """
     here = float(control.cycle)
     sizes = np.unique(np.geomspace(SHORTEST_WINDOW, LONGEST_WINDOW, 20).round())
-    variance = float(estimate_noise(control.stretches).variance[-1])
+    variance = float(find_noise(control.stretches).variance[-1])
     known = float(1 / (forecast.weight @ forecast.error**2)) if forecast.error.any() else inf
     others = min(value for name, value in limits.items() if name not in ("noise", "laws"))
     student = float(stdtrit(forecast.freedom, (1 + JUMP_PROBABILITY) / 2))

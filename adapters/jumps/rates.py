@@ -101,7 +101,7 @@ class Noise:
     """Degrees of freedom that it is known with."""
 
 
-def estimate_noise(stretches: Sequence[Stretch]) -> Noise:
+def find_noise(stretches: Sequence[Stretch]) -> Noise:
     """Long-run variance of the gains about their smooth rate, from all stretches together.
 
     Alone, a window between two bursts sees none, would look quiet, and be believed too much.  The
@@ -186,10 +186,10 @@ def cut_blocks(stretches: Sequence[Stretch]) -> tuple[FloatArray, FloatArray, Fl
     return start, end, np.concatenate([np.add.reduceat(one.gain, e[:-1]) for one, e in pairs])
 
 
-def measure_rates(stretches: Sequence[Stretch]) -> Rates:
+def find_rates(stretches: Sequence[Stretch]) -> Rates:
     """Blocks of all stretches, with the noise of all."""
     start, end, gain = cut_blocks(stretches)
-    noise, count = estimate_noise(stretches), end - start
+    noise, count = find_noise(stretches), end - start
     own = np.repeat(noise.variance, [count_blocks(one) for one in stretches])
     smooth = fit_smooth_rate(stretches)(0.5 * (start + end)) * count
     variance = own * count + (LAW_ERROR * smooth) ** 2

@@ -25,7 +25,7 @@ from math import sqrt
 import numpy as np
 
 from adapters.bed import FloatArray, IntArray
-from adapters.jumps.rates import Stretch, estimate_noise
+from adapters.jumps.rates import Stretch, find_noise
 
 DRIFT = 1.0
 """Standard deviation of the slope's change over a unit of ln N, over the mean slope."""
@@ -89,7 +89,7 @@ def estimate_slopes(stretches: Sequence[Stretch], landings: Sequence[Landing] = 
     reseated = np.array([extra for _, extra in pieces]) / span
     place = np.array([0.5 * np.log(one.first_cycle * one.last_cycle) for one in blocks])
     cycles = np.array([len(one.gain) for one in blocks])
-    noise = estimate_noise(blocks).variance * cycles / span**2
+    noise = find_noise(blocks).variance * cycles / span**2
     kappa = 0.0
     for _ in range(2):  # the walk's scale is the mean slope without what jumps add to it
         mean = float((slope - kappa * reseated) @ span) / float(span.sum())

@@ -101,7 +101,7 @@ def check_state(scene: Scene, state: State) -> None:
         )
 
 
-def measure_window(scene: Scene, window: Window) -> WindowFigures:
+def measure(scene: Scene, window: Window) -> WindowFigures:
     """The figures of `check_bounds`."""
     walls = scene.container.walls()
     # From the positions, not from the engine's list of contacts: it cannot hide one.
@@ -180,6 +180,6 @@ def check_rise(scene: Scene, height: FloatArray, rise: FloatArray) -> None:
 def check_window(scene: Scene, window: Window, cycles: int) -> dict[str, float]:
     """All checks of a window; returns the figures judged, for the record."""
     check_complete(scene, window, cycles)
-    figures = measure_window(scene, window)
+    figures = measure(scene, window)
     check_bounds(scene, figures)
     return asdict(figures)

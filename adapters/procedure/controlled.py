@@ -24,10 +24,10 @@ from adapters.jumps import (
     accept,
     decide,
     estimate_slopes,
+    find_rates,
     fit_forecast,
     join_stretch,
     judge,
-    measure_rates,
     observe,
     reject,
     remove_moves,
@@ -100,7 +100,7 @@ def find_sinking_regime(sunk: Sequence[Stretch], landings: Sequence[Landing]) ->
     lower it by what they move the mean grain by.  That excess does not fall with N, and would pass
     for ratcheting where jumps grow.  None where it does not sink."""
     kappa = estimate_slopes(sunk, landings).kappa()[0] if landings else 0.0
-    forecast = fit_forecast(measure_rates([remove_moves(one, landings, kappa) for one in sunk]))
+    forecast = fit_forecast(find_rates([remove_moves(one, landings, kappa) for one in sunk]))
     return forecast.regime if forecast.rate @ forecast.weight > 0 else None
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from adapters.bed import FloatArray
 from adapters.files import Outcome
 from adapters.laws import Law
-from adapters.laws.fit import measure_coordinates_error, measure_displacement_error
+from adapters.laws.fit import compare_coordinates, compare_displacements
 from adapters.procedure import History
 
 COORDINATION_BAR = 0.03
@@ -84,10 +84,10 @@ def compare_runs(
     displacement = coordinates = nan
     if beds is not None:
         before_jump, in_full, in_own = beds
-        coordinates = measure_coordinates_error(in_full, in_own)
+        coordinates = compare_coordinates(in_full, in_own)
         # Without a move of the full run E_r has no denominator.
         if before_jump is not None and not np.array_equal(before_jump, in_full):
-            displacement = measure_displacement_error(before_jump, in_full, in_own)
+            displacement = compare_displacements(before_jump, in_full, in_own)
     return Comparison(
         name=name,
         computed=own.count_computed(own_cycle),

@@ -9,7 +9,7 @@ from adapters.bed import (
     CHAIN_FACTOR,
     OVERLAP_BOUND,
     combine_moduli,
-    expect_grain_count,
+    expect_grains,
     find_overlap_under_force,
     find_radius_that_fits,
     find_rayleigh_time,
@@ -82,7 +82,7 @@ def _check_time_step(scene: Values) -> Iterator[Problem]:
 
 def _check_fill_height(scene: Values) -> Iterator[Problem]:
     height = scene.need("sample.fill_height")
-    count = expect_grain_count(find_radii(scene), find_geometry(scene), height)
+    count = expect_grains(find_radii(scene), find_geometry(scene), height)
     if not 1 <= count <= COUNT_GREATEST:
         yield Problem("sample.fill_height", f"{height:g} m would take {count:.3g} grains")
 

@@ -26,7 +26,7 @@ from adapters.bed import (
     RadiusDistribution,
     contact_law,
     count_sides,
-    expect_grain_count,
+    expect_grains,
 )
 from adapters.files import LoadSeries, read_load_series
 from adapters.laws.fit import FIRST_WINDOW
@@ -349,9 +349,7 @@ class Scene(Table):
         if self.sample.count is not None:
             return self.sample.count
         assert self.sample.fill_height is not None
-        return expect_grain_count(
-            self.sample.grain_radius.law, self.container, self.sample.fill_height
-        )
+        return expect_grains(self.sample.grain_radius.law, self.container, self.sample.fill_height)
 
     def stress_at(self, phase: float | FloatArray) -> FloatArray:
         """Stress [Pa] on the loaded area at a ``phase`` in cycles; 0 without loading."""

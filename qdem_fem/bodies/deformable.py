@@ -14,8 +14,8 @@ from qdem_fem.element import (
     Material,
     Strain,
     compute_cauchy_stress,
-    compute_displacement_gradient,
     compute_von_mises,
+    find_displacement_gradient,
 )
 from qdem_fem.files import ConditionError, Floats, Integers, MaterialError
 from qdem_fem.mesh import TetMesh, find_gradients, find_surface_faces, read_mesh
@@ -125,9 +125,7 @@ class Body:
         """Elastic Cauchy stress of the elements [Pa], (m, 3, 3) (eq. 2); zero of a rigid body."""
         if self.rigid:
             return np.zeros((len(self.elements), 3, 3))
-        gradient = compute_displacement_gradient(
-            self.gradients[0], self.elements, self.displacement
-        )
+        gradient = find_displacement_gradient(self.gradients[0], self.elements, self.displacement)
         nominal = MEASURES[self.strain].compute_nominal_stress(
             gradient, self.material.lame_first, self.material.lame_second
         )
@@ -137,7 +135,7 @@ class Body:
         """Stored energy of the elements [J], (m,), at a displacement (n, 3) [m]."""
         gradients, volumes = self.gradients
         found: Floats = MEASURES[strain].compute_stored_energy(
-            compute_displacement_gradient(gradients, self.elements, displacement),
+            find_displacement_gradient(gradients, self.elements, displacement),
             volumes, self.material.lame_first, self.material.lame_second,
         )  # fmt: skip
         return found

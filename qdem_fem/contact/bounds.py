@@ -11,7 +11,7 @@ J^T k^1/2``, is a sum over nodes and rigid bodies c of parts that are not negati
 ``D_c`` and are zero for the springs of others; so it is at most the diagonal matrix of the sums of
 both ends' D.
 
-`bound_allowed_contacts` holds for any contacts there may ever be, and pays for it: it gives the
+`bound_contacts` holds for any contacts there may ever be, and pays for it: it gives the
 lightest vertex of all as many as the scene allows, to another as light, and adds what elements do
 to what contact does, though they do it elsewhere.  Bodies that lie together in a bed touch where
 they touch.  Until pairs are looked for again, no contact acts that is not in the list of pairs; and
@@ -55,7 +55,7 @@ def bound_spring_network(
     return float(max(between, each[wall > 0].max(initial=0.0)))
 
 
-def bound_allowed_contacts(
+def bound_contacts(
     normal: Floats,
     inverse_mass: Floats,
     contacts: float,

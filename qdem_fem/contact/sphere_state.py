@@ -28,8 +28,8 @@ from qdem_fem.contact.spheres import (
     Planes,
     SphereContact,
     Spheres,
-    compute_pair_stiffness,
     compute_tangential_stiffness,
+    find_pair_stiffness,
     make_plane_arrays,
 )
 from qdem_fem.contact.state import Contacts, ContactTouching
@@ -60,7 +60,7 @@ class SphereContacts(Contacts):
         normal = repeat_by_body([asked.find_value(b.name, "normal_stiffness") for b in run.bodies])
         radius = repeat_by_body([asked.find_value(b.name, "radius") for b in run.bodies])
         poisson = repeat_by_body([float(np.mean(b.material.poisson)) for b in run.bodies])
-        self.one = compute_pair_stiffness(normal, normal.max(initial=0.0))
+        self.one = find_pair_stiffness(normal, normal.max(initial=0.0))
         self.skin = float(SKIN_OF_SPHERES * radius.min() if asked.skin is None else asked.skin)
         free = asked.skin is None and asked.contacts != NEAR
         self.skins = (self.skin, float(radius.min()) if free else self.skin)
@@ -190,7 +190,7 @@ class SphereContacts(Contacts):
     def _springs(self, ends: Integers, walls: Integers) -> tuple[Integers, Floats, Floats]:
         """k_n of pairs (p, 2), and of so many walls (c,) of each vertex [N/m], behind the pairs."""
         normal = self.kernel.spheres.normal
-        stiffness = compute_pair_stiffness(normal[ends[:, 0]], normal[ends[:, 1]])
+        stiffness = find_pair_stiffness(normal[ends[:, 0]], normal[ends[:, 1]])
         return ends, stiffness, 2 * normal * walls
 
     def _ends(self, *, every: bool = False) -> Integers:
@@ -219,7 +219,7 @@ class SphereContacts(Contacts):
         spheres, planes = self.kernel.spheres, self.kernel.planes
         ends, touching = self._ends(), self.touching()
         normal, tangential = (
-            compute_pair_stiffness(k[ends[:, 0]], k[ends[:, 1]])
+            find_pair_stiffness(k[ends[:, 0]], k[ends[:, 1]])
             for k in (spheres.normal, spheres.tangential)
         )
         twice = (normal * touching.overlap**2).sum()

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qdem_fem.bodies import Given
-from qdem_fem.contact.bounds import bound_allowed_contacts, find_near_step, shorten_step_by_contact
+from qdem_fem.contact.bounds import bound_contacts, find_near_step, shorten_step_by_contact
 from qdem_fem.contact.critical_step import CriticalStep
 from qdem_fem.contact.spheres import LOOK_AGAIN, NEAR, TOO_DEEP, SphereContact
 from qdem_fem.contact.surface import SurfaceContact, check_inside
@@ -137,7 +137,7 @@ class Contacts(ABC):
         """Bound on omega^2 of the contacts that the time step allows for [1/s^2]."""
         if self._allowed is None:
             assert self.contacts != NEAR
-            self._allowed = bound_allowed_contacts(
+            self._allowed = bound_contacts(
                 self.one, self.inverse_mass, self.contacts, self.bound_rigid
             )
         return self._allowed

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qdem_fem.contact.spheres import (
-    compute_pair_stiffness,
     compute_tangential_stiffness,
+    find_pair_stiffness,
     make_plane_arrays,
 )
 from qdem_fem.contact.state import Contacts
@@ -23,7 +23,7 @@ from qdem_fem.contact.surface import (
     Walls,
     find_sharp_edges,
     make_near,
-    place_face_points,
+    place_points,
     renew_near,
 )
 from qdem_fem.contact.system import System
@@ -51,7 +51,7 @@ class SurfaceContacts(Contacts):
         self.reach = 2 * (self.depth + self.skin)
         super().__init__(run, asked)
         counts, starts = np.diff(self.first_vertex), self.first_vertex
-        share = place_face_points(int(asked.points))
+        share = place_points(int(asked.points))
         parts: list[list[Any]] = [[] for _ in range(8)]
         faces, areas, edges, opposite, edge_areas, points, shares, of_points = parts
         for body, start, count in zip(run.bodies, starts, counts, strict=False):
@@ -104,7 +104,7 @@ class SurfaceContacts(Contacts):
         covering = np.zeros(size)
         np.add.at(covering, face, np.repeat(area[:, None] / 3, 3, axis=1))
         covering = self.sum_shared(covering)
-        self.one = compute_pair_stiffness(modulus, modulus.max())[body_of[0]] * covering
+        self.one = find_pair_stiffness(modulus, modulus.max())[body_of[0]] * covering
 
     @property
     def near(self) -> Near:
@@ -144,7 +144,7 @@ class SurfaceContacts(Contacts):
         total = np.zeros(len(self.nodes))
         at = np.flatnonzero(near.weight > 0)
         point, other = near.point[at], near.body[at]
-        modulus = compute_pair_stiffness(
+        modulus = find_pair_stiffness(
             surface.modulus[surface.point_body[point]], surface.modulus[other]
         )
         stiffness = 0.5 * near.weight[at] * modulus

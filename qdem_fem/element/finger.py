@@ -19,10 +19,10 @@ from qdem_fem.element.kinematics import (
     find_trace,
     transpose,
 )
-from qdem_fem.element.stress import Nine, compute_viscous_stress
+from qdem_fem.element.stress import Nine, find_viscous_stress
 from qdem_fem.files import Floats
 
-compute_viscous_numbers = compute_viscous_stress
+find_viscous_numbers = find_viscous_stress
 
 
 class Finger(NamedTuple):
@@ -57,15 +57,13 @@ def compute_stored_energy(
     first, minors = find_trace(H)[..., 0, 0], find_cofactor(H)
     spread = first + contract(H, H) / 2  # tr(eps)
     beyond_first = find_trace(minors)[..., 0, 0] + contract(H, minors) / 3
-    j = first + beyond_first  # compute_volume_change(H)
+    j = first + beyond_first  # find_volume_change(H)
     # (1 + j) tr(eps) - j, its first order tr H - tr H left out
     density = mu * (contract(H, H) / 2 - beyond_first + j * spread)
     return volume * (density + (lam - mu) / 2 * spread**2)
 
 
-def compute_stress_numbers(
-    h: Nine, lame_first: Any, lame_second: Any, half: Any
-) -> tuple[Nine, Any]:
+def find_stress_numbers(h: Nine, lame_first: Any, lame_second: Any, half: Any) -> tuple[Nine, Any]:
     """``P = T cof F`` with ``T = lambda tr(eps) I + 2 mu eps``, ``eps = (B - I)/2`` (eqs. 2-4).
 
     Since ``B cof F = J F``, with ``K = H^T - cof H``, ``II = tr cof H``, ``III = det H``::
@@ -105,11 +103,11 @@ def compute_stress_numbers(
     return stress, (half + half) + growth
 
 
-def compute_fused_pulls(
+def find_fused_pulls(
     h: Nine, w: Nine, g: Nine, lame_first: Any, lame_second: Any, viscous_first: Any,
     viscous_second: Any, half: Any,
 ) -> tuple[Nine, Any, Any]:  # fmt: skip
-    """Pulls of `compute_stress_numbers` and `compute_viscous_stress` together, with less work.
+    """Pulls of `find_stress_numbers` and `find_viscous_stress` together, with less work.
 
     With ``c_a = cof(F) grad N_a``, which is ``J`` times the gradient in the current
     configuration: ``J L = sum_a w_a (x) c_a`` (eq. 5) and ``f_a = -V0 T c_a`` (eqs. 8-10).

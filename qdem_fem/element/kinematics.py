@@ -15,7 +15,7 @@ from qdem_fem.files import Floats, Integers
 IDENTITY = np.eye(3)
 
 
-def compute_displacement_gradient(
+def find_displacement_gradient(
     gradients: Floats, elements: Integers, displacement: Floats
 ) -> Floats:
     """H = sum_a u_a (x) grad_X N_a [-], (m, 3, 3), of displacements (n, 3) [m]; F = I + H (eq. 1).
@@ -53,7 +53,7 @@ def find_cofactor(matrix: Floats) -> Floats:
     return minors
 
 
-def compute_volume_change(H: Floats) -> Floats:
+def find_volume_change(H: Floats) -> Floats:
     """J - 1 = tr H + tr cof H + det H [-], (m,), without cancellation."""
     minors = find_cofactor(H)
     determinant = contract(H, minors) / 3

@@ -41,9 +41,7 @@ def compute_stored_energy(
     return compute_quadratic_energy(compute_strain(H), volume, lame_first, lame_second)
 
 
-def compute_stress_numbers(
-    h: Nine, lame_first: Any, lame_second: Any, half: Any
-) -> tuple[Nine, Any]:
+def find_stress_numbers(h: Nine, lame_first: Any, lame_second: Any, half: Any) -> tuple[Nine, Any]:
     """Linear elasticity, ``P = lambda tr(H) I + mu (H + H^T)``; with it the method is linear FEM.
 
     Returns 1 for ``J`` (NaN where ``H`` is not finite).  Not for bodies that turn: a rotation by
@@ -60,7 +58,7 @@ def compute_stress_numbers(
     return stress, (half + half) + (trace - trace)
 
 
-def compute_viscous_numbers(
+def find_viscous_numbers(
     h: Nine, d: Nine, viscous_first: Any, viscous_second: Any, half: Any
 ) -> Nine:
     """``P = lambda_D tr(Hdot) I + mu_D (Hdot + Hdot^T)``: linear viscosity."""

@@ -55,7 +55,7 @@ def compute_element_pulls(p: Nine, g: Nine) -> Nine:
     )
 
 
-def compute_viscous_stress(
+def find_viscous_stress(
     h: Nine, d: Nine, viscous_first: Any, viscous_second: Any, half: Any
 ) -> Nine:
     """``P = T_D cof F`` with ``T_D = lambda_D tr(D) I + 2 mu_D D``, ``L = Hdot F^-1`` (eqs. 5-7).
@@ -93,7 +93,7 @@ def compute_viscous_stress(
     )
 
 
-def compute_matrix_product(p: Nine, d: Nine) -> Any:
+def find_matrix_product(p: Nine, d: Nine) -> Any:
     """``P : Hdot``, the power of a stress [W/m^3] at a rate of the displacement gradient [1/s]."""
     return (
         p[0] * d[0] + p[1] * d[1] + p[2] * d[2] + p[3] * d[3] + p[4] * d[4] + p[5] * d[5]

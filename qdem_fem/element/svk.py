@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 from numpy.typing import ArrayLike
 
 from qdem_fem.element.kinematics import IDENTITY, apply_hooke, compute_quadratic_energy, transpose
-from qdem_fem.element.stress import Nine, compute_viscous_stress
+from qdem_fem.element.stress import Nine, find_viscous_stress
 from qdem_fem.files import Floats
 
-compute_viscous_numbers = compute_viscous_stress
+find_viscous_numbers = find_viscous_stress
 
 
 class Svk(NamedTuple):
@@ -46,9 +46,7 @@ def compute_stored_energy(
     return compute_quadratic_energy(compute_strain(H), volume, lame_first, lame_second)
 
 
-def compute_stress_numbers(
-    h: Nine, lame_first: Any, lame_second: Any, half: Any
-) -> tuple[Nine, Any]:
+def find_stress_numbers(h: Nine, lame_first: Any, lame_second: Any, half: Any) -> tuple[Nine, Any]:
     """St. Venant-Kirchhoff, ``P = F S``, ``S = lambda tr(E) I + 2 mu E``, ``E = (F^T F - I)/2``.
 
     Conservative and exact under rotation.  Returns ``P`` and ``J``.  Not for strong compression:

@@ -10,7 +10,7 @@ import numpy as np
 
 from qdem_fem.bodies import Body, Given
 from qdem_fem.contact import run_window
-from qdem_fem.element import compute_displacement_gradient, compute_volume_change
+from qdem_fem.element import find_displacement_gradient, find_volume_change
 from qdem_fem.files import ElementInverted, Floats, Integers, StepWarning, Unstable
 from qdem_fem.kernel.cpu import Probes
 from qdem_fem.march.energies import find_energy
@@ -172,8 +172,8 @@ def find_inverted(bodies: Sequence[Body], displacement: Floats) -> tuple[str, in
     for body, moved in zip(bodies, np.split(displacement, ends), strict=True):
         if body.rigid:
             continue
-        jacobian = 1 + compute_volume_change(
-            compute_displacement_gradient(body.gradients[0], body.elements, moved)
+        jacobian = 1 + find_volume_change(
+            find_displacement_gradient(body.gradients[0], body.elements, moved)
         )
         wrong = np.flatnonzero(~(jacobian > 0))
         if wrong.size:

@@ -48,9 +48,9 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Prepared:
     """
     text = read_tables(path, overrides, choose_model)
     if "track" in text.data:
-        from qdem_fem.track import check_track_scene
+        from qdem_fem.track import check_track
 
-        return check_track_scene(text)
+        return check_track(text)
     problems = list(text.problems)
     folder = text.path.parent
     meshes, found = _make_meshes(text, folder)

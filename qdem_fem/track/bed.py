@@ -42,7 +42,7 @@ from qdem_fem.bodies import Body
 from qdem_fem.files import CheckpointError, Floats, NotConverged
 from qdem_fem.grains import GrainSet
 from qdem_fem.march import Damping, Rest, find_rest, read_checkpoint, write_checkpoint
-from qdem_fem.track.bodies import GAP, place_grain_nodes
+from qdem_fem.track.bodies import GAP, place_grains
 from qdem_fem.track.recipe import SLEEPER, BedRecipe, make_bed_bodies, make_bed_grains
 from trackbed.run_files import write_whole
 
@@ -104,19 +104,19 @@ def prepare_bed(
     grains = make_bed_grains(recipe)
     if bed is None:  # refused before grains fall for hours
         recipe.layout.place_grains_beside(
-            place_grain_nodes(grains)[recipe.below :], 0.0, recipe.seed + 1
+            place_grains(grains)[recipe.below :], 0.0, recipe.seed + 1
         )
     for number, stage in enumerate(STAGES):
         if bed is not None and STAGES.index(bed.stage) >= number:
             continue
-        bed = run_stage(recipe, grains, stage, bed, threads, progress, name_stage_file(path, stage))
+        bed = run_stage(recipe, grains, stage, bed, threads, progress, name_file(path, stage))
         write_bed(path, recipe, bed)
-        name_stage_file(path, stage).unlink(missing_ok=True)
+        name_file(path, stage).unlink(missing_ok=True)
     assert bed is not None
     return bed
 
 
-def name_stage_file(path: Path, stage: str) -> Path:
+def name_file(path: Path, stage: str) -> Path:
     """Where a stage of the bed in ``path`` is saved: a kill may leave that of one that is done."""
     return path.with_suffix(f".{stage.replace(' ', '-').replace('/', '-of-')}.part.npz")
 
@@ -226,7 +226,7 @@ def place_start_nodes(
     recipe: BedRecipe, grains: GrainSet, stage: str, before: Bed | None
 ) -> list[Floats]:
     """Where the bodies of a stage begin [m]."""
-    layout, loose = recipe.layout, place_grain_nodes(grains)
+    layout, loose = recipe.layout, place_grains(grains)
     if before is None:
         return layout.place_grains_below(loose[: recipe.below], recipe.seed)
     if stage != "crib":

@@ -82,7 +82,7 @@ def _place_centres(start: float, end: float, cell: float) -> Floats:
     return start + (np.arange(count) + 0.5) * (end - start) / max(count, 1)
 
 
-def place_grain_nodes(grains: GrainSet) -> list[Floats]:
+def place_grains(grains: GrainSet) -> list[Floats]:
     """Nodes of each grain [m], (n, 3), its centroid at zero."""
     return [grains.parts(number)[0] for number in range(len(grains))]
 

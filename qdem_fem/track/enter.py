@@ -1,6 +1,6 @@
 """Scenes with a table ``[track]``: ballast and a sleeper, or part of it, in place of ``[[body]]``.
 
-``track-small.toml`` explains every key.  `check_track_scene` checks such a scene; `enter_track`
+``track-small.toml`` explains every key.  `check_track` checks such a scene; `enter_track`
 prepares the bed, or takes it from its file, and gives the simulation that begins there.
 """
 
@@ -83,7 +83,7 @@ class TrackPrepared(Prepared):
         return self.loads[0]
 
 
-def check_track_scene(text: SceneText) -> TrackPrepared:
+def check_track(text: SceneText) -> TrackPrepared:
     """Check a scene with ``[track]``; raises `SceneError` with all that is wrong."""
     problems = list(text.problems) + list(_find_faults(text))
     loads: tuple[Series, ...] = ()

@@ -16,7 +16,7 @@ import numpy as np
 
 from qdem_fem.bodies import Body, Rigid
 from qdem_fem.contact import SphereContacts
-from qdem_fem.contact.spheres import SphereContact, compute_pair_stiffness
+from qdem_fem.contact.spheres import SphereContact, find_pair_stiffness
 from qdem_fem.files import Floats, NotConverged, StepWarning
 from qdem_fem.march import Simulation
 from qdem_fem.track.bed import Bed, enter_bed, guide_sleeper, write_bed
@@ -72,7 +72,7 @@ def find_friction_in_use(run: Simulation, recipe: BedRecipe, friction: float) ->
     found = run.contacts.touching()
     sleeper = np.maximum(found.first, found.second) >= run.first_node[-2]
     push = found.overlap * np.where(
-        sleeper, compute_pair_stiffness(*recipe.stiffness), recipe.stiffness[0]
+        sleeper, find_pair_stiffness(*recipe.stiffness), recipe.stiffness[0]
     )
     across = np.sqrt(np.maximum((found.force**2).sum(axis=1) - push**2, 0.0))
     return np.asarray(across / (friction * push)) if friction > 0 else np.ones_like(push)

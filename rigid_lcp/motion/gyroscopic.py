@@ -15,7 +15,7 @@ from rigid_lcp.shapes import (
     make_quaternion,
     make_rotation,
     multiply_quaternions,
-    normalise_quaternion,
+    normalise,
     rotate,
     rotate_back,
     turn_quaternion,
@@ -56,7 +56,7 @@ def rotate_freely(
     cubes and all bodies with two equal moments move exactly.
     """
     moments, axes = principal
-    frame = normalise_quaternion(multiply_quaternions(quaternion, axes))
+    frame = normalise(multiply_quaternions(quaternion, axes))
     momentum = moments * rotate_back(frame, spin)
     twice_energy = (momentum**2 / moments).sum(axis=-1)
     world_momentum = rotate(frame, momentum)
@@ -72,7 +72,7 @@ def rotate_freely(
     frame = turn_quaternion(frame, seconds / moments[..., 1:2] * world_momentum)
     spin = rotate(frame, rotate_back(frame, world_momentum) / moments)
     body = multiply_quaternions(frame, axes * [1.0, -1.0, -1.0, -1.0])
-    return normalise_quaternion(body), spin
+    return normalise(body), spin
 
 
 def find_energy_turn(

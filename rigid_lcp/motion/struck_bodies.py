@@ -2,7 +2,7 @@
 
 Contacts of a step are looked for as far as bodies get within it by the velocities that they begin
 it with (`find_margin`).  A body at rest that is struck gets further.  What it then meets shows as
-an overlap at the end of the step, at a pair that had no contact in it (`find_missed_collisions`).
+an overlap at the end of the step, at a pair that had no contact in it (`find_missed`).
 A pair without restitution is moved apart and comes to rest in the next step, as it would have done
 in this one.  With restitution the step is made again, with more contacts
 (`find_contacts_of_struck`).
@@ -33,7 +33,7 @@ def find_margin(world: World, motion: Motion, accelerations: Floats, h: float) -
     return h * world.speeds(rates) + OVERLAPS.allowed * world.length
 
 
-def find_missed_collisions(
+def find_missed(
     world: World, contacts: Contacts, end: Motion, touching: Contacts, slow: float
 ) -> Bools:
     """Bodies (n,) of pairs that overlap at the ``end`` of a step, have restitution, approach faster

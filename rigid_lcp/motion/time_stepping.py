@@ -54,11 +54,7 @@ from rigid_lcp.motion.equations import (
 )
 from rigid_lcp.motion.overlap_removal import OVERLAPS, Restitution, separate_bodies
 from rigid_lcp.motion.state import Motion, replace_rates
-from rigid_lcp.motion.struck_bodies import (
-    find_contacts_of_struck,
-    find_margin,
-    find_missed_collisions,
-)
+from rigid_lcp.motion.struck_bodies import find_contacts_of_struck, find_margin, find_missed
 from rigid_lcp.motion.world import World
 
 SolveFrom = Callable[..., tuple[FrictionSolution, float]]
@@ -130,7 +126,7 @@ def step_moreau(
         )
         end = world.move_freely(after, 0.5 * h)
         touching = world.contacts(end, 0.0)
-        struck = find_missed_collisions(world, contacts, end, touching, slow)
+        struck = find_missed(world, contacts, end, touching, slow)
         if turn == MOREAU.widenings or not struck.any():
             break
         wider, margin = find_contacts_of_struck(world, middle, margin, struck, end, h)

@@ -51,11 +51,11 @@ from rigid_lcp.wear import (
     break_scene,
     find_breaks,
     refuse_dust,
-    replace_worn,
     split_body,
     split_wear,
     start_wear,
     step_wear,
+    swap_worn,
 )
 
 
@@ -248,7 +248,7 @@ class Simulation:
             cut = None
             if self.steps % self.wear.every == 0:
                 try:
-                    cut = replace_worn(self.world.scene, self.motion, self.worn)
+                    cut = swap_worn(self.world.scene, self.motion, self.worn)
                 except ShapeError as error:
                     raise error.relocate(f"{error.where} at {self.time:.6g} s") from error
             if cut is not None:

@@ -19,7 +19,7 @@ from rigid_lcp.shapes.rotations import (
     make_quaternion,
     make_rotation,
     multiply_quaternions,
-    normalise_quaternion,
+    normalise,
     rotate,
     rotate_back,
     turn_quaternion,
@@ -30,7 +30,7 @@ from trackbed.choices import find_choice
 __all__ = [
     "Disc", "HalfSpace", "Polygon", "Polyhedron", "Sphere", "extract_quaternion",
     "find_quaternion_rate", "get_shape", "make_box", "make_quaternion", "make_rotation",
-    "multiply_quaternions", "normalise_quaternion", "require_real", "require_vector", "rotate",
+    "multiply_quaternions", "normalise", "require_real", "require_vector", "rotate",
     "rotate_back", "turn_quaternion",
 ]  # fmt: skip
 

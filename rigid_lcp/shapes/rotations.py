@@ -15,7 +15,7 @@ from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import SceneError
 
 
-def normalise_quaternion(quaternion: ArrayLike) -> Floats:
+def normalise(quaternion: ArrayLike) -> Floats:
     """Scale quaternions (..., 4) to length one.
 
     Raises `SceneError` for one of zero length or with NaN: it names no rotation.

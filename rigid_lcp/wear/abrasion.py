@@ -161,7 +161,7 @@ def rub_grains(state: WearState, contacts: Contacts, volume: Floats) -> None:
                 state.volume += share
 
 
-def replace_worn(scene: Scene, motion: Motion, state: WearState) -> tuple[Scene, WearState] | None:
+def swap_worn(scene: Scene, motion: Motion, state: WearState) -> tuple[Scene, WearState] | None:
     """The scene at ``motion`` with the pending wear cut off; None where there is none to cut.
 
     Grains keep the motion of the whole: velocity ``v + w x d`` where the centre of mass is now.

@@ -19,7 +19,7 @@ from qdem_fem.files import Floats
 LAMBDA = MU = 1.0
 ROUND_OFF = 1e-13
 ASKED = (
-    "MEASURE", "OBJECTIVE", "compute_stress_numbers", "compute_viscous_numbers",
+    "MEASURE", "OBJECTIVE", "find_stress_numbers", "find_viscous_numbers",
     "compute_nominal_stress", "compute_stored_energy",
 )  # fmt: skip
 
@@ -89,17 +89,15 @@ def test_stress_is_the_slope_of_the_energy(name: str, scale: float) -> None:
 @every_measure
 @pytest.mark.parametrize("scale", [1e-12, 1e-3, 0.2])
 def test_stress_of_numbers_is_that_of_arrays(name: str, scale: float) -> None:
-    """`compute_stress_numbers`, on arrays and compiled, is the nominal stress, and J = det F."""
+    """`find_stress_numbers`, on arrays and compiled, is the nominal stress, and J = det F."""
     H = draw_gradients(scale)
     expected = MEASURES[name].compute_nominal_stress(H, 0.7, 1.3)
-    found, jacobian = MEASURES[name].compute_stress_numbers(
-        tuple(H.reshape(-1, 9).T), 0.7, 1.3, 0.5
-    )
+    found, jacobian = MEASURES[name].find_stress_numbers(tuple(H.reshape(-1, 9).T), 0.7, 1.3, 0.5)
     bound = 100 * ROUND_OFF * np.abs(expected).max()
     np.testing.assert_allclose(np.stack(found, -1).reshape(-1, 3, 3), expected, atol=bound)
     if MEASURES[name].OBJECTIVE:
         np.testing.assert_allclose(jacobian, np.linalg.det(np.eye(3) + H), rtol=ROUND_OFF)
-    compiled: Any = njit(MEASURES[name].compute_stress_numbers, error_model="numpy")
+    compiled: Any = njit(MEASURES[name].find_stress_numbers, error_model="numpy")
     alone, _ = compiled(tuple(map(float, H[3].ravel())), 0.7, 1.3, 0.5)
     np.testing.assert_allclose(np.reshape(alone, (3, 3)), expected[3], atol=bound)
 
@@ -110,5 +108,5 @@ def test_viscosity_takes_energy(name: str) -> None:
     H, rate = draw_gradients(0.2), draw_gradients(1.0, seed=1)
     h, d = (tuple(A.reshape(-1, 9).T) for A in (H, rate))
     for first, second in ((-2 / 3, 1.0), (1.0, 0.0)):
-        stress = MEASURES[name].compute_viscous_numbers(h, d, first, second, 0.5)
+        stress = MEASURES[name].find_viscous_numbers(h, d, first, second, 0.5)
         assert (sum(p * r for p, r in zip(stress, d, strict=True)) > 0).all()

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters.bed.radii import draw_radii, expect_grain_count
+from adapters.bed.radii import draw_radii, expect_grains
 from adapters.bed.sample import draw_sample_start
 from adapters.bed.state import FloatArray
 from adapters.engines.contract import EngineStart, get_engine
@@ -147,7 +147,7 @@ def test_what_the_scene_says_of_itself() -> None:
     """A million grains fill a third of a metre; piston mass and load an area are the paper's."""
     cluster, paper = (load_scene(find_scene_file(name)) for name in ("cluster", "karrech"))
     law = cluster.sample.grain_radius.law
-    assert expect_grain_count(law, cluster.container, 1 / 3) == pytest.approx(1e6, rel=0.02)
+    assert expect_grains(law, cluster.container, 1 / 3) == pytest.approx(1e6, rel=0.02)
 
     def mass_an_area(scene: Scene) -> float:
         assert scene.loading is not None

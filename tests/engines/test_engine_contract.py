@@ -389,9 +389,7 @@ def test_momentum(name: str, samples: Callable[[str], Sample], tmp_path: Path) -
 
 
 @with_decks
-def test_walls_keep_their_springs(
-    name: str, samples: Callable[[str], Sample], tmp_path: Path
-) -> None:
+def test_walls_keep_springs(name: str, samples: Callable[[str], Sample], tmp_path: Path) -> None:
     """Put back at rest, the bed drags on floor and cylinder as before, but for damping and what it
     adds to Coulomb's limit; without the springs all drag would be gone."""
     sample = samples(name)

@@ -164,9 +164,7 @@ def test_disk_with_too_little_room_for_a_saved_scene(
 
 
 @pytest.mark.long
-def test_mpi_of_another_kind(
-    sample: Sample, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_another_mpi(sample: Sample, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A launcher of another MPI starts two whole runs in one folder: ended as soon as seen."""
     sample.need_process()
     run = sample.copy(tmp_path / "run", *LOST[SECOND])

@@ -79,9 +79,7 @@ def test_piston_is_a_mass_between_two_forces(lammps: Sample, tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("processes", [1, pytest.param(2, marks=WITH_MPIEXEC)])
-def test_a_shifted_bed_keeps_every_tangential_force(
-    lammps: Sample, tmp_path: Path, processes: int
-) -> None:
+def test_shifted_bed_keeps_tangential_force(lammps: Sample, tmp_path: Path, processes: int) -> None:
     """All grains moved by 2 mm, ten thousand overlaps: no force between grains changes.
 
     On two processes grains go over the border between them, and take their history with them.
@@ -200,9 +198,7 @@ def test_its_own_words_are_told(lammps: Sample, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("number", ["SEGV", "ABRT"])
-def test_a_crash_of_lammps_is_no_crash_of_python(
-    lammps: Sample, tmp_path: Path, number: str
-) -> None:
+def test_a_crash_of_lammps_is_none_of_python(lammps: Sample, tmp_path: Path, number: str) -> None:
     """Ended in its steps as by a fault of its own: an error with the signal's name; all goes on."""
     words = (
         f'"$@" & p=$!; while [ ! -s piston.txt ]; do sleep 0.02; done; kill -{number} $p; wait $p'
@@ -270,9 +266,7 @@ def test_runs_where_neither_apt_engine_is(tmp_path: Path) -> None:
     assert [line.split(",")[0] for line in table[1:]] == ["1", "2", "3"]
 
 
-def test_auto_is_lammps_where_nothing_else_is(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_auto_is_lammps_without_others(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """The default engine of a user without root, whose scene need not name one."""
     monkeypatch.setenv("PATH", str(tmp_path))
     assert get_engine("auto").name == "lammps"

@@ -136,9 +136,7 @@ def test_leftovers_of_a_killed_writer_go(tmp_path: Path) -> None:
 # --- whole files ----------------------------------------------------------------------------
 
 
-def test_a_failed_write_leaves_the_old_file(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A writer that dies half-way, or a full disk, leaves the file as it was, and no rubbish."""
     path = tmp_path / "table.csv"
     write_whole(path, "old")

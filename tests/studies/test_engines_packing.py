@@ -14,14 +14,7 @@ from adapters.bed.sample import GRAVITY, draw_sample_start, measure_bed_height
 from adapters.bed.state import FloatArray
 from adapters.engines.lammps import LammpsEngine
 from adapters.errors import NotCredible
-from validation.studies.engines.packing import (
-    WAYS,
-    Way,
-    change_law,
-    load_bed,
-    measure_window,
-    run_way,
-)
+from validation.studies.engines.packing import WAYS, Way, change_law, load_bed, measure, run_way
 from validation.studies.engines.speed import MIRROR, SIDE, check_end, load_tiles, mirror_tiles
 
 pytestmark = pytest.mark.studies
@@ -60,7 +53,7 @@ def test_density_and_coordination_are_those_of_the_positions(tmp_path: Path) -> 
     apart = np.column_stack([np.zeros(len(radius))] * 2 + [np.arange(len(radius)) * 0.02 + 0.01])
     apart[1] = apart[0] + [0, 0, radius[0] + radius[1] - 1e-6]
     still = replace(window, position=np.repeat(apart[None], len(window.position), axis=0))
-    figures = measure_window(still, apart, scene)
+    figures = measure(still, apart, scene)
     assert figures.coordination == pytest.approx(2 / len(radius))
     assert figures.settlement == 0
     top = 0.9 * measure_bed_height(apart, radius)

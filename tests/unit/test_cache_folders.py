@@ -64,9 +64,7 @@ def test_kernels_are_kept(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("taken", ["link", "open to others", "file"])
-def test_a_taken_name_is_not_used(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, taken: str
-) -> None:
+def test_taken_name_is_unused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, taken: str) -> None:
     """Whoever can write to the folder can run programs as this user."""
     monkeypatch.setattr(cache_folders.tempfile, "tempdir", str(tmp_path))
     path = tmp_path / f"trackbed-cache-{os.getuid()}"
@@ -83,9 +81,7 @@ def test_a_taken_name_is_not_used(
     assert found.stat().st_mode & 0o777 == 0o700
 
 
-def test_a_writable_installation_is_left_alone(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_writable_installation_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Kernels stay beside their sources, or in the user's cache."""
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     (tmp_path / "__init__.py").write_text("")

@@ -24,7 +24,7 @@ from adapters.procedure.checks import (
     check_rise,
     check_state,
     check_window,
-    measure_window,
+    measure,
 )
 from adapters.scene.tables import Scene
 
@@ -105,7 +105,7 @@ def test_overlap_of_a_pair(share: float) -> None:
     """Two grains at distance 2 r - delta: the share is delta / r."""
     position = window().position.copy()
     position[2, 1, 0] = 2 * RADIUS - share * RADIUS
-    figures = measure_window(SCENE, window(position=position))
+    figures = measure(SCENE, window(position=position))
     assert figures.overlap_share == pytest.approx(share, rel=1e-9)
 
 
@@ -121,7 +121,7 @@ def test_overlap_with_a_wall(axis: int, place: float) -> None:
     position = window().position.copy()
     position[3, 0] = [0, 0, 2.5 * RADIUS]
     position[3, 0, axis] = place
-    figures = measure_window(SCENE, window(position=position))
+    figures = measure(SCENE, window(position=position))
     assert figures.overlap_share == pytest.approx(0.4, rel=1e-9)
 
 
@@ -130,7 +130,7 @@ def test_the_state_before_the_window_is_not_judged() -> None:
     position, velocity = window().position.copy(), window().velocity.copy()
     position[0, 1, 0] = RADIUS
     velocity[0] = 100.0
-    figures = measure_window(SCENE, window(position=position, velocity=velocity))
+    figures = measure(SCENE, window(position=position, velocity=velocity))
     assert figures.overlap_share == pytest.approx(0, abs=1e-15)
     assert figures.energy_share == 0
 
@@ -140,7 +140,7 @@ def test_kinetic_energy() -> None:
     velocity, spin = window().velocity.copy(), window().spin.copy()
     velocity[2, 0] = [3.0, 0, 4.0]
     spin[2, 0] = [0, 20.0, 0]
-    figures = measure_window(SCENE, window(velocity=velocity, spin=spin))
+    figures = measure(SCENE, window(velocity=velocity, spin=spin))
     energy = 0.5 * MASS * 25 + 0.5 * 0.4 * MASS * RADIUS**2 * 400
     assert figures.energy_share == pytest.approx(energy / (3 * MASS * GRAVITY * RADIUS), rel=1e-12)
 
@@ -149,7 +149,7 @@ def test_mean_move() -> None:
     """One of three grains moves by 0.6 r in one cycle: the mean is 0.2 r."""
     position = window().position.copy()
     position[2:, 0, 2] += 0.6 * RADIUS
-    figures = measure_window(SCENE, window(position=position))
+    figures = measure(SCENE, window(position=position))
     assert figures.move_share == pytest.approx(0.2, rel=1e-12)
 
 
@@ -157,13 +157,13 @@ def test_mean_move() -> None:
 def test_force_error(cycle: int) -> None:
     """A constant error in one cycle is its own rms, over the peak 2 N; three cycles are free, and
     with none behind them the figure is nan, which is no fault."""
-    short = measure_window(SCENE, window(3))
+    short = measure(SCENE, window(3))
     assert np.isnan(short.force_error)
     check_bounds(SCENE, short)
     plain = window().piston
     force = plain.contact_force.copy()
     force[cycle * SAMPLES : (cycle + 1) * SAMPLES] += 0.3
-    figures = measure_window(SCENE, tracked(contact_force=force))
+    figures = measure(SCENE, tracked(contact_force=force))
     expected = 0.15 if cycle >= FORCE_START_CYCLES else 0.0
     assert figures.force_error == pytest.approx(expected, rel=1e-12)
 

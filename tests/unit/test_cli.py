@@ -205,9 +205,7 @@ def test_rows_left_out_before_a_load_change_still_tell_its_zero(tmp_path: Path) 
     assert main(words) == main([*words, "--from-cycle", "101"]) == 6
 
 
-def test_fit_starts_anew_where_the_load_changed(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_fit_restarts_at_a_load_change(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """3 ln N up to cycle 1000, then 5 ln of the cycles since: exact with the flag, and not without.
 
     From cycle 1000 on, but counted from the first one, the same rows are another curve.

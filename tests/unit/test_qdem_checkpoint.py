@@ -73,9 +73,7 @@ CASES: dict[str, dict[str, Any]] = {
     "case", [pytest.param(case, marks=[pytest.mark.long] * (case == "all")) for case in CASES]
 )  # no other test compiles that loop
 @pytest.mark.parametrize("pause", [None, 0.0, 1.37e-4])
-def test_restored_run_is_the_uninterrupted_one(
-    case: str, pause: float | None, tmp_path: Path
-) -> None:
+def test_restored_run_is_uninterrupted_one(case: str, pause: float | None, tmp_path: Path) -> None:
     """advance, save, restore elsewhere, advance: every bit of state and sums as without."""
     whole, first = made(**CASES[case]), made(**CASES[case])
     for run in (whole, first):
@@ -154,9 +152,7 @@ def test_state_of_periodic_bodies_in_the_middle(tmp_path: Path) -> None:
         ),
     ],
 )  # fmt: skip
-def test_state_of_another_simulation_is_refused(
-    change: dict[str, Any], said: str, tmp_path: Path
-) -> None:
+def test_foreign_state_is_refused(change: dict[str, Any], said: str, tmp_path: Path) -> None:
     """The error names what differs, and the simulation stays as it was."""
     made().save(tmp_path / "state.npz")
     other = made(**change)

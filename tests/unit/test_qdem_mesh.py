@@ -351,9 +351,7 @@ def test_no_mesh_library_is_loaded_for_arrays() -> None:
     assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0
 
 
-def test_library_that_meshio_lacks_is_named(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_library_meshio_lacks_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     path = tmp_path / "box.med"
     path.write_bytes(b"?")
     monkeypatch.setitem(sys.modules, "h5py", None)

@@ -232,9 +232,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("old", "new", "words"), WRONG)
-def test_wrong_scenes_are_refused_with_line_and_key(
-    tmp_path: Path, old: str, new: str, words: str
-) -> None:
+def test_wrong_scenes_name_line_and_key(tmp_path: Path, old: str, new: str, words: str) -> None:
     """One fault, one sentence that names its line and key."""
     assert old in BASE
     message = refusal(tmp_path, BASE.replace(old, new, 1))
@@ -271,9 +269,7 @@ def test_all_faults_are_named_at_once_in_the_order_of_the_file(tmp_path: Path) -
         ("t,p\n0,\udcff\n", "p.csv:2, column p: load.0.force.csv: '\u00ff' is not a number"),
     ],
 )
-def test_wrong_csv_series_are_refused_with_their_line(
-    tmp_path: Path, rows: str, words: str
-) -> None:
+def test_wrong_csv_series_are_refused_with_line(tmp_path: Path, rows: str, words: str) -> None:
     """A CSV series is refused with its own file and line."""
     (tmp_path / "p.csv").write_bytes(rows.encode("utf-8", "surrogateescape"))
     force = '{ csv = "p.csv", time = "t", value = "p", direction = [0, 0, 1] }'

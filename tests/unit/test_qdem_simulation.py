@@ -358,9 +358,7 @@ def test_state_can_be_set(field: str, after: bool) -> None:
     np.testing.assert_array_equal(getattr(body, field), values)
 
 
-def test_many_bodies_are_set_and_written_in_one_go(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_bodies_set_and_written_in_one_go(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Work on one body is that of its own nodes: of n bodies in turn it was of the order n^2."""
     bodies = [stone(seed=seed) for seed in (1, 2, 3)]
     run = q.Simulation(bodies, threads=1)

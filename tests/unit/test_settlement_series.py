@@ -151,9 +151,7 @@ def test_long_tables_are_read_fast(tmp_path: Path) -> None:
 @settings(
     suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=50, deadline=None
 )
-def test_csv_is_read_without_loss(
-    tmp_path: Path, rows: dict[float, float], bom: bool, end: str
-) -> None:
+def test_csv_is_read_exactly(tmp_path: Path, rows: dict[float, float], bom: bool, end: str) -> None:
     """Any cycles and settlements written in full come back to the last bit, sorted."""
     lines = ["cycle,settlement", *(f"{cycle!r},{value!r}" for cycle, value in rows.items())]
     path = tmp_path / "series.csv"
@@ -207,9 +205,7 @@ def test_any_file_is_read_or_refused_with_a_sentence(tmp_path: Path, content: st
         ('cycle,settlement\n"1,0.5\n', "", "no text table"),
     ],
 )
-def test_faulty_csv_names_file_line_and_column(
-    tmp_path: Path, text: str, place: str, message: str
-) -> None:
+def test_faulty_csv_names_its_place(tmp_path: Path, text: str, place: str, message: str) -> None:
     """Each fault of a CSV is refused where it is."""
     path = written(tmp_path / "series.csv", text)
     with pytest.raises(UsageError) as raised:

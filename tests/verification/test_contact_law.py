@@ -44,9 +44,7 @@ def test_mirror_is_a_rigid_plane(young: float, poisson: float, radius: float) ->
 
 
 @given(overlap=st.floats(1e-9, 1e-3), modulus=YOUNG, radius=LENGTH)
-def test_stiffness_and_inverse_of_the_normal_force(
-    overlap: float, modulus: float, radius: float
-) -> None:
+def test_normal_force_slope_and_inverse(overlap: float, modulus: float, radius: float) -> None:
     """S_n = dF/d delta = 3/2 F/delta, and the overlap under a force is the inverse of eq. 5."""
     force = law.find_normal_force(overlap, modulus, radius)
     assert law.find_normal_stiffness(overlap, modulus, radius) == pytest.approx(

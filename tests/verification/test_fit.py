@@ -78,9 +78,7 @@ def test_prediction_is_anchored_at_the_last_cycle() -> None:
 
 @pytest.mark.parametrize("exponent", [-0.89, -0.5, 0.0, 0.5, 0.89])
 @pytest.mark.parametrize("reach", [1.5, 10.0])
-def test_band_holds_futures_between_saturation_and_constant_rate(
-    exponent: float, reach: float
-) -> None:
+def test_band_holds_futures_from_saturation_to_constant_rate(exponent: float, reach: float) -> None:
     """After a logarithmic past, slopes that go on as N^beta, |beta| < P, end inside the band."""
     cycle = np.arange(1.0, 51.0)
     series = Series(cycle, 2.0 + 0.1 * np.log(cycle))

@@ -25,9 +25,9 @@ from adapters.jumps.forecast import bound_gain_by_laws, fit_forecast, integrate_
 from adapters.jumps.rates import (
     Stretch,
     estimate_long_run_variance,
-    estimate_noise,
+    find_noise,
+    find_rates,
     fit_slope_trend,
-    measure_rates,
 )
 from tests.jump_curves import CURVES, Curve, play
 
@@ -81,7 +81,7 @@ def test_quiet_windows_are_not_believed_more() -> None:
             stretch(n, 1e-3 / (n + 5) * gain)
             for n, gain in zip(range(1000, 1160, 20), gains, strict=True)
         ]
-        forecast = fit_forecast(measure_rates(beds))
+        forecast = fit_forecast(find_rates(beds))
         found.append(float(forecast.rate @ forecast.weight))
     error = float(np.std(found)) / 40**0.5
     assert np.mean(found) == pytest.approx(1e-3 / 1150, abs=2 * error)
@@ -96,7 +96,7 @@ def test_noise_in_proportion_to_the_rate_is_told_from_constant_noise() -> None:
             for n in (100, 200, 400, 1000)
             for noise in [random.standard_normal(30)]
         ]
-        noise = estimate_noise(beds).variance
+        noise = find_noise(beds).variance
         ratio = (100 / 1000) ** (2 * power)
         assert noise[-1] / noise[0] == pytest.approx(ratio, rel=0.35)
 
@@ -108,9 +108,9 @@ def test_a_noisy_slope_is_no_curvature() -> None:
         stretch(n, 1e-4 / (n + np.arange(20.0)) * (1 + 0.3 * random.standard_normal(20)))
         for n in (100, 150, 220)
     ]
-    slope, error = fit_slope_trend(measure_rates(noisy))
+    slope, error = fit_slope_trend(find_rates(noisy))
     assert abs(slope) < 2 * error
-    slope, error = fit_slope_trend(measure_rates([of_law(n, 20, 0.5) for n in (100, 150, 220)]))
+    slope, error = fit_slope_trend(find_rates([of_law(n, 20, 0.5) for n in (100, 150, 220)]))
     assert slope > 5 * error
 
 
@@ -118,7 +118,7 @@ def test_a_noisy_slope_is_no_curvature() -> None:
 def test_forecast_of_a_power_law(beta: float) -> None:
     """Four windows over a doubling of N, without noise, give the gain of the next half doubling."""
     beds = [of_law(n, 20, beta) for n in (100, 130, 160, 200)]
-    forecast = fit_forecast(measure_rates(beds))
+    forecast = fit_forecast(find_rates(beds))
     truth = float(of_law(220, 110, beta).gain.sum())
     noise, form = forecast.half_widths(220, 330.0, 0.9)
     # laws are known to 2 % of a block (LAW_ERROR), so beta only to some tenths
@@ -130,7 +130,7 @@ def test_units_do_not_matter() -> None:
     """Millimetres instead of metres, ten times the cycles: the same gain and the same weights."""
     beds = [of_law(n, 20, 0.3) for n in (100, 200)]
     scaled = [stretch(one.first_cycle, 1e3 * one.gain) for one in beds]
-    one, other = (fit_forecast(measure_rates(of)) for of in (beds, scaled))
+    one, other = (fit_forecast(find_rates(of)) for of in (beds, scaled))
     np.testing.assert_allclose(other.weight, one.weight, rtol=1e-9)
     assert float(other.gain(220, 300.0)) == pytest.approx(1e3 * float(one.gain(220, 300.0)))
 
@@ -194,7 +194,7 @@ def test_slope_rule() -> None:
     """The longest jump by the slope is where g x^2 / 2 reaches 0.9 of the tolerance's error."""
     beds = [of_law(n, 20, 0.4) for n in (50, 80, 120)]
     control = known(*beds)
-    trend, error = fit_slope_trend(measure_rates(beds))
+    trend, error = fit_slope_trend(find_rates(beds))
     longest = dict(decide(control, SETTINGS).limits)["slope"]
     missed = 0.5 * (trend - error) * log(1 + longest / 140) ** 2
     gain = float(of_law(140, int(longest), 0.4).gain.sum())

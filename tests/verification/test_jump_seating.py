@@ -278,9 +278,7 @@ def by_tolerance(
 
 
 @pytest.mark.long
-def test_jumps_that_choose_themselves_wait_too(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_self_chosen_jumps_wait_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """By tolerance: the first jump no earlier than k_i cycles behind the last hung one; where the
     piston hangs again, cycles are computed in place of the jump that was due."""
     first = {}

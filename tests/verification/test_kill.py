@@ -127,9 +127,7 @@ def test_interrupted(
     assert RunFolder(run).stage_names()[: len(finished)] == finished
 
 
-def test_interrupt_is_not_taken_for_a_damaged_file(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_interrupt_is_no_damaged_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A signal that comes while a file is read stops the run; the jump is not given up for it."""
     (tmp_path / "scene.toml").write_text(SCENE)
 

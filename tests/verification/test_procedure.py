@@ -77,9 +77,7 @@ def test_flow_chart(tmp_path: Path) -> None:
     assert max(kinds) == 70
 
 
-def test_healing_cycles_stay_out_of_the_fit(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_healing_cycles_stay_out_of_fit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The fit after a jump sees k + 1 states, and none of the healing ones."""
     seen: list[np.ndarray] = []
     real = stages.get_move("smoothed")
@@ -105,9 +103,7 @@ def test_no_jump_h_zero(tmp_path: Path) -> None:
     )
 
 
-def test_a_jump_that_lifts_the_bed_is_no_jump(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_jump_that_lifts_a_bed_is_no_jump(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A law that says so, by more than the bed moved in its window: shorter jumps, then exit code
     6; a rise of less is let be."""
     real = stages.estimate

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 import qdem_fem as q
 from qdem_fem.bodies.frames import BodyFrames
-from qdem_fem.element.kinematics import compute_displacement_gradient
+from qdem_fem.element.kinematics import find_displacement_gradient
 from qdem_fem.mesh.generation import make_box_mesh
 
 Floats = NDArray[np.float64]
@@ -25,9 +25,7 @@ EPS = float(np.finfo(np.float32).eps)
 
 def green_strain(body: q.Body) -> Floats:
     """``(F^T F - I)/2``: what no rotation changes."""
-    f = np.eye(3) + compute_displacement_gradient(
-        body.gradients[0], body.elements, body.displacement
-    )
+    f = np.eye(3) + find_displacement_gradient(body.gradients[0], body.elements, body.displacement)
     return 0.5 * (f.transpose(0, 2, 1) @ f - np.eye(3))
 
 

@@ -19,7 +19,7 @@ import pytest
 from numpy.typing import ArrayLike
 
 from qdem_fem import Body, Material, Series, Simulation
-from qdem_fem.element.kinematics import compute_displacement_gradient
+from qdem_fem.element.kinematics import find_displacement_gradient
 from qdem_fem.mesh.generation import jitter_nodes, make_box_mesh
 from qdem_fem.mesh.tetrahedra import TetMesh
 from qdem_fem.report.spectra import find_peak_frequencies
@@ -141,7 +141,7 @@ def block_on_its_axes() -> tuple[TetMesh, FloatArray]:
 
 def gradient_of(body: Body) -> FloatArray:
     """H = F - I of the elements [-], (m, 3, 3)."""
-    return compute_displacement_gradient(body.gradients[0], body.elements, body.displacement)
+    return find_displacement_gradient(body.gradients[0], body.elements, body.displacement)
 
 
 def lagrange_strain(body: Body) -> FloatArray:

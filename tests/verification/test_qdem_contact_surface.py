@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import qdem_fem as q
-from qdem_fem.contact.surface.options import find_sharp_edges, place_face_points
+from qdem_fem.contact.surface.options import find_sharp_edges, place_points
 from qdem_fem.contact.window import advance_contact
 from qdem_fem.files.errors import ConditionError, ContactTooDeep
 from qdem_fem.mesh.generation import make_box_mesh
@@ -264,7 +264,7 @@ def test_a_saved_run_goes_on_to_the_same_bits(tmp_path: Path) -> None:
 @given(st.integers(1, 6), st.integers(0, 2**32 - 1))
 def test_points_of_a_face_integrate_linear_functions(parts: int, seed: int) -> None:
     """Equal shares, inside, and their mean is the mean of the corners."""
-    share = place_face_points(parts)
+    share = place_points(parts)
     corners = np.random.default_rng(seed).normal(size=3)
     assert share.shape == (parts**2, 3)
     assert share.min() > 0

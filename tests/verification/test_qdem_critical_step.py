@@ -16,7 +16,7 @@ from qdem_fem.element.strain_measures import Strain
 from qdem_fem.files.errors import StepWarning, Unstable
 from qdem_fem.mesh.generation import make_box_mesh
 from validation.bench.qdem.judge import build_from_lame, build_stiffness, lump_mass
-from validation.bench.qdem.meshes import SLIVER_STEP, make_delaunay, make_sliver_box
+from validation.bench.qdem.meshes import SLIVER_STEP, make_delaunay, make_slivers
 
 LAW = pytest.mark.parametrize("law", get_args(Strain))
 YOUNG, POISSON, DENSITY = 1e6, 0.3, 1000.0
@@ -211,7 +211,7 @@ def test_slivers_cost_what_they_did_in_the_first_study() -> None:
     """Step over that of the even mesh, by the altitude that is left (8^3 and 4^3 cells agree)."""
 
     def critical(altitude: float) -> Any:
-        nodes, elements = make_sliver_box(altitude)
+        nodes, elements = make_slivers(altitude)
         stone = q.Body((nodes, elements), q.Material(45e9, 0.167, 2350.0))
         found = q.Simulation([stone], threads=1).critical_step
         return found, stone.gradients[1]
@@ -266,8 +266,8 @@ def test_mass_scaling_of_a_sliver(
     d omega/omega = -phi dM phi/(2 phi M phi), at most half of the added share times the
     square of the mode there.
     """
-    nodes, elements = make_sliver_box(altitude)
-    even_nodes, _ = make_sliver_box(1.0)
+    nodes, elements = make_slivers(altitude)
+    even_nodes, _ = make_slivers(1.0)
     material = q.Material(YOUNG, POISSON, DENSITY)
     target = share * float(find_element_step(q.Body((even_nodes, elements), material)).min())
 

@@ -16,12 +16,7 @@ from qdem_fem.mesh.generation import jitter_nodes, make_box_mesh
 from qdem_fem.mesh.tetrahedra import TetMesh
 from validation.bench.qdem import hard, judge
 from validation.bench.qdem.hard import CONCRETE
-from validation.bench.qdem.meshes import (
-    make_delaunay,
-    make_graded_box,
-    make_sliver_box,
-    measure_edges,
-)
+from validation.bench.qdem.meshes import make_delaunay, make_graded, make_slivers, measure_edges
 from validation.bench.qdem.problem import make_cantilever
 from validation.case import Check
 
@@ -41,7 +36,7 @@ def test_a_sliver_changes_nothing_but_the_step() -> None:
 
 
 def test_graded_box_fills_the_cube_and_turns_no_element() -> None:
-    nodes, elements = make_graded_box(100.0, 6)
+    nodes, elements = make_graded(100.0, 6)
     volume = np.linalg.det(nodes[elements[:, 1:]] - nodes[elements[:, :1]]) / 6
     assert (volume > 0).all()
     assert volume.sum() == pytest.approx(1.0, rel=1e-12)
@@ -99,9 +94,7 @@ def test_a_step_above_the_critical_one_is_named_with_its_element() -> None:
     assert raised.value.exit_code == 6
 
 
-def test_the_bound_on_the_energy_is_broken_above_the_critical_step(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_energy_bound_is_broken_above_the_critical_step(monkeypatch: pytest.MonkeyPatch) -> None:
     """At 1.001 of the judge's step energy grows by 1.09 each step: the check fails, not the run."""
     problem = hard.make_irregular_cube()
     share = 1.001 / hard.compare_steps(problem)
@@ -241,7 +234,7 @@ def test_an_element_inverted_by_an_impact_is_named() -> None:
 @pytest.mark.parametrize("share", [1.001, 1.3])
 def test_an_element_inverted_from_the_start_is_named(share: float) -> None:
     """A state set by the user: one node beyond the opposite face of element 7, and so of 6."""
-    nodes, elements = make_sliver_box(1.0)
+    nodes, elements = make_slivers(1.0)
     corner = nodes[elements[7]]
     normal = np.cross(corner[2] - corner[1], corner[3] - corner[1])
     height = (corner[0] - corner[1]) @ normal / (normal @ normal)

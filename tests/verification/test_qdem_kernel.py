@@ -17,7 +17,7 @@ from numba.core import types
 
 import qdem_fem as q
 from qdem_fem.element import finger, small, stress
-from qdem_fem.element.kinematics import compute_displacement_gradient, compute_volume_change
+from qdem_fem.element.kinematics import find_displacement_gradient, find_volume_change
 from qdem_fem.element.strain_measures import Strain
 from qdem_fem.kernel.cpu import lanes
 from qdem_fem.kernel.cpu import step as kernel
@@ -104,7 +104,7 @@ def force_scale(body: q.Body, u: np.ndarray, v: np.ndarray) -> np.ndarray:
         for f in (u, v)
     )
     size = (abs(m.lame_first) + 2 * m.lame_second) * h * (1 + h) ** 3
-    jacobian = 1 + compute_volume_change(compute_displacement_gradient(gradients, corner, u))
+    jacobian = 1 + find_volume_change(find_displacement_gradient(gradients, corner, u))
     viscous = abs(m.viscous_first) + 2 * m.viscous_second
     size = size + viscous * d * (1 + h) ** 4 / np.minimum(1, jacobian)
     per_node = np.repeat(volumes * size * length.sum(axis=1), 4)
@@ -162,14 +162,14 @@ def test_viscous_stress_of_arrays(law: Strain) -> None:
     rate, G = generator.uniform(-9, 9, (2, 100, 3, 3))
     h, d, g = (tuple(A.reshape(-1, 9).T) for A in (H, rate, G))
     if law == "small":
-        found = small.compute_viscous_numbers(h, d, -0.4, 0.6, 0.5)
+        found = small.find_viscous_numbers(h, d, -0.4, 0.6, 0.5)
         expected = reference_forces.stress_viscous_small(rate, -0.4, 0.6)
     else:
-        found = stress.compute_viscous_stress(h, d, -0.4, 0.6, 0.5)
+        found = stress.find_viscous_stress(h, d, -0.4, 0.6, 0.5)
         expected = reference_forces.stress_viscous(H, rate, -0.4, 0.6)
         # the velocity edges that go with the rate: Hdot = sum w_a (x) g_a
         w = tuple((rate @ np.linalg.inv(G)).transpose(0, 2, 1).reshape(-1, 9).T)
-        both, _, power = finger.compute_fused_pulls(h, w, g, 0.7, 1.3, -0.4, 0.6, 0.5)
+        both, _, power = finger.find_fused_pulls(h, w, g, 0.7, 1.3, -0.4, 0.6, 0.5)
         total = reference_forces.stress_finger(H, 0.7, 1.3) + expected
         pulls = (total @ G.transpose(0, 2, 1)).transpose(0, 2, 1)
         scale = np.linalg.cond(G)[:, None, None] * abs(pulls).max()
@@ -178,7 +178,7 @@ def test_viscous_stress_of_arrays(law: Strain) -> None:
         taken = (expected * rate).sum(axis=(1, 2))
         assert (abs(power - taken) < 1e-13 * scale[:, 0, 0] ** 2).all()
         np.testing.assert_allclose(
-            stress.compute_matrix_product(found, d), taken, rtol=1e-11, atol=1e-9
+            stress.find_matrix_product(found, d), taken, rtol=1e-11, atol=1e-9
         )
     np.testing.assert_allclose(np.stack(found, -1).reshape(-1, 3, 3), expected, atol=1e-13)
 

@@ -198,9 +198,7 @@ def test_a_free_sleeper_takes_up_the_impulse_of_the_record() -> None:
     assert turning == pytest.approx(expected, rel=2 * lag)
 
 
-def test_command_writes_a_record_to_nine_digits(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_command_writes_to_nine_digits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "train.csv"
     assert main(["train", "--cars", "1", "--out", str(path)]) == 0
     assert "10000 Hz" in capsys.readouterr().out
@@ -225,9 +223,7 @@ def test_command_gives_wheels_flats(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert "on axle nan" in capsys.readouterr().err
 
 
-def test_command_refuses_with_a_sentence(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_command_refuses_in_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["train", "--speed", "-3", "--out", str(tmp_path / "train.csv")]) == 3
     assert "speed = -3.0" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())

@@ -25,12 +25,7 @@ from qdem_fem.scene.checks import load_scene
 from qdem_fem.scene.energy_account import EnergyAccount, list_energy_facts
 from qdem_fem.scene.run import RunFolder, run_dynamic
 from qdem_fem.track.bed import Bed, read_bed, scatter, write_bed
-from qdem_fem.track.bodies import (
-    TrackBox,
-    make_loose_lattice,
-    make_sleeper_slice,
-    place_grain_nodes,
-)
+from qdem_fem.track.bodies import TrackBox, make_loose_lattice, make_sleeper_slice, place_grains
 from qdem_fem.track.bogie import RISE, make_bogie_series
 from qdem_fem.track.enter import TrackPrepared
 from qdem_fem.track.loads.rail import Track, find_seat_share
@@ -146,7 +141,7 @@ def test_grains_that_fall_in_a_column_do_not_stand_as_a_tower() -> None:
     Plumb, some stand on each other, four high, on processors that round so.
     """
     grains = make_grains(8, 1, None, Grading(np.array([0.022, 0.030]), np.array([0.0, 1.0])))
-    placed = make_loose_lattice(place_grain_nodes(grains), [(0.0, 0.09, 0.0, 0.09)], 0.0, 0.012, 1)
+    placed = make_loose_lattice(place_grains(grains), [(0.0, 0.09, 0.0, 0.09)], 0.0, 0.012, 1)
     material = Material(30e9, 0.2, 2700.0)
     bodies = [
         q.Body(replace(grains.mesh(k), nodes=nodes), material, name=str(k), rigid="lumped")
@@ -261,9 +256,7 @@ def test_what_viscosity_takes_closes_the_account(tmp_path: Path) -> None:
     assert kept == pytest.approx(energy.external, rel=1e-2)
 
 
-def test_a_run_whose_account_does_not_close_stops(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_run_whose_account_is_open_stops(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(energies, "find_viscous_half", lambda run: -float(run.motion.work[2]))
     prepared, run, bodies, folder = shaken(tmp_path)
     with (
@@ -316,7 +309,7 @@ def test_where_bodies_touch_the_account_is_looked_at(
 
 def test_loose_grains_touch_neither_each_other_nor_walls_nor_sleeper() -> None:
     band = (0.13, 0.29)
-    grains = place_grain_nodes(make_bed_grains(RECIPE))
+    grains = place_grains(make_bed_grains(RECIPE))
     rooms = [(0.0, 0.2, 0.0, band[0]), (0.0, 0.2, band[1], 0.42)]
     placed = make_loose_lattice(grains, rooms, 0.0, RECIPE.radius, 5)
     assert len(placed) == 8

@@ -122,9 +122,7 @@ def test_a_flat_that_can_not_be_is_refused_by_its_key(tmp_path: Path, flat: str,
         ("roughness = { amplitude = 1e6 }", "leaves the rail"),
     ],
 )
-def test_a_bogie_that_no_record_holds_is_refused_by_its_key(
-    tmp_path: Path, bogie: str, said: str
-) -> None:
+def test_a_bogie_no_record_holds_is_refused_by_key(tmp_path: Path, bogie: str, said: str) -> None:
     """Before any array of that size is asked for."""
     with pytest.raises(SceneError, match=said) as caught:
         load_of(tmp_path, bogie)
@@ -182,16 +180,12 @@ def test_a_record_of_the_load_belongs_to_the_run(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_a_track_that_can_not_be_as_asked_is_refused(
-    tmp_path: Path, change: str, said: str
-) -> None:
+def test_an_impossible_track_is_refused(tmp_path: Path, change: str, said: str) -> None:
     with pytest.raises(SceneError, match=said):
         load_of(tmp_path, "lead = 1.0", change)
 
 
-def test_the_device_of_a_scene_is_that_of_its_run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_device_of_a_scene_is_of_its_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A run on a processor that says it was on a GPU is none."""
 
     class Begun(Exception):

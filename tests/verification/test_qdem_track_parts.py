@@ -20,7 +20,7 @@ from qdem_fem.scene.checks import load_scene
 from qdem_fem.track import bed as track_bed
 from qdem_fem.track import enter as track_scene
 from qdem_fem.track.bed import Bed, guide_sleeper
-from qdem_fem.track.bodies import TrackBox, place_grain_nodes
+from qdem_fem.track.bodies import TrackBox, place_grains
 from qdem_fem.track.enter import TrackPrepared, enter_track
 from qdem_fem.track.layout import TrackLayout
 from qdem_fem.track.recipe import make_bed_grains
@@ -100,7 +100,7 @@ def scene_of(folder: Path, part: str, *changes: tuple[str, str]) -> TrackPrepare
 def test_loose_ballast_keeps_to_its_shoulder_and_off_the_sleeper(
     layout: TrackLayout, tmp_path: Path
 ) -> None:
-    grains = 40 * place_grain_nodes(make_bed_grains(scene_of(tmp_path, "half").recipe))
+    grains = 40 * place_grains(make_bed_grains(scene_of(tmp_path, "half").recipe))
     below = np.concatenate(layout.place_grains_below(grains, 1))
     out = layout.measure_beyond(below[:, 0])
     assert out.max() + layout.radius <= 1.3 + 1e-9
@@ -129,7 +129,7 @@ def test_each_rail_seat_takes_its_own_pressure(
     two += "\npressure_other = { times = [0.0, 1.0], values = [2e6, 2e6] }" * (seats - 1)
     prepared = scene_of(tmp_path, part, (one, two))
     layout, recipe = prepared.recipe.layout, prepared.recipe
-    grains = place_grain_nodes(make_bed_grains(recipe))
+    grains = place_grains(make_bed_grains(recipe))
     nodes = layout.place_grains_below(grains[: recipe.below], 1)
     nodes += layout.place_grains_beside(grains[recipe.below :], 0.5, 2)
     nodes.append(layout.sleeper(0.5).nodes)

@@ -16,15 +16,7 @@ from qdem_fem.march.kinetic_damping import Rest
 from qdem_fem.rigid.holds import find_hold
 from qdem_fem.rigid.step import FREE, STILL
 from qdem_fem.track import bed as track_bed
-from qdem_fem.track.bed import (
-    STAGES,
-    Bed,
-    name_stage_file,
-    prepare_bed,
-    read_bed,
-    run_stage,
-    write_bed,
-)
+from qdem_fem.track.bed import STAGES, Bed, name_file, prepare_bed, read_bed, run_stage, write_bed
 from qdem_fem.track.recipe import BedRecipe, make_bed_grains
 from validation.bench.track_trials import load_track
 
@@ -118,13 +110,13 @@ def test_what_a_kill_left_of_a_stage_that_is_done_is_not_read(
     """Between the bed's file and the removal of the part: the next stages begin all the same."""
     recipe, path = recipe_at(tmp_path), tmp_path / "bed.npz"
     write_bed(path, recipe, whole)
-    parts = {name_stage_file(path, stage) for stage in STAGES}
+    parts = {name_file(path, stage) for stage in STAGES}
     assert len(parts) == len(STAGES)
-    name_stage_file(path, "bed").write_bytes(b"left by a kill")
+    name_file(path, "bed").write_bytes(b"left by a kill")
     nothing = Rest(0.0, 0.0, 0.0, 0, 0, 0, 0.0)
     monkeypatch.setattr(track_bed, "find_rest", lambda *given, **more: nothing)
     assert prepare_bed(recipe, path, 1).stage == "rest"
-    assert not [part for part in parts - {name_stage_file(path, "bed")} if part.exists()]
+    assert not [part for part in parts - {name_file(path, "bed")} if part.exists()]
 
 
 @pytest.mark.long

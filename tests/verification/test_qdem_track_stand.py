@@ -24,7 +24,7 @@ from qdem_fem.scene.build import make_simulation
 from qdem_fem.scene.checks import load_scene
 from qdem_fem.track import stand as track_stand
 from qdem_fem.track.bed import Bed, read_bed, write_bed
-from qdem_fem.track.bodies import place_grain_nodes
+from qdem_fem.track.bodies import place_grains
 from qdem_fem.track.enter import TrackPrepared, choose_contact
 from qdem_fem.track.recipe import make_bed_grains
 from qdem_fem.track.stand import begin_bed, judge_bed, let_bed_stand
@@ -106,7 +106,7 @@ def scene_in_the_air(folder: Path, text: Callable[[str], str]) -> TrackPrepared:
     prepared = load_scene(path)
     assert isinstance(prepared, TrackPrepared)
     layout, recipe = prepared.recipe.layout, prepared.recipe
-    grains = place_grain_nodes(make_bed_grains(recipe))
+    grains = place_grains(make_bed_grains(recipe))
     nodes: list[Any] = layout.place_grains_below(grains[: recipe.below], 1)
     nodes += layout.place_grains_beside(grains[recipe.below :], 0.6, 2)
     nodes.append(layout.sleeper(0.6).nodes)

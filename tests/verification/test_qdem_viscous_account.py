@@ -28,9 +28,7 @@ def thrown(stiffness: float, viscosity: float, gap: float) -> q.Simulation:
 @pytest.mark.parametrize(
     ("stiffness", "viscosity", "share"), [(1e9, 1e4, 0.3), (1e9, 300.0, 0.05), (1e8, 1e4, 0.02)]
 )
-def test_an_impact_within_one_advance_closes(
-    stiffness: float, viscosity: float, share: float
-) -> None:
+def test_impact_within_one_advance_closes(stiffness: float, viscosity: float, share: float) -> None:
     """After a flight of 1000 steps, in which viscosity takes nothing, a blow of some hundred.
 
     The account lacks what second order in the step leaves: 1e-3 is the bar of every run.

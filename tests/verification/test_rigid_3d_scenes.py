@@ -7,7 +7,7 @@ import pytest
 
 from rigid_lcp import HalfSpace, Polyhedron, Scene, Simulation, Sphere, make_box
 from rigid_lcp.arrays import Floats
-from rigid_lcp.shapes.rotations import make_quaternion, normalise_quaternion, rotate
+from rigid_lcp.shapes.rotations import make_quaternion, normalise, rotate
 from tests.rigid_solids import angular_momentum, ballast_stone
 
 G = 9.81
@@ -158,7 +158,7 @@ def poured(count: int, size: float, seed: int) -> Scene:
         scene.add(
             ballast_stone(generator, size), density=2700.0, friction=0.6,
             position=[*across, size * (0.8 + 1.4 * layer)],
-            angle=normalise_quaternion(generator.normal(size=4)),
+            angle=normalise(generator.normal(size=4)),
         )  # fmt: skip
     scene.add(FLOOR)
     return scene

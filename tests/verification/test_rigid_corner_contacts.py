@@ -14,7 +14,7 @@ from rigid_lcp.shapes.rotations import (
     Floats,
     make_quaternion,
     multiply_quaternions,
-    normalise_quaternion,
+    normalise,
     rotate,
 )
 from tests.rigid_solids import CUBE, coal_distance, contacts
@@ -32,7 +32,7 @@ def nearest_corners(name: str, seed: int, form: str, gap: float) -> tuple[Pair, 
     """
     generator = np.random.default_rng(seed)
     shapes = family(name, generator)
-    turns = normalise_quaternion(generator.normal(size=(2, 4)))
+    turns = normalise(generator.normal(size=(2, 4)))
     if form == "edge under corner":
         (pair, normal) = nearest_corners(name, seed, "corner on edge", gap)
         shapes, position, turns, axes = pair

@@ -14,7 +14,7 @@ from rigid_lcp.shapes.rotations import (
     Floats,
     make_quaternion,
     multiply_quaternions,
-    normalise_quaternion,
+    normalise,
     rotate,
 )
 from tests.rigid_solids import CUBE, FLOOR, UPRIGHT, ballast_stone, coal_distance, contacts
@@ -84,7 +84,7 @@ def touching(name: str, seed: int, share: float) -> Pair:
     turns, axes."""
     generator = np.random.default_rng(seed)
     shapes = family(name, generator)
-    turns = normalise_quaternion(generator.normal(size=(2, 4)))
+    turns = normalise(generator.normal(size=(2, 4)))
     axes = separating_axes(shapes, turns)
     direction = generator.normal(size=3)
     direction /= np.linalg.norm(direction)

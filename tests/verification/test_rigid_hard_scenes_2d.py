@@ -31,10 +31,10 @@ from validation.bench.rigid.scenes import (
     find_card_friction,
     find_slide_distance,
     find_wedge_acceleration,
-    incline_block,
     lean_cards,
     stack,
     stack_unequal,
+    tilt_block,
 )
 
 SLOPE = radians(20)
@@ -47,7 +47,7 @@ MILANKOVITCH = 0.10748
 def test_block_at_its_threshold(share: float) -> None:
     """It slides iff ``mu < tan(slope)``: ``g (sin - mu cos) t^2 / 2``, 1.7e-9 t^2 m at 1 - 1e-9."""
     mu, seconds = tan(SLOPE) * share, 0.2
-    run = incline_block(SLOPE, mu, step=2e-3)
+    run = tilt_block(SLOPE, mu, step=2e-3)
     run.advance(seconds)
     way = find_slide_distance(SLOPE, mu, seconds)
     # A residual of 1e-12 is an acceleration of 1e-11 m/s^2.
@@ -58,7 +58,7 @@ def test_block_at_its_threshold(share: float) -> None:
 @pytest.mark.long
 def test_block_does_not_creep() -> None:
     """At rest on 20 degrees with mu = 1: 1e-12 m in 1e5 steps is 1e-17 m a step; 2,000 of them."""
-    run = incline_block(SLOPE, 1.0)
+    run = tilt_block(SLOPE, 1.0)
     assert stack_drop(run, 2.0) < 2e-14
 
 
@@ -164,7 +164,7 @@ def test_an_arch_without_friction_needs_help() -> None:
 
 def test_forces_at_rest_exist_iff_the_block_holds() -> None:
     """The linear programme on a block on a slope: balance turns at ``mu = tan(slope)``."""
-    run = incline_block(SLOPE, 1.0)
+    run = tilt_block(SLOPE, 1.0)
     limit = bisect_rest(lambda mu: find_unbalance(run, mu) <= BALANCED, 0.0, 2.0, 1e-9)
     assert limit == pytest.approx(tan(SLOPE), abs=2e-9)
 
@@ -200,10 +200,10 @@ def test_a_kicked_tower_gains_nothing() -> None:
 
 def test_no_friction_no_grip() -> None:
     """mu = 0 on a slope: free sliding; a huge mu: none, and the box tips over its corner."""
-    run = incline_block(SLOPE, 0.0)
+    run = tilt_block(SLOPE, 0.0)
     run.advance(0.05)
     assert run.positions[0, 0] == pytest.approx(find_slide_distance(SLOPE, 0.0, 0.05), rel=1e-9)
-    steep = incline_block(radians(50), 1e4)
+    steep = tilt_block(radians(50), 1e4)
     steep.advance(0.05)
     # J_A phi'' = m g (a/2) (sin - cos), J_A = 2/3 m a^2, to the first order in the angle
     tip = 0.75 * G * (np.sin(radians(50)) - np.cos(radians(50)))

@@ -24,7 +24,7 @@ from rigid_lcp.shapes.rotations import (
     make_quaternion,
     make_rotation,
     multiply_quaternions,
-    normalise_quaternion,
+    normalise,
     rotate,
     rotate_back,
     turn_quaternion,
@@ -37,7 +37,7 @@ vectors = st.tuples(*[st.floats(-10.0, 10.0)] * 3).map(np.array)
 
 
 def random_rotations(count: int, seed: int = 0) -> Floats:
-    return normalise_quaternion(np.random.default_rng(seed).normal(size=(count, 4)))
+    return normalise(np.random.default_rng(seed).normal(size=(count, 4)))
 
 
 def as_scipy(quaternion: Floats) -> Rotation:
@@ -97,7 +97,7 @@ def test_rate_is_the_derivative_of_the_turn() -> None:
 @pytest.mark.parametrize("bad", [[0, 0, 0, 0], [1, np.nan, 0, 0], [1, 0, 0]])
 def test_no_rotation_is_refused(bad: list[float]) -> None:
     with pytest.raises(SceneError, match="quaternion"):
-        normalise_quaternion(bad)
+        normalise(bad)
 
 
 # --- free bodies ---
@@ -117,7 +117,7 @@ def euler_by_ode(inertia: Floats, q: Floats, spin: Floats, seconds: float) -> tu
     end = solve_ivp(
         rates, (0, seconds), np.concatenate([q, spin]), method="DOP853", rtol=1e-13, atol=1e-13
     ).y[:, -1]
-    return normalise_quaternion(end[:4]), end[4:]
+    return normalise(end[:4]), end[4:]
 
 
 def march(inertia: Floats, q: Floats, spin: Floats, h: float, steps: int) -> tuple[Floats, Floats]:

@@ -16,14 +16,7 @@ from rigid_lcp.motion.lasting_contacts import find_first_fall
 from rigid_lcp.motion.state import Motion
 from rigid_lcp.scene.simulation import Method
 from tests.rigid_motions import bouncing_time, falling_box, grains_in_a_box
-from validation.bench.rigid.scenes import (
-    G,
-    drop_disc,
-    find_rod_limit,
-    incline_block,
-    slide_rod,
-    stack,
-)
+from validation.bench.rigid.scenes import G, drop_disc, limit_rod, slide_rod, stack, tilt_block
 
 BY_HALVING = replace(runge_kutta.RUNGE_KUTTA, located_ends=0)
 NEEDLE = Polygon([(-1, 0), (0, -0.01), (1, 0), (0, 0.01)])
@@ -151,7 +144,7 @@ def test_blocks_that_are_pushed_slide_past_an_edge() -> None:
 
 def test_sliding_stops_where_it_should() -> None:
     """``v^2 / (2 mu g)``, met to the speed that counts as rest: the step is cut at the event."""
-    run = incline_block(0.0, 0.5, method="acceleration", step=0.01)
+    run = tilt_block(0.0, 0.5, method="acceleration", step=0.01)
     run.motion.velocity[0, 0] = 1.0
     run.advance(0.3)
     assert run.positions[0, 0] == pytest.approx(1 / G, abs=1e-9)
@@ -244,7 +237,7 @@ def test_just_below_painleves_limit_the_tip_stops_at_once(below: float) -> None:
     direction beyond rest threw the rod off with up to 4e8 times its energy; and a step that went
     on where the rod would have turned met states without forces, which it does not come to.
     """
-    limit = find_rod_limit(slide_rod(1.0, method="acceleration"))
+    limit = limit_rod(slide_rod(1.0, method="acceleration"))
     runs = [slide_rod((1 - below) * limit, method="acceleration", step=h) for h in (1e-2, 1e-3)]
     for run in runs:
         energy = run.energy
@@ -257,7 +250,7 @@ def test_just_below_painleves_limit_the_tip_stops_at_once(below: float) -> None:
 
 def test_painleve() -> None:
     """Below its limit the sliding rod has forces; above it none, and impulses go on."""
-    limit = find_rod_limit(slide_rod(1.0, method="acceleration"))
+    limit = limit_rod(slide_rod(1.0, method="acceleration"))
     assert limit == pytest.approx(4 / 3, rel=1e-6)  # a uniform thin rod at tan t = 2
     below = slide_rod(0.99 * limit, method="acceleration")
     below.advance(1e-7)
@@ -291,7 +284,7 @@ def test_residual_is_judged(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(integrator, "solve_friction", wrong)
     monkeypatch.setattr(integrator, "try_lasting_forces", lambda *_: None)
-    run = incline_block(0.1, 0.5, method="acceleration")
+    run = tilt_block(0.1, 0.5, method="acceleration")
     with pytest.raises(NotConverged, match="residual"):
         run.advance(0.01)
 

@@ -14,14 +14,7 @@ from rigid_lcp.errors import NotConverged
 from rigid_lcp.scene import simulation
 from rigid_lcp.scene.simulation import Method
 from tests.rigid_motions import bouncing_time, disc_on_incline_acceleration
-from validation.bench.rigid.scenes import (
-    G,
-    drop_disc,
-    fill_trough,
-    incline_block,
-    incline_disc,
-    stack,
-)
+from validation.bench.rigid.scenes import G, drop_disc, fill_trough, stack, tilt_block, tilt_disc
 
 
 def test_free_flight_is_exact() -> None:
@@ -43,7 +36,7 @@ def test_free_flight_is_exact() -> None:
 def test_disc_rolls_or_slides(mu: float, method: Method) -> None:
     """``2/3 g sin`` or ``g (sin - mu cos)``: constant accelerations, so exact at any step."""
     slope = radians(20)
-    run = incline_disc(slope, mu, method=method, step=2e-3)
+    run = tilt_disc(slope, mu, method=method, step=2e-3)
     run.advance(0.1)
     expected = disc_on_incline_acceleration(slope, mu)
     assert run.velocities[0, 0] == pytest.approx(expected * 0.1, rel=1e-11)
@@ -57,7 +50,7 @@ def test_disc_rolls_or_slides(mu: float, method: Method) -> None:
 @pytest.mark.long
 def test_block_slides_to_rest() -> None:
     """It stops after ``v^2 / (2 mu g)``, to first order: within half a step's way at the end."""
-    run = incline_block(0.0, 0.5, step=1e-3)
+    run = tilt_block(0.0, 0.5, step=1e-3)
     run.motion.velocity[0, 0] = 1.0
     run.advance(0.3)
     assert run.positions[0, 0] == pytest.approx(1 / G, abs=0.5 * (0.5 * G * 1e-3) * 1e-3)

@@ -24,13 +24,7 @@ from rigid_lcp import (
 from rigid_lcp.errors import SceneError, ShapeError, UsageError
 from rigid_lcp.motion import make_world
 from rigid_lcp.shapes import make_quaternion, multiply_quaternions
-from rigid_lcp.wear.abrasion import (
-    find_energy,
-    find_slip_work,
-    replace_worn,
-    rub_grains,
-    start_wear,
-)
+from rigid_lcp.wear.abrasion import find_energy, find_slip_work, rub_grains, start_wear, swap_worn
 from rigid_lcp.wear.cuts import find_cut_depth, find_volume, make_unworn, rub_corners, wear_shape
 from tests.rigid_solids import CUBE, ballast_stone, contacts
 
@@ -145,7 +139,7 @@ def test_what_stays_keeps_every_points_velocity(dim):
     state = start_wear(scene)
     for corner, volume in ((0, 0.03), (2, 0.01)):
         state.grains[0] = rub_corners(state.grains[0], np.array([corner]), volume)
-    worn, after = replace_worn(scene, motion, state)
+    worn, after = swap_worn(scene, motion, state)
     body = worn.bodies[0]
     arm = body.position - motion.position[0]
     assert np.linalg.norm(arm) > 1e-3

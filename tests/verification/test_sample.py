@@ -14,12 +14,7 @@ from scipy.stats import kstest, truncnorm
 
 from adapters.bed.container import Container
 from adapters.bed.overlaps import find_pairs_within
-from adapters.bed.radii import (
-    PAPER_RELATIVE_DENSITY,
-    RadiusDistribution,
-    draw_radii,
-    expect_grain_count,
-)
+from adapters.bed.radii import PAPER_DENSITY, RadiusDistribution, draw_radii, expect_grains
 from adapters.bed.sample import (
     GRAVITY,
     draw_sample_start,
@@ -104,12 +99,12 @@ def test_table_1_does_not_give_the_papers_weight() -> None:
 
     Weight = relative density * section * depth * density * g; 1,085 grains weigh 4.25 N.
     """
-    quarter = PAPER_RELATIVE_DENSITY * QUARTER.area * 0.060 * 2710 * GRAVITY
+    quarter = PAPER_DENSITY * QUARTER.area * 0.060 * 2710 * GRAVITY
     assert quarter == pytest.approx(3.957, abs=5e-4)
     assert 4 * quarter == pytest.approx(15.83, abs=5e-3)
     grains = 1085 * TABLE_1.volume_mean * 2710 * GRAVITY
     assert grains == pytest.approx(4.25, abs=5e-3)
-    filled = expect_grain_count(TABLE_1, QUARTER, 0.060) * TABLE_1.volume_mean * 2710 * GRAVITY
+    filled = expect_grains(TABLE_1, QUARTER, 0.060) * TABLE_1.volume_mean * 2710 * GRAVITY
     assert filled == pytest.approx(quarter, rel=1e-3)
 
 

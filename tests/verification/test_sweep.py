@@ -157,9 +157,7 @@ def test_failed_members_are_named_and_the_others_finish(
     assert len(in_process) == 2
 
 
-def test_dry_run_starts_nothing(
-    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_dry_run_runs_none(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Each member's command line, one that a shell takes, and no folder."""
     words = ["sweep", str(scene), *FREQUENCIES, "--into", str(tmp_path / "sweep"), "--dry-run"]
     assert command.main(words) == 0

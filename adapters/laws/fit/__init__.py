@@ -11,14 +11,10 @@ from adapters.laws.fit.regime import (
     Regime,
     find_regime_of_weight,
 )
-from adapters.laws.fit.residual import (
-    FIRST_WINDOW,
-    measure_coordinates_error,
-    measure_displacement_error,
-)
+from adapters.laws.fit.residual import FIRST_WINDOW, compare_coordinates, compare_displacements
 
 __all__ = [
     "AGREE", "EXPONENTS", "FIRST_WINDOW", "PRIOR", "ROWS_FEWEST", "WHY_NOT", "WHY_NOT_PISTON",
-    "BoolArray", "Regime", "find_increments", "find_regime_of_weight", "fit_auto", "fit_series",
-    "measure_coordinates_error", "measure_displacement_error", "read_series", "thin_rows",
+    "BoolArray", "Regime", "compare_coordinates", "compare_displacements", "find_increments",
+    "find_regime_of_weight", "fit_auto", "fit_series", "read_series", "thin_rows",
 ]  # fmt: skip

@@ -11,9 +11,7 @@ FIRST_WINDOW = 20
 """Cycles that are fitted first where no k is given: the paper finds k > 20 enough."""
 
 
-def measure_displacement_error(
-    start: FloatArray, computed: FloatArray, estimated: FloatArray
-) -> float:
+def compare_displacements(start: FloatArray, computed: FloatArray, estimated: FloatArray) -> float:
     """E_r = ||u - u^|| / ||u|| of the residual displacements from ``start`` on (eq. 22).
 
     Positions [m], shape (n, 3) each.  1 is the error of moving nothing.  With ``start`` the last
@@ -25,12 +23,12 @@ def measure_displacement_error(
     return _measure_relative_error(computed - start, np.asarray(estimated, float) - start)
 
 
-def measure_coordinates_error(computed: FloatArray, estimated: FloatArray) -> float:
+def compare_coordinates(computed: FloatArray, estimated: FloatArray) -> float:
     """E_r of eq. 22 with u the coordinates themselves, as in Figs 6 and 7 of the paper.
 
     Positions [m], shape (n, 3) each.  The denominator is the size of the sample and depends on
     its origin, so the number is small for any method, moving nothing included; to be quoted
-    only beside `measure_displacement_error`.
+    only beside `compare_displacements`.
     """
     return _measure_relative_error(np.asarray(computed, float), np.asarray(estimated, float))
 

@@ -24,9 +24,9 @@ from qdem_fem.contact.spheres.options import (
     check_contact_number,
     check_contact_planes,
     check_planes_along,
-    compute_pair_stiffness,
     compute_tangential_stiffness,
     find_body_value,
+    find_pair_stiffness,
     make_plane_arrays,
 )
 
@@ -34,6 +34,6 @@ __all__ = [
     "DEEPEST", "GO_ON", "LOOK_AGAIN", "NEAR", "SKIN_OF_SPHERES", "TOO_DEEP", "Contact",
     "ContactPlane", "Planes", "SphereContact", "Spheres", "add_in_series", "advance_one",
     "advance_threads", "check_contact_number", "check_contact_planes", "check_planes_along",
-    "compute_pair_stiffness", "compute_tangential_stiffness", "find_body_value", "law",
+    "compute_tangential_stiffness", "find_body_value", "find_pair_stiffness", "law",
     "make_plane_arrays", "slide_spring", "subtract_rows", "write_row",
 ]  # fmt: skip

@@ -198,7 +198,7 @@ def compute_pairs_forces(
 
 @inlined
 def add_in_series(one: float, other: float) -> float:  # pragma: no cover
-    """`qdem_fem.contact.spheres.compute_pair_stiffness`"""
+    """`qdem_fem.contact.spheres.find_pair_stiffness`"""
     return 2.0 * one * other / (one + other)
 
 

@@ -45,7 +45,7 @@ def compute_tangential_stiffness(normal: Any, poisson: Any) -> Any:
     return normal / (2 * (1 + poisson))
 
 
-def compute_pair_stiffness(one: Any, other: Any) -> Any:
+def find_pair_stiffness(one: Any, other: Any) -> Any:
     """Stiffness between two spheres [N/m]: ``2 a b/(a + b)``, ``a`` for two of one material.
 
     Each sphere brings a spring of ``2 a``, in series.  The paper gives springs of two materials

@@ -79,7 +79,7 @@ class SurfaceContact:
         return find_body_value(getattr(self, quantity), name, quantity)
 
 
-def place_face_points(parts: int) -> Floats:
+def place_points(parts: int) -> Floats:
     """Points of a triangle in barycentric coordinates, (parts**2, 3), of equal shares of its area.
 
     The centroids of ``parts**2`` equal triangles: with them linear functions are integrated

@@ -54,12 +54,12 @@ LAWS: dict[str, type] = {name: measure.MEASURE for name, measure in MEASURES.ite
 BY_LAW = {measure.MEASURE: measure for measure in MEASURES.values()}
 compute_element_gradient = inlined(stress.compute_element_gradient)
 compute_element_pulls = inlined(stress.compute_element_pulls)
-compute_matrix_product = inlined(stress.compute_matrix_product)
+find_matrix_product = inlined(stress.find_matrix_product)
 
 
-def compute_elastic_stress(law: Any, h: Any, lame_first: Any, lame_second: Any) -> Any:
+def find_elastic_stress(law: Any, h: Any, lame_first: Any, lame_second: Any) -> Any:
     """``(P V, J)`` of the strain measure that the type of ``law`` names."""
-    return BY_LAW[type(law)].compute_stress_numbers(h, lame_first, lame_second, law.half)
+    return BY_LAW[type(law)].find_stress_numbers(h, lame_first, lame_second, law.half)
 
 
 def compute_viscous_pulls(
@@ -70,20 +70,18 @@ def compute_viscous_pulls(
     The power is what viscosity takes of the motion [W].
     """
     measure = BY_LAW[type(law)]
-    if hasattr(measure, "compute_fused_pulls"):
-        return measure.compute_fused_pulls(
-            h, w, g, lame_first, lame_second, first, second, law.half
-        )
-    p, jacobian = compute_elastic_stress(law, h, lame_first, lame_second)
+    if hasattr(measure, "find_fused_pulls"):
+        return measure.find_fused_pulls(h, w, g, lame_first, lame_second, first, second, law.half)
+    p, jacobian = find_elastic_stress(law, h, lame_first, lame_second)
     rate = stress.compute_element_gradient(w, g)
-    q = measure.compute_viscous_numbers(h, rate, first, second, law.half)
+    q = measure.find_viscous_numbers(h, rate, first, second, law.half)
     pulls = stress.compute_element_pulls(tuple(a + b for a, b in zip(p, q, strict=True)), g)
-    return pulls, jacobian, stress.compute_matrix_product(q, rate)
+    return pulls, jacobian, stress.find_matrix_product(q, rate)
 
 
-@overload(compute_elastic_stress, strict=False, jit_options=INLINED)
+@overload(find_elastic_stress, strict=False, jit_options=INLINED)
 def _choose_elastic_stress(law: Any, h: Any, lame_first: Any, lame_second: Any) -> Any:
-    chosen = inlined(BY_LAW[law.instance_class].compute_stress_numbers)
+    chosen = inlined(BY_LAW[law.instance_class].find_stress_numbers)
     return lambda law, h, lame_first, lame_second: chosen(h, lame_first, lame_second, law.half)
 
 
@@ -92,15 +90,12 @@ def _choose_viscous_pulls(
     law: Any, h: Any, w: Any, g: Any, lame_first: Any, lame_second: Any, first: Any, second: Any
 ) -> Any:
     measure = BY_LAW[law.instance_class]
-    if hasattr(measure, "compute_fused_pulls"):
-        fused = inlined(measure.compute_fused_pulls)
+    if hasattr(measure, "find_fused_pulls"):
+        fused = inlined(measure.find_fused_pulls)
         return lambda law, h, w, g, lame_first, lame_second, first, second: fused(
             h, w, g, lame_first, lame_second, first, second, law.half
         )
-    elastic, viscous = (
-        inlined(measure.compute_stress_numbers),
-        inlined(measure.compute_viscous_numbers),
-    )
+    elastic, viscous = (inlined(measure.find_stress_numbers), inlined(measure.find_viscous_numbers))
 
     def compose_pulls(
         law: Any, h: Any, w: Any, g: Any, lame_first: Any, lame_second: Any, first: Any,
@@ -109,7 +104,7 @@ def _choose_viscous_pulls(
         p, jacobian = elastic(h, lame_first, lame_second, law.half)
         rate = compute_element_gradient(w, g)
         q = viscous(h, rate, first, second, law.half)
-        return compute_element_pulls(add(p, q), g), jacobian, compute_matrix_product(q, rate)
+        return compute_element_pulls(add(p, q), g), jacobian, find_matrix_product(q, rate)
 
     return compose_pulls
 
@@ -149,7 +144,7 @@ def add_chunk_forces(
         h = compute_element_gradient(gather_edges(displacement, corners, block), g)
         first, second = load_lanes(rows, at + 9 * width), load_lanes(rows, at + 10 * width)
         if viscous is None:
-            p, jacobian = compute_elastic_stress(law, h, first, second)
+            p, jacobian = find_elastic_stress(law, h, first, second)
             pulls = compute_element_pulls(p, g)
         else:
             rate = gather_edges(velocity, corners, block)

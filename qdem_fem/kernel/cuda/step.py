@@ -54,7 +54,7 @@ a vertex has left the skin of its pairs; whether two spheres are too deep in eac
 
 compute_element_gradient = cuda.jit(device=True)(stress.compute_element_gradient)
 compute_element_pulls = cuda.jit(device=True)(stress.compute_element_pulls)
-compute_matrix_product = cuda.jit(device=True)(stress.compute_matrix_product)
+find_matrix_product = cuda.jit(device=True)(stress.find_matrix_product)
 
 
 def choose_grid(count: int) -> tuple[int, int]:
@@ -84,11 +84,11 @@ def add_forces(forces: Any, at: Any, x: Any, y: Any, z: Any) -> None:
 def build_pulls_function(strain: Strain, viscous: bool) -> Any:
     """The device function ``(h, w, g, rows, e, half) -> (pulls, J, power)`` of a strain measure.
 
-    The same composition as `qdem_fem.kernel.cpu.step.compute_elastic_stress` and
+    The same composition as `qdem_fem.kernel.cpu.step.find_elastic_stress` and
     `qdem_fem.kernel.cpu.step.compute_viscous_pulls`.
     """
     measure = MEASURES[strain]
-    elastic = cuda.jit(device=True)(measure.compute_stress_numbers)
+    elastic = cuda.jit(device=True)(measure.find_stress_numbers)
     if not viscous:
 
         @cuda.jit(device=True)
@@ -98,8 +98,8 @@ def build_pulls_function(strain: Strain, viscous: bool) -> Any:
 
         return find_elastic_pulls
 
-    if hasattr(measure, "compute_fused_pulls"):
-        fused = cuda.jit(device=True)(measure.compute_fused_pulls)
+    if hasattr(measure, "find_fused_pulls"):
+        fused = cuda.jit(device=True)(measure.find_fused_pulls)
 
         @cuda.jit(device=True)
         def fuse_pulls(h: Any, w: Any, g: Any, rows: Any, e: Any, half: Any) -> Any:
@@ -107,7 +107,7 @@ def build_pulls_function(strain: Strain, viscous: bool) -> Any:
 
         return fuse_pulls
 
-    dashpot = cuda.jit(device=True)(measure.compute_viscous_numbers)
+    dashpot = cuda.jit(device=True)(measure.find_viscous_numbers)
 
     @cuda.jit(device=True)
     def compose_pulls(h: Any, w: Any, g: Any, rows: Any, e: Any, half: Any) -> Any:
@@ -118,7 +118,7 @@ def build_pulls_function(strain: Strain, viscous: bool) -> Any:
             p[0] + q[0], p[1] + q[1], p[2] + q[2], p[3] + q[3], p[4] + q[4], p[5] + q[5],
             p[6] + q[6], p[7] + q[7], p[8] + q[8],
         )  # fmt: skip
-        return compute_element_pulls(total, g), jacobian, compute_matrix_product(q, rate)
+        return compute_element_pulls(total, g), jacobian, find_matrix_product(q, rate)
 
     return compose_pulls
 

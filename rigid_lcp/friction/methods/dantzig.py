@@ -38,7 +38,7 @@ from rigid_lcp.friction.pivots import (
     consider_contacts,
     drive_offset,
     judge_pivots,
-    read_pivots_force,
+    read_pivots,
     remove_shift,
     start_pivots,
 )
@@ -87,7 +87,7 @@ def solve_dantzig(
     if ended == DONE:
         exact = problem.offset[state.rows]
         ended = drive_offset(state, exact - state.b, False, limit)
-    force = read_pivots_force(problem, state)
+    force = read_pivots(problem, state)
     if ended == DONE:
         force = remove_shift(problem, state, tolerance, problem.contacts + 50)
     return judge_pivots(problem, state, force, tolerance, "dantzig", ended, where)

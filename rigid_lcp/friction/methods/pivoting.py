@@ -38,7 +38,7 @@ from rigid_lcp.friction.pivots import (
     follow_from_forces,
     follow_from_nothing,
     judge_pivots,
-    read_pivots_force,
+    read_pivots,
     remove_shift,
     start_pivots,
 )
@@ -109,7 +109,7 @@ def solve_pivoting(
             ended = follow_from_forces(problem, state, near, min(limit, most - spent))
         else:
             ended = follow_from_nothing(problem, state, min(limit, most - spent))
-        force = read_pivots_force(problem, state)
+        force = read_pivots(problem, state)
         if ended == DONE:
             force = remove_shift(problem, state, tolerance, max(few, limit // 4))
         spent += int(state.events[0])

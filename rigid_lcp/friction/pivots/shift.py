@@ -22,7 +22,7 @@ from rigid_lcp.friction.pivots.state import (
     Pivots,
     drive_offset,
     measure_pivots_residual,
-    read_pivots_force,
+    read_pivots,
 )
 from rigid_lcp.friction.pivots.updates import BREAKING, STATIC, multiply_geometry, refresh_reduced
 from rigid_lcp.friction.problem import FrictionProblem
@@ -65,7 +65,7 @@ def remove_shift(problem: FrictionProblem, state: Pivots, tolerance: float, few:
     A step of more than ``few`` pivots is done again with the shift of before, which then falls
     more slowly.
     """
-    exact, best = problem.offset[state.rows], read_pivots_force(problem, state)
+    exact, best = problem.offset[state.rows], read_pivots(problem, state)
     least, idle, pace = measure_pivots_residual(problem, state, best), 0, 1.0
     taken, floor = 0, SHIFT.least * state.unit
     for _ in range(SHIFT.steps if state.shift[0] > 0.0 else 0):
@@ -90,7 +90,7 @@ def remove_shift(problem: FrictionProblem, state: Pivots, tolerance: float, few:
                 break
             pace *= 0.5
             continue
-        force = read_pivots_force(problem, state)
+        force = read_pivots(problem, state)
         residual = measure_pivots_residual(problem, state, force)
         idle = 0 if residual < least else idle + 1
         if least <= tolerance and (taken or not residual < 0.5 * least):
@@ -114,7 +114,7 @@ def find_lists_force(
     state.f[:] = 0.0
     for _ in range(2):
         settle_values(state.geometry, state.reduced, state.b, nothing, state.f, state.a)
-    found = read_pivots_force(problem, state)
+    found = read_pivots(problem, state)
     with np.errstate(over="ignore", invalid="ignore"):  # where eq. 28 is singular but to round-off
         return found if measure_pivots_residual(problem, state, found) < residual else force
 

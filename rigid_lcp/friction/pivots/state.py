@@ -141,7 +141,7 @@ def find_diagonal_places(matrix: sp.csr_array | sp.csc_array) -> Ints:
     return np.flatnonzero(matrix.indices == line)
 
 
-def read_pivots_force(problem: FrictionProblem, state: Pivots) -> Floats:
+def read_pivots(problem: FrictionProblem, state: Pivots) -> Floats:
     """Forces of all rows (nc * dim,): no round-off outside the cones."""
     force = np.zeros(len(problem.offset))
     force[state.rows] = state.f

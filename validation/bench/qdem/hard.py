@@ -26,7 +26,7 @@ from qdem_fem.mesh.tetrahedra import read_mesh
 from validation.bench.qdem.checks import check_below, check_between, report
 from validation.bench.qdem.closed_forms import CONCRETE_BEAM
 from validation.bench.qdem.judge import FloatArray, find_tip_p2, list_free
-from validation.bench.qdem.meshes import make_sliver_box
+from validation.bench.qdem.meshes import make_slivers
 from validation.bench.qdem.problem import Problem, clamp_mesh, find_tip_node, make_cantilever
 from validation.bench.qdem.static import StaticAnswer, relax
 from validation.bench.qdem.vibration import find_error, find_exact_motion, release
@@ -81,7 +81,7 @@ def check_static(name: str, problem: Problem, tolerance: float = 1e-8) -> list[C
 
 def make_sliver(altitude: float) -> Problem:
     """The cube with a sliver, clamped at x = 0 and pulled down at x = 1."""
-    return replace(clamp_mesh(read_mesh(make_sliver_box(altitude)), CONCRETE), force=FORCE)
+    return replace(clamp_mesh(read_mesh(make_slivers(altitude)), CONCRETE), force=FORCE)
 
 
 def check_sliver(altitude: float = 0.01) -> list[Check]:

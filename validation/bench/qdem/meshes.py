@@ -36,7 +36,7 @@ def make_delaunay(count: int, seed: int, shape: float = 0.02) -> tuple[Floats, I
     return nodes, elements[abs(six_volumes) > shape * measure_edges(nodes, elements) ** 3]
 
 
-def make_sliver_box(altitude: float, cells: int = 4) -> tuple[Floats, Integers]:
+def make_slivers(altitude: float, cells: int = 4) -> tuple[Floats, Integers]:
     """A unit cube of Kuhn tetrahedra, some of them flattened to ``altitude`` times their own [-].
 
     The middle node is pushed towards the face opposite to it in one of its elements; four of
@@ -58,7 +58,7 @@ SLIVER_STEP = {0.3: 0.83, 0.1: 0.51, 0.03: 0.28, 0.01: 0.16}
 """Critical step of `box_with_sliver` over that of the undisturbed mesh, by altitude."""
 
 
-def make_graded_box(ratio: float, cells: int = 12) -> tuple[Floats, Integers]:
+def make_graded(ratio: float, cells: int = 12) -> tuple[Floats, Integers]:
     """A unit cube whose cells shrink towards the corner at the origin.
 
     Shells ``max(x, y, z) = s`` of a regular mesh are moved to ``ratio^((s - 1)/(1 - 1/cells))``:

@@ -29,7 +29,7 @@ def turn_gravity(slope: float) -> Floats:
     return G * np.array([sin(slope), -cos(slope)])
 
 
-def incline_block(
+def tilt_block(
     slope: float, mu: float, *, size: float = 1.0, method: Method = "time-stepping",
     step: float = 1e-3,
 ) -> Simulation:  # fmt: skip
@@ -122,7 +122,7 @@ def find_wedge_acceleration(run: Simulation, half_angle: float, mu: float, force
     return float(drive * normal)
 
 
-def incline_disc(
+def tilt_disc(
     slope: float, mu: float, *, radius: float = 0.5, method: Method = "time-stepping",
     step: float = 1e-3,
 ) -> Simulation:  # fmt: skip
@@ -161,7 +161,7 @@ def slide_rod(
     return Simulation(scene, method, step=step)
 
 
-def find_rod_limit(run: Simulation) -> float:
+def limit_rod(run: Simulation) -> float:
     """Friction at which ``1/m + x^2/J - mu |x y|/J`` is zero: above, no finite force exists."""
     contact = run.world.contacts(run.motion, 1e-9 * run.world.length)
     x, y = (contact.point - run.positions[0])[0]

@@ -107,7 +107,7 @@ def load_bed(seed: int, *settings: str) -> Scene:
     )
 
 
-def measure_window(window: Window, start: FloatArray, scene: Scene) -> Figures:
+def measure(window: Window, start: FloatArray, scene: Scene) -> Figures:
     """The figures of a window that began at the common ``start`` positions [m], shape (n, 3).
 
     ``scene`` gives container and cycle; a polygon's section counts as the cylinder's.
@@ -174,7 +174,7 @@ def run_way(
     window = read_window(loaded, 0, engine.wall_names(scene, piston=True), face)
     check_window(scene, window, cycles)
     common = load_bed(seed, 'engine.name="liggghts"')
-    figures = measure_window(window, start, common if way.engine == "yade" else scene)
+    figures = measure(window, start, common if way.engine == "yade" else scene)
     return figures, rest.cpu_s + done.cpu_s
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from adapters.bed.overlaps import find_pairs
 from adapters.bed.state import FloatArray, State
 from adapters.laws import get_law
-from adapters.laws.fit.residual import measure_coordinates_error, measure_displacement_error
+from adapters.laws.fit.residual import compare_coordinates, compare_displacements
 from adapters.relaxation.measured import RelaxationNotConverged
 from adapters.relaxation.methods import relax
 from adapters.scene.file import load_scene
@@ -50,9 +50,9 @@ def judge_jump(position: FloatArray, twin: FloatArray, k_i: int, k: int, h: int)
         estimates[OTHER] = first + twin[k_i + k + h] - twin[k_i + k]
     errors = {
         name: (
-            measure_coordinates_error(last, estimate),
-            measure_displacement_error(position[0], last, estimate),
-            measure_displacement_error(first, last, estimate),
+            compare_coordinates(last, estimate),
+            compare_displacements(position[0], last, estimate),
+            compare_displacements(first, last, estimate),
         )
         for name, estimate in estimates.items()
     }

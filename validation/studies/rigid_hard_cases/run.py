@@ -108,7 +108,7 @@ def try_inclines() -> Iterator[Row]:
         yield from try_all([Trial(
             f"block at mu = {words}",
             f"slides g (sin - mu cos) t²/2 = {way:.3g} m" if way else RESTS,
-            partial(scenes.incline_block, slope, mu), 2.0, f"<= {0.01 * way or 1e-12:.3g}",
+            partial(scenes.tilt_block, slope, mu), 2.0, f"<= {0.01 * way or 1e-12:.3g}",
             compare_move(way), BOTH,
         )])  # fmt: skip
         short = scenes.find_slide_distance(slope, mu, 0.2) if off else 0.0
@@ -126,7 +126,7 @@ def try_inclines() -> Iterator[Row]:
 
 def try_creep() -> Iterator[Row]:
     """A block that must not creep in 1e5 steps."""
-    build = partial(scenes.incline_block, radians(20), 1.0)
+    build = partial(scenes.tilt_block, radians(20), 1.0)
     return try_all([Trial("block at rest on 20°, mu = 1", RESTS, build, 100.0, "<= 1e-12")])
 
 
@@ -237,7 +237,7 @@ def try_arches() -> Iterator[Row]:
 
 def try_rods() -> Iterator[Row]:
     """Painleve's rod either side of the friction above which no finite force exists."""
-    limit = scenes.find_rod_limit(scenes.slide_rod(1.0, method="acceleration"))
+    limit = scenes.limit_rod(scenes.slide_rod(1.0, method="acceleration"))
     for below in (1e-1, 1e-3, 1e-6):
 
         def try_force(below: float = below) -> tuple[float, int]:
@@ -306,7 +306,7 @@ def try_motions() -> Iterator[Row]:
                     "<= 1e-13", method, drift)  # fmt: skip
 
     def roll() -> tuple[float, int]:
-        run = scenes.incline_disc(radians(20), 0.5)
+        run = scenes.tilt_disc(radians(20), 0.5)
         worst = 0.0
         for _ in range(10):
             run.advance(2_000 * run.step)
@@ -326,7 +326,7 @@ FAMILIES: dict[str, Callable[[], Iterator[Row]]] = {
 def measure(family: str) -> Row:
     """The rows of a family, after a short run so that no cost holds the time of a compiler."""
     scenes.stack(3).advance(2e-3)
-    scenes.incline_block(0.1, 0.5, method="acceleration").advance(2e-3)
+    scenes.tilt_block(0.1, 0.5, method="acceleration").advance(2e-3)
     ours = list(FAMILIES[family]())
     path = find_record("rigid-hard-cases")
     known = [row for row in (read_record(path) if path.exists() else []) if row["part"] == family]
