@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
 from adapters.bed import FloatArray, IntArray
 from adapters.export.fields import Array, gather_contacts, gather_grains, list_contacts
 from adapters.export.instants import ExportedRun
-from trackbed.run_files import replace_file, write_whole
+from trackbed.run_files import replace_file, write_pvd
 
 
 def export_vtu(run: ExportedRun, into: Path, every: int) -> list[Path]:
@@ -20,22 +19,21 @@ def export_vtu(run: ExportedRun, into: Path, every: int) -> list[Path]:
     Grains are points with `gather_grains`; contacts are lines from centre to centre with
     `gather_contacts`.
     """
-    folder = into / "vtu"
-    folder.mkdir(exist_ok=True)
+    (into / "vtu").mkdir(exist_ok=True)
     grains, contacts = [], []
     for instant in run.instants(every):
-        grains.append((instant.cycle, folder / f"grains_{instant.cycle:06d}.vtu"))
-        contacts.append((instant.cycle, folder / f"contacts_{instant.cycle:06d}.vtu"))
+        grains.append((instant.cycle, f"vtu/grains_{instant.cycle:06d}.vtu"))
+        contacts.append((instant.cycle, f"vtu/contacts_{instant.cycle:06d}.vtu"))
         centres = instant.state.position
         points = np.arange(len(centres))[:, None]
         of_grains = gather_grains(run, instant)
-        write_mesh(grains[-1][1], centres, "vertex", points, point_data=of_grains)
+        write_mesh(into / grains[-1][1], centres, "vertex", points, point_data=of_grains)
         of_contacts = gather_contacts(run, instant)
         lines = list_contacts(instant)
-        write_mesh(contacts[-1][1], centres, "line", lines, cell_data=of_contacts)
+        write_mesh(into / contacts[-1][1], centres, "line", lines, cell_data=of_contacts)
     write_pvd(into / "grains.pvd", grains)
     write_pvd(into / "contacts.pvd", contacts)
-    files = [path for _, path in (*grains, *contacts)]
+    files = [into / name for _, name in (*grains, *contacts)]
     return [into / "grains.pvd", into / "contacts.pvd", *files]
 
 
@@ -50,13 +48,3 @@ def write_mesh(
     mesh = meshio.Mesh(points, [(kind, cells)], dict(point_data or {}), of_cells)
     with replace_file(path) as temporary:
         mesh.write(temporary, file_format="vtu", compression=None)
-
-
-def write_pvd(path: Path, members: Sequence[tuple[int, Path]]) -> None:
-    """Write a series for ParaView; its time is the number of load cycles."""
-    lines = [
-        f'<DataSet timestep="{cycle}" file={quoteattr(str(file.relative_to(path.parent)))}/>'
-        for cycle, file in members
-    ]
-    head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n<Collection>\n'
-    write_whole(path, head + "\n".join(lines) + "\n</Collection>\n</VTKFile>\n")

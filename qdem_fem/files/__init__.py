@@ -17,12 +17,12 @@ from qdem_fem.files.errors import (
     Unstable,
     UsageError,
 )
-from qdem_fem.files.output import Table, read_table, write_bodies_vtu, write_pvd
+from qdem_fem.files.output import Table, read_table, write_bodies_vtu
 from qdem_fem.files.series import Driver, Series, Value, is_real, make_ramp
 
 __all__ = [
     "CheckpointError", "ConditionError", "ContactTooDeep", "Driver", "ElementInverted",
     "EnergyLost", "Floats", "Integers", "Interrupted", "LibraryMissing", "MaterialError",
     "MeshError", "NotConverged", "QdemError", "Series", "StepWarning", "Table", "Unstable",
-    "UsageError", "Value", "is_real", "make_ramp", "read_table", "write_bodies_vtu", "write_pvd",
+    "UsageError", "Value", "is_real", "make_ramp", "read_table", "write_bodies_vtu",
 ]  # fmt: skip

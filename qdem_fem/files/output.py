@@ -10,7 +10,6 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 import numpy.typing as npt
@@ -45,23 +44,6 @@ def write_bodies_vtu(path: Path, bodies: Sequence[Any]) -> None:
     )
     with replace_file(path) as temporary:
         mesh.write(temporary, file_format="vtu", compression=None)
-
-
-def write_pvd(path: Path, files: Sequence[tuple[float, str]]) -> None:
-    """Write the PVD file that strings VTU files (time [s], file name beside it) together."""
-    entries = (
-        f'<DataSet timestep="{float(time)!r}" group="" part="0" file={quoteattr(name)}/>'
-        for time, name in files
-    )
-    lines = [
-        '<?xml version="1.0"?>',
-        '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">',
-        "<Collection>",
-        *entries,
-        "</Collection>",
-        "</VTKFile>",
-    ]
-    write_whole(path, "\n".join(lines) + "\n")
 
 
 class Table:

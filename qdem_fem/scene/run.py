@@ -11,10 +11,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from qdem_fem.files import EnergyLost, Interrupted, Table, read_table, write_bodies_vtu, write_pvd
+from qdem_fem.files import EnergyLost, Interrupted, Table, read_table, write_bodies_vtu
 from qdem_fem.scene.energy_account import EnergyAccount
 from qdem_fem.tables import Prepared
-from trackbed.run_files import RESULT, note_signals, read_object, write_whole
+from trackbed.run_files import RESULT, note_signals, read_object, write_pvd, write_whole
 from trackbed.run_files import folder as run_folder
 
 CHUNK_WORK = 50_000_000

@@ -14,11 +14,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from qdem_fem.files.errors import DiskFull, UsageError
-from qdem_fem.files.output import Table, read_table, write_bodies_vtu, write_pvd
+from qdem_fem.files.output import Table, read_table, write_bodies_vtu
 from qdem_fem.mesh.generation import make_box_mesh
 from qdem_fem.mesh.surface import find_surface_faces
 from qdem_fem.report.deformed import draw_deformed, round_magnification
 from qdem_fem.report.figures import choose_unit, draw_energy, draw_history, draw_spectrum
+from trackbed.run_files.whole import write_pvd
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 

@@ -22,12 +22,14 @@ from trackbed.run_files.whole import (
     replace_file,
     seal_file,
     sync_folder,
+    write_pvd,
     write_whole,
 )
 
 __all__ = [
-    "MANIFEST", "RESULT", "add_run_arguments", "append_line", "digest_file", "folder",
-    "is_written", "list_differences", "lock_folder", "note_signals", "open_unlinked", "place_run",
+    "MANIFEST", "RESULT", "add_run_arguments", "append_line", "digest_file", "folder", "is_written",
+    "list_differences", "lock_folder", "note_signals", "open_unlinked", "place_run",
     "raise_on_signals", "read_object", "record_provenance", "refuse_both", "refuse_format",
-    "refuse_links", "refuse_writing", "replace_file", "seal_file", "sync_folder", "write_whole",
+    "refuse_links", "refuse_writing", "replace_file", "seal_file", "sync_folder", "write_pvd",
+    "write_whole",
 ]  # fmt: skip

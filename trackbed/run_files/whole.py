@@ -5,11 +5,12 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from errno import EEXIST, ELOOP, ENOTDIR
 from pathlib import Path
 from typing import IO, Any
+from xml.sax.saxutils import quoteattr
 
 from trackbed.errors import NO_ROOM, DiskFull, UsageError
 
@@ -115,3 +116,16 @@ def read_object(path: Path) -> dict[str, Any] | None:
     except (OSError, ValueError, RecursionError):
         return {}
     return content if isinstance(content, dict) else {}
+
+
+def write_pvd(path: Path, files: Sequence[tuple[float, str]]) -> None:
+    """Write the PVD file that strings VTU files (time [s], or cycle; name from there) together."""
+    lines = [
+        '<?xml version="1.0"?>',
+        '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">',
+        "<Collection>",
+        *(f'<DataSet timestep="{t}" group="" part="0" file={quoteattr(n)}/>' for t, n in files),
+        "</Collection>",
+        "</VTKFile>",
+    ]
+    write_whole(path, "\n".join(lines) + "\n")

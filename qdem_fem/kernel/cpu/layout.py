@@ -60,8 +60,6 @@ class Packed:
     """User's number of every kernel node, (n,)."""
     node_place: Integers
     """Kernel's number of every user node, (n,)."""
-    element_order: Integers
-    """User's number of every kernel element, (m,)."""
     window_count: int
     """Numbers in the windows of forces."""
     node_window: Integers
@@ -132,7 +130,7 @@ def build_layout(
         piece_window=np.searchsorted(piece, np.arange(len(order) + 1)).astype(np.int64),
         window_shift=chunk_shift[window].astype(np.int64),
     )
-    packed = Packed(layout, node_order, node_place, element_order, int(starts[-1]), node_window)
+    packed = Packed(layout, node_order, node_place, int(starts[-1]), node_window)
     return _add_loose(packed, loose)
 
 
@@ -140,10 +138,8 @@ def _make_empty_layout(node_order: Integers, node_place: Integers, element_rows:
     """The layout without any element: no chunk, no piece."""
     none, end = np.zeros(0, np.int64), np.zeros(1, np.int64)
     corners = np.zeros(0, np.int32)
-    layout = Layout(
-        corners, element_rows.ravel(), end, none, none, none, end, end.copy(), none
-    )  # fmt: skip
-    return Packed(layout, node_order, node_place, none, 0, np.full(len(node_order), -1))
+    layout = Layout(corners, element_rows.ravel(), end, none, none, none, end, end.copy(), none)
+    return Packed(layout, node_order, node_place, 0, np.full(len(node_order), -1))
 
 
 def _add_loose(packed: Packed, loose: Integers | None) -> Packed:
