@@ -15,12 +15,12 @@ from qdem_fem.element.finger import compute_strain as strain_finger
 from qdem_fem.element.kinematics import (
     IDENTITY,
     apply_hooke,
-    compute_von_mises,
     contract,
     find_cofactor,
     find_displacement_gradient,
     find_trace,
     find_volume_change,
+    find_von_mises,
     transpose,
 )
 from qdem_fem.element.small import compute_nominal_stress as stress_small
@@ -30,10 +30,9 @@ from tests.qdem_construction import particle_forces, strain_rate
 
 __all__ = [
     "IDENTITY", "STRESS", "Elements", "Strain", "apply_hooke", "compute_cauchy_stress",
-    "compute_elastic_energy", "compute_von_mises", "contract", "find_cofactor",
-    "find_displacement_gradient", "find_trace", "find_volume_change", "internal_forces",
-    "strain_finger", "stress_finger", "stress_small", "stress_viscous", "stress_viscous_small",
-    "transpose",
+    "compute_elastic_energy", "contract", "find_cofactor", "find_displacement_gradient",
+    "find_trace", "find_volume_change", "find_von_mises", "internal_forces", "strain_finger",
+    "stress_finger", "stress_small", "stress_viscous", "stress_viscous_small", "transpose",
 ]  # fmt: skip
 STRESS = {name: measure.compute_nominal_stress for name, measure in MEASURES.items()}
 

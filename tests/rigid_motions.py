@@ -15,7 +15,7 @@ from rigid_lcp.arrays import Floats
 from rigid_lcp.motion.state import Motion
 from rigid_lcp.scene.simulation import Method
 from rigid_lcp.shapes.rotations import find_quaternion_rate, make_quaternion, rotate
-from tests.rigid_solids import ballast_stone
+from tests.rigid_solids import make_stone
 from validation.bench.rigid.scenes import DENSITY, FLOOR, G, turn_gravity
 
 EXACT = {"rtol": 1e-13, "atol": 1e-13, "method": "DOP853"}
@@ -125,7 +125,7 @@ def falling_box(method: Method, step: float) -> Simulation:
 
 # --- a stone in free flight ---
 
-STONE = ballast_stone(np.random.default_rng(0), 0.05)
+STONE = make_stone(np.random.default_rng(0), 0.05)
 STONE_SPIN = np.array([20.0, -35.0, 10.0])
 STONE_DENSITY = 1e3
 

@@ -24,7 +24,7 @@ def angular_momentum(inertia: Floats, quaternion: Floats, spin: Floats) -> Float
     return np.einsum("...ij,...j->...i", turn_inertia(inertia, quaternion), spin)
 
 
-def ballast_stone(generator: np.random.Generator, size: float, corners: int = 16) -> Polyhedron:
+def make_stone(generator: np.random.Generator, size: float, corners: int = 16) -> Polyhedron:
     """A random convex stone that passes a square sieve of about ``size`` [m].
 
     Points on an ellipsoid, each the farthest of ten random ones from those before it (Mitchell's
@@ -45,9 +45,7 @@ def contacts(
     """Contacts with a gap up to ``2 margin``."""
     movable = np.array([not isinstance(shape, HalfSpace) for shape in shapes])
     turns = np.array([UPRIGHT] * len(shapes)) if quaternion is None else np.array(quaternion)
-    return detect_3d(
-        pack_shapes_3d(shapes, movable), np.array(position, dtype=float), turns, margin
-    )
+    return detect_3d(pack_shapes_3d(shapes, movable), np.array(position, float), turns, margin)
 
 
 def coal_distance(shapes: Sequence[Polyhedron], position: Floats, turns: Floats) -> Any:
@@ -66,7 +64,7 @@ def coal_distance(shapes: Sequence[Polyhedron], position: Floats, turns: Floats)
     return result
 
 
-def sorted_points(found: Contacts) -> Floats:
+def sort_points(found: Contacts) -> Floats:
     across = np.round(found.point[:, :2], 9) + 0.0
     return found.point[np.lexsort(across.T)]
 
@@ -74,7 +72,7 @@ def sorted_points(found: Contacts) -> Floats:
 def near_pair(seed: int, gap: float = 1e-4) -> Placed:
     """Two stones at random angles, moved together until the least gap is about ``gap`` [m]."""
     generator = np.random.default_rng(seed)
-    shapes = [ballast_stone(generator, 1.0), ballast_stone(generator, 0.7, 12)]
+    shapes = [make_stone(generator, 1.0), make_stone(generator, 0.7, 12)]
     quaternion = normalise(generator.normal(size=(2, 4)))
     direction = generator.normal(size=3)
     direction /= np.linalg.norm(direction)

@@ -75,9 +75,7 @@ BENCH = Path(__file__).with_name("bench")
 def list_live_cases() -> dict[str, str]:
     """Modules that measure now, by name: files of ``validation/cases``, and those of
     ``validation/bench`` that have a function ``run(quick)``."""
-    found = {
-        module.name: f"validation.cases.{module.name}" for module in iter_modules(cases.__path__)
-    }
+    found = {part.name: f"validation.cases.{part.name}" for part in iter_modules(cases.__path__)}
     for path in BENCH.glob("*.py"):
         if "\ndef run(quick: bool)" in path.read_text(encoding="utf-8"):
             found[path.stem] = f"validation.bench.{path.stem}"

@@ -71,9 +71,8 @@ def measure_parts(
         started = time.process_time()
         row = {"part": part, **parts[part]()}
         row["cpu_s"] = round(time.process_time() - started, 1)
-        row["origin"] = provenance(
-            ["python", "-m", "validation.study", name, "run", "--only", part]
-        )
+        command = ["python", "-m", "validation.study", name, "run", "--only", part]
+        row["origin"] = provenance(command)
         known = {old["part"]: old for old in (read_record(path) if path.exists() else [])}
         known[part] = row
         ordered = [
@@ -121,9 +120,7 @@ def summarise_bars(checks: Iterable[Check]) -> str:
     missed = [check for check in barred if not check.holds]
     if not missed:
         return f"All {len(barred)} bars are met."
-    lines = [
-        f"- {check.name}: {check.value:.3g}, bar {check.asked}; {check.why}" for check in missed
-    ]
+    lines = [f"- {one.name}: {one.value:.3g}, bar {one.asked}; {one.why}" for one in missed]
     head = f"Of {len(barred)} bars {len(barred) - len(missed)} are met.  Missed:"
     return "\n".join([head, "", *lines])
 

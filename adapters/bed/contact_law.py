@@ -208,11 +208,9 @@ def solve_collision(
     """
     from scipy.integrate import solve_ivp
 
-    undamped = solve_hertz_collision(speed, modulus, radius, mass)
-    unit_time = undamped.overlap_max / speed
-    stiffness = (
-        find_normal_force(undamped.overlap_max, modulus, radius) * unit_time / (mass * speed)
-    )
+    free = solve_hertz_collision(speed, modulus, radius, mass)
+    unit_time = free.overlap_max / speed
+    stiffness = find_normal_force(free.overlap_max, modulus, radius) * unit_time / (mass * speed)
 
     def find_repulsion(overlap: float, velocity: float) -> float:
         open_overlap = max(overlap, 0.0)
@@ -241,4 +239,4 @@ def solve_collision(
     )
     overlap_max = float(solution.y_events[1][0][0])
     end_time, end_velocity = float(solution.t_events[0][0]), float(solution.y_events[0][0][1])
-    return Collision(-end_velocity, overlap_max * undamped.overlap_max, end_time * unit_time)
+    return Collision(-end_velocity, overlap_max * free.overlap_max, end_time * unit_time)

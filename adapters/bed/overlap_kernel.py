@@ -91,11 +91,11 @@ def fill_rows(
         if distance > _COINCIDENT * reach:
             normal[c] /= distance
         else:
-            angle, z = GOLDEN_ANGLE * c, 2.0 * ((c * 0.6180339887498949) % 1.0) - 1.0
+            turn, z = GOLDEN_ANGLE * c, 2.0 * ((c * 0.6180339887498949) % 1.0) - 1.0
             level = np.sqrt(1.0 - z * z)
             normal[c, 0], normal[c, 1], normal[c, 2] = (
-                level * np.cos(angle),
-                level * np.sin(angle),
+                level * np.cos(turn),
+                level * np.sin(turn),
                 z,
             )
 

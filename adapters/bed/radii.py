@@ -91,13 +91,11 @@ def find_radius_that_fits(container: Container) -> float:
     return container.radius / (1, 2, 1 + sqrt(2))[len(container.symmetry)]
 
 
-def expect_grains(
-    distribution: RadiusDistribution, container: Container, fill_height: float
-) -> int:
-    """Number of grains that fill ``container`` to ``fill_height`` [m] after the rain.
+def expect_grains(distribution: RadiusDistribution, container: Container, height: float) -> int:
+    """Number of grains that fill ``container`` to ``height`` [m] after the rain.
 
     At `PAPER_DENSITY`, that of a bed of friction 0.5 without load; a frictionless bed
     packs to 0.64 and ends an eighth lower.
     """
-    volume = PAPER_DENSITY * container.area * fill_height
+    volume = PAPER_DENSITY * container.area * height
     return round(volume / distribution.volume_mean)

@@ -124,7 +124,7 @@ class FakeEngine:
     def _prepare(scene: Scene, values: dict[str, FloatArray], folder: Path) -> None:
         radius = values["radius"]
         position = place_lattice(scene, len(radius), float(radius.max()))
-        write_fake_dumps(folder, radius, position[None], [0])
+        write_dumps(folder, radius, position[None], [0])
         header = "step time_s kinetic_translational_J kinetic_rotational_J potential_J "
         header += "coordination_number floor_force_N"
         np.savetxt(folder / "history.txt", np.array([[0, 0, 1e-9, 0, 1, 4, 1]]), header=header)
@@ -141,7 +141,7 @@ class FakeEngine:
         share = start[:, 2] / start[:, 2].mean()
         position = np.repeat(start[None], cycles + 1, axis=0)
         position[:, :, 2] -= settled[:, None] * share
-        write_fake_dumps(folder, radius, position, steps.tolist())
+        write_dumps(folder, radius, position, steps.tolist())
         write_fake_restart(folder, radius, position[-1], first + cycles)
         phase = np.arange(1, cycles * CYCLE_SAMPLES + 1) / CYCLE_SAMPLES
         force = scene.stress_at(phase) * scene.loaded_area
@@ -176,9 +176,7 @@ def _make_frame(step: int, radius: FloatArray, position: FloatArray) -> Frame:
     return Frame(step, names, np.column_stack(rows))
 
 
-def write_fake_dumps(
-    folder: Path, radius: FloatArray, position: FloatArray, steps: list[int]
-) -> None:
+def write_dumps(folder: Path, radius: FloatArray, position: FloatArray, steps: list[int]) -> None:
     """``states.dump``, and a ``contacts.dump`` without contacts."""
     frames = [_make_frame(step, radius, x) for step, x in zip(steps, position, strict=True)]
     write_dump(folder / "states.dump", frames)

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from adapters.bed import FloatArray
-from adapters.jumps.rates import Rates, integrate_powers
+from adapters.jumps.rates import Rates, integrate_power
 from adapters.laws.fit import (
     EXPONENTS,
     PRIOR,
@@ -48,18 +48,18 @@ class Forecast:
 
         Negative where the bed rose: cut at zero, noise would settle a bed that is at rest.
         """
-        return np.asarray(integrate_powers(self.last_cycle, start, end) @ (self.weight * self.rate))
+        return np.asarray(integrate_power(self.last_cycle, start, end) @ (self.weight * self.rate))
 
     def shares(self, start: float, end: float) -> FloatArray:
         """Derivative of that gain by the gain of each block it was fitted to, shape (b,)."""
-        span = integrate_powers(self.last_cycle, start, end)
+        span = integrate_power(self.last_cycle, start, end)
         return np.asarray(self.influence @ (self.weight * span))
 
     def half_widths(
         self, start: float, end: float | FloatArray, probability: float
     ) -> tuple[FloatArray, FloatArray]:
         """Half-widths of the gain [m]: from the noise of the rates, from the unknown exponent."""
-        span = integrate_powers(self.last_cycle, start, end)
+        span = integrate_power(self.last_cycle, start, end)
         student = stdtrit(self.freedom, (1 + probability) / 2)
         gains = span * self.rate
         mean = gains @ self.weight
@@ -80,7 +80,7 @@ def fit_forecast(rates: Rates) -> Forecast:
     rate 0 with no error.
     """
     last = rates.last_cycle
-    span = integrate_powers(last, rates.start, rates.end)
+    span = integrate_power(last, rates.start, rates.end)
     prior = 1 / (1 + (EXPONENTS / PRIOR) ** 2)
     if not rates.gain.any() and not rates.variance.any():
         still = np.zeros_like(EXPONENTS)

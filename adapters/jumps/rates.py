@@ -140,9 +140,7 @@ def find_noise(stretches: Sequence[Stretch]) -> Noise:
     return Noise(pooled * scale[ends - count // 2 - 1] ** 2, freedom)
 
 
-def integrate_powers(
-    scale: float, start: float | FloatArray, end: float | FloatArray
-) -> FloatArray:
+def integrate_power(scale: float, start: float | FloatArray, end: float | FloatArray) -> FloatArray:
     """phi_beta = integral of (N / scale)^(beta - 1) dN, shape (..., g); ``start`` above 0."""
     low = np.log(np.asarray(start, float) / scale)[..., None]
     high = np.log(np.asarray(end, float) / scale)[..., None]
@@ -160,7 +158,7 @@ def fit_smooth_rate(stretches: Sequence[Stretch]) -> Callable[[FloatArray], Floa
     """
     start, end, gain = cut_blocks(stretches)
     scale = float(end[-1])
-    span = integrate_powers(scale, start, end)
+    span = integrate_power(scale, start, end)
     weight = ((start + (end - start) / 2) ** 2 / (end - start))[:, None]
     rate = (span * gain[:, None] * weight).sum(axis=0) / (span**2 * weight).sum(axis=0)
     missed = ((gain[:, None] - span * rate) ** 2 * weight).sum(axis=0)

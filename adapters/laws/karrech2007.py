@@ -52,11 +52,9 @@ class Karrech2007:
         t = np.asarray(cycle, float)
         return outer(np.log(t), parameters[0]) + outer(t, parameters[1])
 
-    def increment(
-        self, parameters: FloatArray, start: float, end: float | FloatArray
-    ) -> FloatArray:
-        """The whole law at ``end`` [m], whatever ``start`` is: the fault of eq. 17, as printed."""
-        return self.value(parameters, end)
+    def increment(self, parameters: FloatArray, start: float, to: float | FloatArray) -> FloatArray:
+        """The whole law at ``to`` [m], whatever ``start`` is: the fault of eq. 17, as printed."""
+        return self.value(parameters, to)
 
 
 LAW = Karrech2007()

@@ -35,11 +35,9 @@ class Linear:
         c, b = parameters
         return np.asarray(c + outer(cycle, b))
 
-    def increment(
-        self, parameters: FloatArray, start: float, end: float | FloatArray
-    ) -> FloatArray:
-        """b (end - start) [m]; see `Law.increment`."""
-        return outer(np.asarray(end) - start, parameters[1])
+    def increment(self, parameters: FloatArray, start: float, to: float | FloatArray) -> FloatArray:
+        """b (to - start) [m]; see `Law.increment`."""
+        return outer(np.asarray(to) - start, parameters[1])
 
 
 LAW = Linear()

@@ -38,11 +38,9 @@ class Log:
         c, a = parameters
         return np.asarray(c + outer(np.log(cycle), a))
 
-    def increment(
-        self, parameters: FloatArray, start: float, end: float | FloatArray
-    ) -> FloatArray:
-        """a ln(end / start) [m]; see `Law.increment`."""
-        return outer(find_log_ratio(start, end), parameters[1])
+    def increment(self, parameters: FloatArray, start: float, to: float | FloatArray) -> FloatArray:
+        """a ln(to / start) [m]; see `Law.increment`."""
+        return outer(find_log_ratio(start, to), parameters[1])
 
 
 LAW = Log()

@@ -35,10 +35,8 @@ class LogLinear:
         themselves only.  Raises `UsageError` also where they cannot be separated.
         """
         cycle, displacement = check_training_data(self, cycle, displacement)
-        linear, slowing = (
-            centre((cycle - cycle[0]) / cycle[0]),
-            centre(find_log_ratio(cycle[0], cycle)),
-        )
+        linear = centre((cycle - cycle[0]) / cycle[0])
+        slowing = centre(find_log_ratio(cycle[0], cycle))
         unit, norm = normalise(linear)
         along = float((unit * slowing).sum())
         rest, left = normalise(slowing - along * unit)
@@ -61,12 +59,10 @@ class LogLinear:
         c, a, b = parameters
         return np.asarray(c + outer(np.log(cycle), a) + outer(cycle, b))
 
-    def increment(
-        self, parameters: FloatArray, start: float, end: float | FloatArray
-    ) -> FloatArray:
-        """a ln(end / start) + b (end - start) [m]; see `Law.increment`."""
+    def increment(self, parameters: FloatArray, start: float, to: float | FloatArray) -> FloatArray:
+        """a ln(to / start) + b (to - start) [m]; see `Law.increment`."""
         _, a, b = parameters
-        return outer(find_log_ratio(start, end), a) + outer(np.asarray(end) - start, b)
+        return outer(find_log_ratio(start, to), a) + outer(np.asarray(to) - start, b)
 
 
 def choose_one_sign(y: FloatArray, norm: float, along: float, left: float) -> FloatArray:

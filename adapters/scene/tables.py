@@ -208,9 +208,7 @@ class Procedure(Table):
         newer = {"move": MOVE_DEFAULT, "tolerance": None, "settlement": "law"}
         newer |= {"seating": "any", "seating_cycles": None, "jammed": "less"}
         record: dict[str, Any] = whole(self)
-        return {
-            key: value for key, value in record.items() if key not in newer or value != newer[key]
-        }
+        return {k: value for k, value in record.items() if k not in newer or value != newer[k]}
 
     def jump_cycles(self, jump: int) -> int:
         """Cycles of jump number ``jump`` = 0, 1, ...; 0 where the jumps choose themselves."""

@@ -337,7 +337,5 @@ class Assembly:
         """The kernel's lists of loads and constraints; in single precision, frames to suit."""
         if self.dtype == np.float32:
             self._choose_frames(conditions, gravity)
-        return (
-            conditions.pack_loads(self.packed, self.place),
-            conditions.pack_constraints(self.place),
-        )
+        loads = conditions.pack_loads(self.packed, self.place)
+        return loads, conditions.pack_constraints(self.place)

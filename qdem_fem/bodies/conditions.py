@@ -96,9 +96,7 @@ class Conditions:
                 weights = held.factor
             for c in held.components:
                 at = (4 * place[held.nodes] + c).tolist()
-                given.update(
-                    {key: (series, w) for key, w in zip(at, weights.tolist(), strict=True)}
-                )
+                given.update({k: (series, w) for k, w in zip(at, weights.tolist(), strict=True)})
             column += held.driver is not None
         order = np.array(sorted(given), dtype=np.int64)
         values = [given[key] for key in order.tolist()]

@@ -14,8 +14,8 @@ from qdem_fem.element import (
     Material,
     Strain,
     compute_cauchy_stress,
-    compute_von_mises,
     find_displacement_gradient,
+    find_von_mises,
 )
 from qdem_fem.files import ConditionError, Floats, Integers, MaterialError
 from qdem_fem.mesh import TetMesh, find_gradients, find_surface_faces, read_mesh
@@ -142,7 +142,7 @@ class Body:
 
     def von_mises(self) -> Floats:
         """Von Mises stress of the elements [Pa], (m,)."""
-        return compute_von_mises(self.stress())
+        return find_von_mises(self.stress())
 
     def select_nodes(self, nodes: Any, where: str) -> Integers:
         """Node numbers of a selection: a mask (n,), an index or indices.

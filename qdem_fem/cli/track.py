@@ -102,9 +102,7 @@ def make_train_file(arguments: argparse.Namespace) -> int:
 
 def _select_given(arguments: argparse.Namespace, *names: str) -> dict[str, Any]:
     """Those of the named arguments that were given."""
-    return {
-        name: getattr(arguments, name) for name in names if getattr(arguments, name) is not None
-    }
+    return {key: getattr(arguments, key) for key in names if getattr(arguments, key) is not None}
 
 
 def _refuse_no_folder(out: Path) -> None:

@@ -28,9 +28,9 @@ from qdem_fem.contact.spheres import (
     Planes,
     SphereContact,
     Spheres,
-    compute_tangential_stiffness,
     find_pair_stiffness,
-    make_plane_arrays,
+    find_tangential_stiffness,
+    pack_planes,
 )
 from qdem_fem.contact.state import Contacts, ContactTouching
 from qdem_fem.contact.system import System
@@ -73,14 +73,14 @@ class SphereContacts(Contacts):
             Spheres(
                 self.reference, 4 * self.place, self.force_at,
                 np.repeat(np.arange(len(counts)), counts), radius, normal,
-                compute_tangential_stiffness(normal, poisson),
+                find_tangential_stiffness(normal, poisson),
             ),
             make_pairs(
                 np.zeros(size + 1, np.int64), np.zeros(0, np.int64), np.zeros((size, 0), bool),
                 NO_IMAGE if asked.periodic is None else np.zeros((0, 3)),
             ),
             Planes(
-                *make_plane_arrays(asked.planes, asked.friction),
+                *pack_planes(asked.planes, asked.friction),
                 np.zeros((walls, size, 3)), np.zeros((walls, size, 3)),
             ),
             float(asked.friction), self.skin / 2, zero + np.inf, zero.copy(), zero.copy(),

@@ -8,11 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from qdem_fem.contact.spheres import (
-    compute_tangential_stiffness,
-    find_pair_stiffness,
-    make_plane_arrays,
-)
+from qdem_fem.contact.spheres import find_pair_stiffness, find_tangential_stiffness, pack_planes
 from qdem_fem.contact.state import Contacts
 from qdem_fem.contact.surface import (
     DEPTH,
@@ -91,11 +87,11 @@ class SurfaceContacts(Contacts):
                 np.where(point_face >= 0, area[point_face] / len(share), 0.0), body_of[2],
                 np.concatenate(edges),
                 np.concatenate(opposite), np.concatenate(edge_areas), body_of[3],
-                modulus, compute_tangential_stiffness(modulus, poisson),
+                modulus, find_tangential_stiffness(modulus, poisson),
             ),
             make_near(nothing, nothing, np.zeros(1, np.int64), nothing, nothing.reshape(0, 2)),
             Walls(
-                *make_plane_arrays(asked.planes, asked.friction), np.full((walls, count), -1.0),
+                *pack_planes(asked.planes, asked.friction), np.full((walls, count), -1.0),
                 np.zeros((walls, count, 3)), np.zeros((walls, 3)),
             ),
             float(asked.friction), self.skin / 2, self.depth, zero + np.inf, zero.copy(),

@@ -81,10 +81,8 @@ def find_stress_numbers(h: Nine, lame_first: Any, lame_second: Any, half: Any) -
     c6, c7, c8 = h1 * h5 - h2 * h4, h2 * h3 - h0 * h5, h0 * h4 - h1 * h3
     trace = h0 + h4 + h8
     change = (c0 + c4 + c8) + (h0 * c0 + h1 * c1 + h2 * c2)
-    squares = (
-        h0 * h0 + h1 * h1 + h2 * h2 + h3 * h3 + h4 * h4 + h5 * h5 + h6 * h6 + h7 * h7 + h8 * h8
-    )
-    pressure = lame_first * (trace + half * squares)
+    square = h0 * h0 + h1 * h1 + h2 * h2 + h3 * h3 + h4 * h4 + h5 * h5 + h6 * h6 + h7 * h7 + h8 * h8
+    pressure = lame_first * (trace + half * square)
     alpha = (pressure + pressure * trace) + lame_second * change
     growth = trace + change
     beta = lame_second + lame_second * growth

@@ -76,7 +76,7 @@ def compute_quadratic_energy(
     return volume * (lam / 2 * first**2 + mu * contract(strain, strain))
 
 
-def compute_von_mises(cauchy: Floats) -> Floats:
+def find_von_mises(cauchy: Floats) -> Floats:
     """sqrt(3/2 s : s) [Pa], (m,), with the deviator s of the Cauchy stress (m, 3, 3)."""
     deviator = cauchy - find_trace(cauchy) * IDENTITY / 3
     return np.sqrt(1.5 * contract(deviator, deviator))

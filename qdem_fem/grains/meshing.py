@@ -70,9 +70,7 @@ def make_grain_elements(nodes: Floats, corner_faces: Integers) -> Integers:
         [corner_faces, middle, apex + 1 + corner_faces, np.full(len(corner_faces), apex)]
     )
     choices = local[:, DIAGONALS]
-    worst = (
-        find_radius_ratios(nodes, choices.reshape(-1, 4)).reshape(*choices.shape[:3]).min(axis=2)
-    )
+    worst = find_radius_ratios(nodes, choices.reshape(-1, 4)).reshape(*choices.shape[:3]).min(2)
     best = choices[np.arange(len(local)), worst.argmax(axis=1)]
     return np.concatenate([local[:, CORNERS], best], axis=1).reshape(-1, 4)
 

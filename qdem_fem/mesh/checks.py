@@ -71,9 +71,8 @@ def convert_nodes(raw: Any) -> tuple[Floats, list[Problem]]:
     bad = np.flatnonzero(~np.isfinite(nodes).all(axis=1))
     if len(bad):
         at = f"{name_some('node', bad)}; node {bad[0]} is at {nodes[bad[0]].tolist()}"
-        return nodes, [
-            Problem(f"coordinates that are not finite: {at}", "mend or remove these nodes")
-        ]
+        what = f"coordinates that are not finite: {at}"
+        return nodes, [Problem(what, "mend or remove these nodes")]
     if extent > EXTENT_MOST or 0 < extent < 1 / EXTENT_MOST:
         what = f"the nodes span {extent:.3g} m, of which no volume can be computed"
         return none, [Problem(what, "check the unit of length: coordinates are in metres")]

@@ -192,10 +192,8 @@ def _format_bed(summary: dict[str, Any]) -> Iterator[str]:
 
 def _format_cost(summary: dict[str, Any]) -> str:
     cost = summary["cost"]
-    rows = [
-        ("CPU time (s)", f"{cost['cpu_s']:.3g}"),
-        ("time on the clock (s)", f"{cost['wall_s']:.3g}"),
-    ]
+    cpu, wall = f"{cost['cpu_s']:.3g}", f"{cost['wall_s']:.3g}"
+    rows = [("CPU time (s)", cpu), ("time on the clock (s)", wall)]
     if "million_elements_per_s" in cost:
         speed = f"{cost['million_elements_per_s']:.3g}"
         rows.append(("million element-steps per second on the clock", speed))

@@ -103,9 +103,7 @@ def prepare_bed(
     bed = read_bed(path, recipe) if path.exists() else None
     grains = make_bed_grains(recipe)
     if bed is None:  # refused before grains fall for hours
-        recipe.layout.place_grains_beside(
-            place_grains(grains)[recipe.below :], 0.0, recipe.seed + 1
-        )
+        recipe.layout.place_beside(place_grains(grains)[recipe.below :], 0.0, recipe.seed + 1)
     for number, stage in enumerate(STAGES):
         if bed is not None and STAGES.index(bed.stage) >= number:
             continue
@@ -149,9 +147,7 @@ def run_stage(
     if stage in FALLS:
         falling = slice(recipe.below) if stage == "bed" else slice(recipe.below, len(grains))
         scatter(list(bodies.values())[falling], recipe.seed)
-    run = Simulation(
-        list(bodies.values()), gravity=recipe.gravity, threads=threads, contact=contact
-    )
+    run = Simulation([*bodies.values()], gravity=recipe.gravity, threads=threads, contact=contact)
     if SLEEPER in bodies:
         guide_sleeper(run, bodies[SLEEPER], upright=stage == "crib")
     shares = FIRMER if stage in FIRM else ROUGH
@@ -235,7 +231,7 @@ def place_start_nodes(
     every = np.concatenate(below)
     bottom = float(every[layout.is_under(every), 2].max()) + 2 * radius + GAP
     top = float(every[:, 2].max()) + radius + GAP
-    beside = layout.place_grains_beside(loose[recipe.below :], top, recipe.seed + 1)
+    beside = layout.place_beside(loose[recipe.below :], top, recipe.seed + 1)
     return [*below, *beside, layout.sleeper(bottom).nodes]
 
 

@@ -61,9 +61,8 @@ class TrackLayout:
             return make_sleeper_slice(self.shape, self.box, bottom, self.radius, self.cells)
         make = make_half_sleeper if self.part == "half" else make_sleeper_mesh
         mesh = make(self.shape, *self.cells)
-        return replace(
-            mesh, nodes=mesh.nodes + np.array([self.span[0], self.box.width / 2, bottom])
-        )
+        shift = np.array([self.span[0], self.box.width / 2, bottom])
+        return replace(mesh, nodes=mesh.nodes + shift)
 
     def measure_beyond(self, x: Floats) -> Floats:
         """How far x (k,) [m] lies beyond the free end of the sleeper, zero along it [m]."""
@@ -93,9 +92,7 @@ class TrackLayout:
 
         return make_loose_lattice(grains, [self._room(foot)], 0.0, self.radius, seed, find_share)
 
-    def place_grains_beside(
-        self, grains: Sequence[Floats], bottom: float, seed: int
-    ) -> list[Floats]:
+    def place_beside(self, grains: Sequence[Floats], bottom: float, seed: int) -> list[Floats]:
         """Loose grains from a height [m] on, beside the sleeper and beyond its ends; nodes.
 
         Raises `MeshError` where there is no room."""

@@ -65,10 +65,10 @@ def find_near_pairs(kind: Ints, boxes: Floats, movable: Bools) -> Ints:
     solid = np.flatnonzero(kind != HALF_SPACE)
     dim = boxes.shape[1] // 2
     sweep, widest = 0, -1.0
-    for axis in range(dim):
-        spread = np.var(boxes[solid, axis]) if len(solid) > 0 else 0.0
+    for k in range(dim):
+        spread = np.var(boxes[solid, k]) if len(solid) > 0 else 0.0
         if spread > widest:
-            sweep, widest = axis, spread
+            sweep, widest = k, spread
     order = solid[np.argsort(boxes[solid, sweep], kind="mergesort")]
     walls = np.flatnonzero(kind == HALF_SPACE)
     pairs = np.empty((0, 2), dtype=np.int64)
@@ -81,11 +81,8 @@ def find_near_pairs(kind: Ints, boxes: Floats, movable: Bools) -> Ints:
                 if boxes[j, sweep] > boxes[i, dim + sweep]:
                     break
                 apart = not (movable[i] or movable[j])
-                for axis in range(dim):
-                    if (
-                        boxes[i, axis] > boxes[j, dim + axis]
-                        or boxes[j, axis] > boxes[i, dim + axis]
-                    ):
+                for k in range(dim):
+                    if boxes[i, k] > boxes[j, dim + k] or boxes[j, k] > boxes[i, dim + k]:
                         apart = True
                 if apart:
                     continue

@@ -100,15 +100,12 @@ class Scene:
             remedy = f"give 0 to {MOST_FRICTION:g}"
             friction = require_number_in(friction, 0.0, MOST_FRICTION, "friction", where, remedy)
         if restitution is not None:
-            restitution = require_number_in(
-                restitution, 0.0, 1.0, "restitution", where, "give 0 to 1"
-            )
+            name, remedy = "restitution", "give 0 to 1"
+            restitution = require_number_in(restitution, 0.0, 1.0, name, where, remedy)
 
-        def check_state(
-            values: ArrayLike | None, default: Floats | list[float], what: str
-        ) -> Floats:
-            given = default if values is None else values
-            return require_vector(given, len(default), what, where, BOUNDS.state)
+        def check_state(values: ArrayLike | None, usual: Floats | list[float], what: str) -> Floats:
+            given = usual if values is None else values
+            return require_vector(given, len(usual), what, where, BOUNDS.state)
 
         origin = getattr(shape, "centroid", np.zeros(self.dim))
         turn, upright = (3, [1.0, 0.0, 0.0, 0.0]) if self.dim == 3 else (1, [0.0])

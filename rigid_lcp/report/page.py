@@ -111,10 +111,8 @@ def draw_frames(
     drawn = []
     for name, frame in frames.items():
         bodies, head = rebuild_frame_scene(frame, scene), f"{title}   t = {frame['time']:.3f} s"
-        figure = pictures.draw_state(
-            bodies, frame["motion"], frame["contacts"], window, scale, head
-        )
-        drawn.append(write_picture(folder, name, figure))
+        image = pictures.draw_state(bodies, frame["motion"], frame["contacts"], window, scale, head)
+        drawn.append(write_picture(folder, name, image))
     return drawn
 
 

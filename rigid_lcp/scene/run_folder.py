@@ -72,11 +72,9 @@ def restore_bodies(run: Simulation, frame: dict[str, Any]) -> None:
     if "wear_counts" in frame:
         grains: list[WornShape | None] = []
         ends = np.cumsum(np.maximum(frame["wear_counts"], 0))
-        for body, count, end in zip(
-            run.world.scene.bodies, frame["wear_counts"], ends, strict=True
-        ):
-            mine = (frame[f"wear_{name}"][end - count : end] for name in WORN)
-            grains.append(None if count < 0 else WornShape(body.shape, *mine))
+        for body, n, end in zip(run.world.scene.bodies, frame["wear_counts"], ends, strict=True):
+            mine = (frame[f"wear_{name}"][end - n : end] for name in WORN)
+            grains.append(None if n < 0 else WornShape(body.shape, *mine))
         run.worn = WearState(grains, *map(float, frame["wear_sums"]))
 
 

@@ -109,9 +109,8 @@ def _make_tile(vectors: int, divided: bool) -> Any:
                 rows[i] = [builder.fmul(value, scale) for value in rows[i]]
             for row, made in zip(places, rows, strict=True):
                 for place, value in zip(row, made, strict=True):
-                    builder.store(
-                        value, _point_to_vector(builder, x, builder.add(to, place)), align=8
-                    )
+                    at = _point_to_vector(builder, x, builder.add(to, place))
+                    builder.store(value, at, align=8)
             return context.get_dummy_value()
 
         return signature, generate

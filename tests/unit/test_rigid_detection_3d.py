@@ -13,15 +13,7 @@ from rigid_lcp.contact.near_pairs import bound_shapes, find_near_pairs
 from rigid_lcp.contact.placed_solids import pack_shapes_3d, place_solids
 from rigid_lcp.errors import SceneError
 from rigid_lcp.shapes.rotations import make_quaternion, multiply_quaternions, normalise, rotate
-from tests.rigid_solids import (
-    CUBE,
-    FLOOR,
-    UPRIGHT,
-    ballast_stone,
-    contacts,
-    near_pair,
-    sorted_points,
-)
+from tests.rigid_solids import CUBE, FLOOR, UPRIGHT, contacts, make_stone, near_pair, sort_points
 
 # --- closed forms ---
 
@@ -33,7 +25,7 @@ def test_box_on_floor_has_its_four_corners() -> None:
     assert np.allclose(found.gap, 1e-4, atol=1e-16)
     assert np.array_equal(found.normal, np.tile([0.0, 0.0, 1.0], (4, 1)))
     corners = [[-0.5, -0.5], [0.5, -0.5], [-0.5, 0.5], [0.5, 0.5]]
-    assert np.allclose(sorted_points(found)[:, :2], corners)
+    assert np.allclose(sort_points(found)[:, :2], corners)
     assert (found.radius_a == 0).all()
     assert np.isinf(found.radius_b).all()
 
@@ -42,7 +34,7 @@ def test_box_on_floor_has_its_four_corners() -> None:
 def test_box_on_box_has_the_corners_of_the_overlap(gap: float) -> None:
     found = contacts([CUBE, CUBE], [[0, 0, 0], [0.3, 0.2, 1.0 + gap]])
     wanted = [[-0.2, -0.3], [0.5, -0.3], [-0.2, 0.5], [0.5, 0.5]]
-    assert np.allclose(sorted_points(found)[:, :2], wanted, atol=1e-15)
+    assert np.allclose(sort_points(found)[:, :2], wanted, atol=1e-15)
     assert np.allclose(found.gap, gap, atol=1e-15)
     up = np.where(found.body_a == 1, 1.0, -1.0)
     assert np.allclose(found.normal, up[:, None] * [0.0, 0.0, 1.0], atol=1e-15)
@@ -61,7 +53,7 @@ def test_crossed_bars_share_a_square() -> None:
     across = make_quaternion([0.0, 0.0, np.pi / 2])
     found = contacts([bar, bar], [[0, 0, 0], [0, 0, 1.0]], [UPRIGHT, across])
     wanted = [[-0.5, -0.5], [0.5, -0.5], [-0.5, 0.5], [0.5, 0.5]]
-    assert np.allclose(sorted_points(found)[:, :2], wanted, atol=1e-15)
+    assert np.allclose(sort_points(found)[:, :2], wanted, atol=1e-15)
 
 
 def test_a_shared_octagon_keeps_its_corners() -> None:
@@ -238,7 +230,7 @@ def test_boxes_are_those_of_the_corners(dim: int) -> None:
 
 def test_pairs_are_those_of_all_boxes() -> None:
     generator = np.random.default_rng(0)
-    shapes = [ballast_stone(generator, 0.2) for _ in range(40)] + [Sphere(0.1)] * 20 + [FLOOR]
+    shapes = [make_stone(generator, 0.2) for _ in range(40)] + [Sphere(0.1)] * 20 + [FLOOR]
     position = generator.random((61, 3))
     movable = generator.random(61) < 0.8
     movable[60] = False

@@ -132,11 +132,8 @@ def test_fclib_triplets_add_up(tmp_path: Path) -> None:
     path = fclib_write(tmp_path / "one.h5", sp.eye_array(2), np.ones(2), np.ones(1), 2, nz=0)
     with h5py.File(path, "r+") as file:
         w = file["fclib_local/W"]
-        for name, values in {
-            "p": [0, 0, 1, 1],
-            "i": [0, 0, 1, 0],
-            "x": [1.0, 2.0, 5.0, 9.0],
-        }.items():
+        tables = {"p": [0, 0, 1, 1], "i": [0, 0, 1, 0], "x": [1.0, 2.0, 5.0, 9.0]}
+        for name, values in tables.items():
             del w[name]
             w[name] = np.array(values)
         w["nz"][...] = 3

@@ -19,7 +19,7 @@ from adapters.laws.fit.candidates import (
     SLOW_LAWS,
     count_held_out_rows,
     find_candidates,
-    fit_constant_rate_gains,
+    fit_constant_rates,
     thin_rows,
 )
 from adapters.laws.fit.outlook import AGREE, compare_laws, find_outlook
@@ -130,7 +130,7 @@ def test_band_holds_a_constant_rate_that_the_tail_shows(
     """A quarter of the rate at cycle 1000 goes on for ever: 7 of 10 bands hold it at 1e4.
 
     Of 10 that hold with 90 %, fewer than 7 do with a chance of 1 %.  Without
-    `fit_constant_rate_gains`
+    `fit_constant_rates`
     none does.
     """
     cycle, inside = np.unique(np.geomspace(1, 1000, 60).round()), 0
@@ -147,10 +147,10 @@ def test_constant_rate_is_not_believed_of_a_power_law() -> None:
     """The band of N^0.3 is what it is without: a + b N beside a logarithm fits it worse."""
     cycle = np.geomspace(1, 1000, 40)
     for exponent in (0.15, 0.3, 0.45):
-        gains = fit_constant_rate_gains(cycle, cycle[:, None] ** exponent, 1e4)
+        gains = fit_constant_rates(cycle, cycle[:, None] ** exponent, 1e4)
         assert np.isnan(gains).all()
     ratchet = np.log(cycle) + 3e-4 * cycle
-    gains = fit_constant_rate_gains(cycle, ratchet[:, None], 1e4)
+    gains = fit_constant_rates(cycle, ratchet[:, None], 1e4)
     assert np.nanmax(gains) == pytest.approx(np.log(10) + 2.7, rel=1e-6)
 
 

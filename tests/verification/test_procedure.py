@@ -170,9 +170,7 @@ def test_what_a_bed_has_no_room_for_is_made_good_by_the_next_jump(
     """u = a ln(1 + N) and jumps by history of 20 and 15 cycles, of which the first may move by no
     more than 6 um: a ln(61 / 41) = 7.9 um is halved.  The next is asked for a ln(101 / 86) and for
     that half; a differs by 2 % from N in place of 1 + N."""
-    no_room(
-        monkeypatch, lambda before, target, _: before.cycle == 40 and drop(before, target) > 6e-6
-    )
+    no_room(monkeypatch, lambda start, target, _: start.cycle == 40 and drop(start, target) > 6e-6)
     keys = ('procedure.settlement="history"', "procedure.h=[20, 15]", "procedure.total_cycles=125")
     rows = settle(tmp_path / "run", *keys)
     jumps = [one for one in RunFolder(tmp_path / "run").outcomes() if one.stage == "jump"]

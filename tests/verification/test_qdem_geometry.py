@@ -201,9 +201,7 @@ def test_altitudes_are_three_volumes_over_the_largest_face() -> None:
         np.linalg.norm(find_area_vectors(mesh.nodes, mesh.elements[:, list(face)]), axis=1)
         for face in combinations(range(4), 3)
     ]
-    np.testing.assert_allclose(
-        find_altitudes(gradients), 3 * volumes / np.max(areas, axis=0), 1e-12
-    )
+    np.testing.assert_allclose(find_altitudes(gradients), 3 * volumes / np.max(areas, 0), 1e-12)
 
 
 def test_lumped_mass_keeps_mass_and_centre_of_mass(body: tuple[TetMesh, float, int]) -> None:

@@ -157,7 +157,7 @@ def test_cauchy_and_von_mises() -> None:
     T = r.compute_cauchy_stress(H, r.STRESS["svk"](H, LAMBDA, MU), "svk")
     np.testing.assert_allclose(T, np.swapaxes(T, -1, -2), atol=1e-12)
     pull, shear = np.diag([-7.0, 0, 0]), np.array([[0, 2.0, 0], [2.0, 0, 0], [0, 0, 0]])
-    found = r.compute_von_mises(np.stack([pull, shear, 5 * np.eye(3)]))
+    found = r.find_von_mises(np.stack([pull, shear, 5 * np.eye(3)]))
     np.testing.assert_allclose(found, [7.0, 2 * np.sqrt(3), 0.0], atol=1e-15)
 
 

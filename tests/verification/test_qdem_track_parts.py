@@ -109,7 +109,7 @@ def test_loose_ballast_keeps_to_its_shoulder_and_off_the_sleeper(
     )
     assert top > near > foot  # half and a quarter of it, in whole grains
     sleeper = layout.sleeper(0.5).nodes
-    beside = np.concatenate(layout.place_grains_beside(grains, 0.5, 2))
+    beside = np.concatenate(layout.place_beside(grains, 0.5, 2))
     out = layout.measure_beyond(beside[:, 0])
     assert 0.4 < out.max() <= 0.5 - layout.radius + 1e-9
     low, high = sleeper.min(axis=0), sleeper.max(axis=0)
@@ -131,15 +131,13 @@ def test_each_rail_seat_takes_its_own_pressure(
     layout, recipe = prepared.recipe.layout, prepared.recipe
     grains = place_grains(make_bed_grains(recipe))
     nodes = layout.place_grains_below(grains[: recipe.below], 1)
-    nodes += layout.place_grains_beside(grains[recipe.below :], 0.5, 2)
+    nodes += layout.place_beside(grains[recipe.below :], 0.5, 2)
     nodes.append(layout.sleeper(0.5).nodes)
     bed = Bed("rest", nodes, np.zeros((sum(map(len, nodes)), 3)), {}, {})
     monkeypatch.setattr(track_scene, "prepare_bed", lambda *given: bed)
     run, bodies = enter_track(prepared)
     now = np.array([0.0])
-    force = [
-        (load.weights * load.driver.sample(now)[0]).sum(axis=0) for load in run.conditions.loads
-    ]
+    force = [(one.weights * one.driver.sample(now)[0]).sum(axis=0) for one in run.conditions.loads]
     assert np.array(force)[:, 2] == pytest.approx([-22.1e3, -44.2e3][:seats])
     sleeper = bodies["sleeper"]
     seat = [

@@ -108,7 +108,7 @@ def scene_in_the_air(folder: Path, text: Callable[[str], str]) -> TrackPrepared:
     layout, recipe = prepared.recipe.layout, prepared.recipe
     grains = place_grains(make_bed_grains(recipe))
     nodes: list[Any] = layout.place_grains_below(grains[: recipe.below], 1)
-    nodes += layout.place_grains_beside(grains[recipe.below :], 0.6, 2)
+    nodes += layout.place_beside(grains[recipe.below :], 0.6, 2)
     nodes.append(layout.sleeper(0.6).nodes)
     moved = np.zeros((sum(map(len, nodes)), 3))
     write_bed(prepared.bed_file, recipe, Bed("rest", nodes, moved, {}, {}))

@@ -8,7 +8,7 @@ import pytest
 from rigid_lcp import HalfSpace, Polyhedron, Scene, Simulation, Sphere, make_box
 from rigid_lcp.arrays import Floats
 from rigid_lcp.shapes.rotations import make_quaternion, normalise, rotate
-from tests.rigid_solids import angular_momentum, ballast_stone
+from tests.rigid_solids import angular_momentum, make_stone
 
 G = 9.81
 FLOOR = HalfSpace([0.0, 0.0, 1.0], 0.0)
@@ -59,7 +59,7 @@ def test_a_sphere_spins_on_like_a_top() -> None:
 
 @pytest.mark.long
 def test_a_spinning_stone_flies_on_a_parabola_with_its_momentum() -> None:
-    stone = ballast_stone(np.random.default_rng(0), 0.05)
+    stone = make_stone(np.random.default_rng(0), 0.05)
     scene = Scene(dim=3)
     spin = np.array([20.0, -35.0, 10.0])
     scene.add(stone, density=2700.0, position=[0.0, 0.0, 1.0], velocity=[1.0, 2.0, 3.0], spin=spin)
@@ -156,7 +156,7 @@ def poured(count: int, size: float, seed: int) -> Scene:
         layer, cell = divmod(number, 9)
         across = 1.35 * size * np.array([cell % 3 - 1.0, cell // 3 - 1.0])
         scene.add(
-            ballast_stone(generator, size), density=2700.0, friction=0.6,
+            make_stone(generator, size), density=2700.0, friction=0.6,
             position=[*across, size * (0.8 + 1.4 * layer)],
             angle=normalise(generator.normal(size=4)),
         )  # fmt: skip

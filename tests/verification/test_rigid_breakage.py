@@ -21,9 +21,7 @@ def press(load: float, strength: float, **options) -> Simulation:
     scene.add(HalfSpace([0, 1]), friction=0.5)
     diamond = Polygon([(0, -0.1), (0.1, 0), (0, 0.1), (-0.1, 0)])
     scene.add(diamond, density=2700.0, position=[0, 0.1], friction=0.5)
-    plate = scene.add(
-        Polygon.rectangle(0.3, 0.05), density=100.0, position=[0, 0.225], friction=0.5
-    )
+    plate = scene.add(Polygon.rectangle(0.3, 0.05), density=1e2, position=[0, 0.225], friction=0.5)
 
     def loads(time, motion):
         forces = np.zeros((len(motion.position), 3))

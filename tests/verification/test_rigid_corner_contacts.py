@@ -84,9 +84,7 @@ def test_corners_carry_radii_zero_and_names_last(form: str) -> None:
     assert found.edge_b.any() == (form != "corner on corner")
     later = contacts(shapes, position + 1e-6, turns)
     assert later.key.tolist() == found.key.tolist()
-    names = {
-        int(contacts(*nearest_corners("stones", 5, each, 1e-3)[0][:3]).key[0]) for each in FORMS
-    }
+    names = {int(contacts(*nearest_corners("stones", 5, one, 1e-3)[0][:3]).key[0]) for one in FORMS}
     assert len(names) == 3
 
 

@@ -133,9 +133,7 @@ def test_inertia_of_bricks() -> None:
 def test_a_wall_turns_as_a_rigid_body() -> None:
     """Turned about a point, all bricks alike, no joint of theirs opens or slides."""
     space = build_wall(3, 3, 2, np.ones(count_bricks(3, 3)), joined=True)
-    middle = np.array(
-        [(2.0 * (i + k % 2 / 2), k + 0.5) for k in range(3) for i in range(3 - k % 2)]
-    )
+    middle = np.array([(2 * (i + k % 2 / 2), k + 0.5) for k in range(3) for i in range(3 - k % 2)])
     turn = np.column_stack([-middle[:, 1], middle[:, 0], np.ones(len(middle))])
     moved = space.jacobian @ turn.ravel()
     inside = space.jacobian[:, :].indptr  # floor contacts touch one body, the others two

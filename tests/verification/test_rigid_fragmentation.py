@@ -17,7 +17,7 @@ from rigid_lcp.motion import make_world
 from rigid_lcp.shapes import rotate, rotate_back
 from rigid_lcp.wear.cuts import find_volume
 from rigid_lcp.wear.fragmentation import split_body
-from tests.rigid_solids import ballast_stone
+from tests.rigid_solids import make_stone
 
 SQUARE = Polygon([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 
@@ -55,7 +55,7 @@ def test_a_break_conserves_everything(seed, dim, far):
     """The parts go on as parts of the rigid body: mass, momenta and energy to round-off; their
     corners stay where they were, those in the cut are in both, and neither approach nor part."""
     rng = np.random.default_rng(seed)
-    shape = grain(seed) if dim == 2 else ballast_stone(rng, 1.0)
+    shape = grain(seed) if dim == 2 else make_stone(rng, 1.0)
     scene = Scene(dim)
     place, velocity, direction = rng.normal(size=(3, dim))
     place = place + far
@@ -117,7 +117,7 @@ def test_a_plane_through_corners_makes_no_slivers():
 def test_a_stone_can_be_cut_again_and_again():
     generator = np.random.default_rng(4)
     scene = Scene(3)
-    scene.add(ballast_stone(generator, 0.05), density=1.0)
+    scene.add(make_stone(generator, 0.05), density=1.0)
     whole = find_volume(scene.bodies[0].shape)
     for _ in range(6):
         for body in range(len(scene.bodies)):

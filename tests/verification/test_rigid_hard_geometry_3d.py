@@ -17,7 +17,7 @@ from rigid_lcp.shapes.rotations import (
     normalise,
     rotate,
 )
-from tests.rigid_solids import CUBE, FLOOR, UPRIGHT, ballast_stone, coal_distance, contacts
+from tests.rigid_solids import CUBE, FLOOR, UPRIGHT, coal_distance, contacts, make_stone
 
 
 def placed_corners(shapes: list[Polyhedron], position: Floats, turns: Floats) -> list[Floats]:
@@ -51,7 +51,7 @@ def family(name: str, generator: np.random.Generator) -> list[Polyhedron]:
     """Two solids of a kind."""
 
     def stone(size: float = 1.0, squeezed: tuple[float, float, float] = (1, 1, 1)) -> Polyhedron:
-        return Polyhedron(ballast_stone(generator, size, 12).vertices * squeezed)
+        return Polyhedron(make_stone(generator, size, 12).vertices * squeezed)
 
     def tetrahedron() -> Polyhedron:
         return Polyhedron(generator.normal(size=(4, 3)))

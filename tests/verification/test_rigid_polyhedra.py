@@ -11,13 +11,13 @@ from scipy.spatial.transform import Rotation
 
 from rigid_lcp import Polyhedron, make_box
 from rigid_lcp.shapes.polyhedron import Floats
-from tests.rigid_solids import ballast_stone
+from tests.rigid_solids import make_stone
 
 seeds = st.integers(0, 10_000)
 
 
 def stone(seed: int, corners: int = 16) -> Polyhedron:
-    return ballast_stone(np.random.default_rng(seed), 0.05, corners)
+    return make_stone(np.random.default_rng(seed), 0.05, corners)
 
 
 def by_delaunay(points: Floats) -> tuple[float, Floats, Floats]:

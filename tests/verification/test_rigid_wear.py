@@ -26,7 +26,7 @@ from rigid_lcp.motion import make_world
 from rigid_lcp.shapes import make_quaternion, multiply_quaternions
 from rigid_lcp.wear.abrasion import find_energy, find_slip_work, rub_grains, start_wear, swap_worn
 from rigid_lcp.wear.cuts import find_cut_depth, find_volume, make_unworn, rub_corners, wear_shape
-from tests.rigid_solids import CUBE, ballast_stone, contacts
+from tests.rigid_solids import CUBE, contacts, make_stone
 
 GRAVITY = 9.81
 SQUARE = Polygon.rectangle(1.0, 1.0)
@@ -210,7 +210,7 @@ def make_shape(form: str, rng: np.random.Generator):
     return {
         "polygon": lambda: Polygon(np.column_stack([np.cos(angle), np.sin(angle)])),
         "triangle": lambda: Polygon([[0, 0], [1, 0], [rng.random(), 0.3]]),
-        "stone": lambda: ballast_stone(rng, 1.0),
+        "stone": lambda: make_stone(rng, 1.0),
         "needle": lambda: NEEDLE,
         "sliver": lambda: SLIVER,
         "tetrahedron": lambda: Polyhedron(rng.normal(size=(4, 3))),
@@ -280,7 +280,7 @@ def test_pile_wears_without_overlap_or_a_burst(dim):
     scene = Scene(dim)
     scene.add(HalfSpace([0.0] * (dim - 1) + [1.0]), friction=0.5)
     for k in range(6):
-        shape = Polygon.regular(5, 0.05) if dim == 2 else ballast_stone(rng, 0.1)
+        shape = Polygon.regular(5, 0.05) if dim == 2 else make_stone(rng, 0.1)
         side = (-1) ** k
         scene.add(
             shape, density=2700.0, friction=0.5, angle=0.3 * k if dim == 2 else rng.normal(size=4),

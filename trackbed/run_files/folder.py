@@ -216,20 +216,18 @@ class RunFolder:
             )  # fmt: skip
 
 
-def list_differences(
-    key: str, before: Any, after: Any, free: tuple[str, ...] = ()
-) -> Iterator[str]:
+def list_differences(key: str, old: Any, new: Any, free: tuple[str, ...] = ()) -> Iterator[str]:
     """What differs between two values of JSON, one line for each dotted key below ``key``."""
-    if before == after or key in free:
+    if old == new or key in free:
         return
-    if isinstance(before, list) and isinstance(after, list) and len(before) == len(after):
-        before, after = (dict(enumerate(one)) for one in (before, after))
-    if isinstance(before, dict) and isinstance(after, dict):
-        for name in dict.fromkeys([*before, *after]):
+    if isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
+        old, new = (dict(enumerate(one)) for one in (old, new))
+    if isinstance(old, dict) and isinstance(new, dict):
+        for name in dict.fromkeys([*old, *new]):
             inner = f"{key}.{name}" if key else str(name)
-            yield from list_differences(inner, before.get(name), after.get(name), free)
+            yield from list_differences(inner, old.get(name), new.get(name), free)
     else:
-        yield f"{key}: {_shorten(before)} there, {_shorten(after)} now"
+        yield f"{key}: {_shorten(old)} there, {_shorten(new)} now"
 
 
 def _shorten(value: Any) -> str:

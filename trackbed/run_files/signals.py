@@ -13,10 +13,8 @@ from trackbed.errors import Interrupted
 
 
 @contextmanager
-def handle_signals(
-    handler: Callable[[signal.Signals], None], *, once: bool = False
-) -> Iterator[None]:
-    """Call ``handler`` for SIGTERM and Ctrl-C inside; the handlers before come back behind it.
+def handle_signals(act: Callable[[signal.Signals], None], *, once: bool = False) -> Iterator[None]:
+    """Call ``act`` for SIGTERM and Ctrl-C inside; the handlers before come back behind it.
 
     With ``once`` they come back at the first signal already.  In the main thread only: elsewhere
     whoever runs us takes care of signals.
@@ -30,7 +28,7 @@ def handle_signals(
     def call_handler(number: int, _frame: object) -> None:
         if once:
             restore()
-        handler(signal.Signals(number))
+        act(signal.Signals(number))
 
     with suppress(ValueError):  # not in the main thread
         for number in (signal.SIGTERM, signal.SIGINT):

@@ -45,10 +45,8 @@ def explain_refusal(path: Path, error: OSError) -> DiskFull | UsageError:
         remedy = "a file is where the folder should be: give another folder"
     if error.errno == ELOOP:
         remedy = "it is a symbolic link, which may lead anywhere: remove it"
-    refusal = DiskFull if full else UsageError
-    return refusal(
-        f"can not be written ({error.strerror or error})", where=str(path), remedy=remedy
-    )
+    kind = DiskFull if full else UsageError
+    return kind(f"can not be written ({error.strerror or error})", where=str(path), remedy=remedy)
 
 
 @contextmanager

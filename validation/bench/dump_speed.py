@@ -78,9 +78,7 @@ def write_dump(path: Path, grains: int, digits: int) -> np.ndarray:
     return values[np.argsort(values[:, 0]), 2]
 
 
-def measure_reader(
-    reader: str, path: Path, repeats: int, coordinate: np.ndarray, digits: int
-) -> float:
+def measure_reader(reader: str, path: Path, repeats: int, values: np.ndarray, digits: int) -> float:
     """Median CPU time [s] of a reader in a process of its own; nan when it is not installed."""
     result = path.with_suffix(".npy")
     for python in (sys.executable, os.environ.get("TRACKBED_PEER_PYTHON", sys.executable)):
@@ -92,7 +90,7 @@ def measure_reader(
         return np.nan
     if process.returncode != 0:
         raise RuntimeError(f"{reader} failed: {process.stderr.strip()[-500:]}")
-    if not np.allclose(np.load(result), coordinate, rtol=10.0 ** (1 - min(digits, 16)), atol=0):
+    if not np.allclose(np.load(result), values, rtol=10.0 ** (1 - min(digits, 16)), atol=0):
         raise ValueError(f"{reader} did not return the coordinates that were written")
     return float(np.median(json.loads(process.stdout)))
 

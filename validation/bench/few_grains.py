@@ -209,9 +209,8 @@ def drive_contact(
         motion.append(f"fix leg grain_1 move linear {leg[0]:.17g} {leg[1]:.17g} 0.0 units box")
         motion += [f"run {steps}", "unfix leg"]
     start = PLACE + np.array([[2 * RADIUS - overlap[0], displacement[0], 0.0], [0.0, 0.0, 0.0]])
-    track = run(
-        scene, start, np.zeros((2, 3)), motion, time_step=time_step, every=max(steps // 100, 1)
-    )
+    every = max(steps // 100, 1)
+    track = run(scene, start, np.zeros((2, 3)), motion, time_step=time_step, every=every)
     apart = track.position[:, 0] - track.position[:, 1]
     return track, 2 * RADIUS - np.linalg.norm(apart, axis=1), apart[:, 1]
 

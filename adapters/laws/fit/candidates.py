@@ -123,9 +123,7 @@ def find_increments(
     return found
 
 
-def fit_constant_rate_gains(
-    cycle: FloatArray, displacement: FloatArray, to_cycle: float
-) -> FloatArray:
+def fit_constant_rates(cycle: FloatArray, displacement: FloatArray, to_cycle: float) -> FloatArray:
     """Increments of a + b N beside a logarithm, a row a window, (w, n); nan where not believed.
 
     Believed on a window where c + a ln N + b N misses the readings by no more than c + a N^b does,

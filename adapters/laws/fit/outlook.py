@@ -15,7 +15,7 @@ from adapters.laws.fit.candidates import (
     BoolArray,
     Candidates,
     find_candidates,
-    fit_constant_rate_gains,
+    fit_constant_rates,
     thin_rows,
 )
 from adapters.laws.fit.regime import (
@@ -89,7 +89,7 @@ def find_outlook(
       worse than a power law, also to where that leads;
     - held-out block: the median's own error there, in proportion to the distance in ln N, as one
       standard deviation;
-    - tail: error of the last reading and of the slope there; see `estimate_tail_error`.
+    - tail: error of the last reading and of the slope there; see `find_tail_error`.
 
     It never reaches back beyond the last value by more than the reading: a bed that settles does
     not rise.  The band does not hold in the regimes ratcheting and collapse.
@@ -111,16 +111,14 @@ def find_outlook(
         candidates = find_candidates(few, means, to_cycle)
         votes = candidates.votes(bounded, unbounded)
         moved = np.zeros_like(last) if known else candidates.median(votes)
-        endless = np.where(unbounded, fit_constant_rate_gains(few, means, to_cycle), np.nan)
+        endless = np.where(unbounded, fit_constant_rates(few, means, to_cycle), np.nan)
 
         def find_band(probability: float) -> tuple[FloatArray, FloatArray, FloatArray]:
             """Low end, high end, and half-width of a reading."""
-            reading, tail = estimate_tail_error(
-                cycle, displacement, exponent, to_cycle, probability
-            )
+            reading, tail = find_tail_error(cycle, displacement, exponent, to_cycle, probability)
             if known:
                 return last, last, reading
-            miss = estimate_held_out_error(candidates, log(to_cycle / cycle[-1]), probability)
+            miss = find_held_out_error(candidates, log(to_cycle / cycle[-1]), probability)
             further = np.hypot(miss, tail)
             lowest, highest = candidates.spread(bounded, probability)
             lowest = np.fmin(lowest, np.fmin.reduce(endless))
@@ -141,9 +139,7 @@ def find_outlook(
     )  # fmt: skip
 
 
-def estimate_held_out_error(
-    candidates: Candidates, distance: float, probability: float
-) -> FloatArray:
+def find_held_out_error(candidates: Candidates, distance: float, probability: float) -> FloatArray:
     """Half-width from the median's own error on the held-out block, (n,); 0 without a block.
 
     The error grows in proportion to the distance in ln N, here ``distance``, and is taken as one
@@ -157,7 +153,7 @@ def estimate_held_out_error(
     return np.asarray(ndtri((1 + probability) / 2) * miss)
 
 
-def estimate_tail_error(
+def find_tail_error(
     cycle: FloatArray, displacement: FloatArray, exponent: FloatArray, to_cycle: float,
     probability: float,
 ) -> tuple[FloatArray, FloatArray]:  # fmt: skip

@@ -78,18 +78,16 @@ def _find_refusal(outlook: Outlook, series: int) -> Refusal | None:
     return None
 
 
-def find_failure(
-    cycle: FloatArray, settlement: FloatArray, fail_at: float | None
-) -> Refusal | None:
-    """Collapse where a series, ``settlement`` (k,) at the user's cycles (k,), has reached the
+def find_failure(cycle: FloatArray, settled: FloatArray, fail_at: float | None) -> Refusal | None:
+    """Collapse where a series, ``settled`` (k,) at the user's cycles (k,), has reached the
     user's bound in the same unit, of either sign: whatever would be predicted then."""
-    reached = np.flatnonzero(np.abs(settlement) >= (np.inf if fail_at is None else fail_at))
+    reached = np.flatnonzero(np.abs(settled) >= (np.inf if fail_at is None else fail_at))
     if not len(reached):
         return None
     first = reached[0]
     return Refusal(
         COLLAPSE,
-        f"{abs(settlement[first]):.3g} was reached at cycle {cycle[first]:.10g}, and {fail_at:g} "
+        f"{abs(settled[first]):.3g} was reached at cycle {cycle[first]:.10g}, and {fail_at:g} "
         "was given as failure (--fail-at): it has failed",
         "leave out what came behind the failure, or give another bound",
     )

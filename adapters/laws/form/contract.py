@@ -54,10 +54,8 @@ class Law(Protocol):
     def value(self, parameters: FloatArray, cycle: float | FloatArray) -> FloatArray:
         """u(N) [m], shape (...) for one cycle, (m, ...) for m cycles."""
 
-    def increment(
-        self, parameters: FloatArray, start: float, end: float | FloatArray
-    ) -> FloatArray:
-        """Displacement from cycle ``start`` to ``end`` [m], shaped as by `value`.
+    def increment(self, parameters: FloatArray, start: float, to: float | FloatArray) -> FloatArray:
+        """Displacement from cycle ``start`` to cycle ``to`` [m], shaped as by `value`.
 
         What a jump adds to the computed state at ``start``: the estimate is anchored there, and
         the residual of the fit at ``start`` is kept, not undone.

@@ -223,11 +223,9 @@ class ShapedLaw(ABC):
         """u(N) [m]; see `Law.value`."""
         return np.asarray(parameters[0] + self._trend(parameters, cycle))
 
-    def increment(
-        self, parameters: FloatArray, start: float, end: float | FloatArray
-    ) -> FloatArray:
-        """u(end) - u(start) [m]; see `Law.increment`."""
-        return self._trend(parameters, end) - self._trend(parameters, start)
+    def increment(self, parameters: FloatArray, start: float, to: float | FloatArray) -> FloatArray:
+        """u(to) - u(start) [m]; see `Law.increment`."""
+        return self._trend(parameters, to) - self._trend(parameters, start)
 
     def _trend(self, parameters: FloatArray, cycle: float | FloatArray) -> FloatArray:
         """a phi: u(N) - c [m]."""

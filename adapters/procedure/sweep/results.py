@@ -113,9 +113,7 @@ def estimate_bands(sweep: Sweep, finished: set[str]) -> list[Band]:
 def write_results(sweep: Sweep, results: Sequence[Result]) -> tuple[list[Band], dict[str, str]]:
     """Write the tables and the picture; the bands, and the path of every file."""
     by_name = {result.member: result for result in results}
-    bands = estimate_bands(
-        sweep, {result.member for result in results if result.state == "finished"}
-    )
+    bands = estimate_bands(sweep, {one.member for one in results if one.state == "finished"})
     member_rows, curve_rows = [], []
     for member in sweep.members:
         key = {"member": member.name, **convert_settings(member), SEED: member.seed}

@@ -24,16 +24,16 @@ from qdem_fem.contact.spheres.options import (
     check_contact_number,
     check_contact_planes,
     check_planes_along,
-    compute_tangential_stiffness,
     find_body_value,
     find_pair_stiffness,
-    make_plane_arrays,
+    find_tangential_stiffness,
+    pack_planes,
 )
 
 __all__ = [
     "DEEPEST", "GO_ON", "LOOK_AGAIN", "NEAR", "SKIN_OF_SPHERES", "TOO_DEEP", "Contact",
     "ContactPlane", "Planes", "SphereContact", "Spheres", "add_in_series", "advance_one",
     "advance_threads", "check_contact_number", "check_contact_planes", "check_planes_along",
-    "compute_tangential_stiffness", "find_body_value", "find_pair_stiffness", "law",
-    "make_plane_arrays", "slide_spring", "subtract_rows", "write_row",
+    "find_body_value", "find_pair_stiffness", "find_tangential_stiffness", "law", "pack_planes",
+    "slide_spring", "subtract_rows", "write_row",
 ]  # fmt: skip

@@ -40,7 +40,7 @@ NEAR: Literal["near"] = "near"
 """In place of their number: those it may have with what is within the skin now."""
 
 
-def compute_tangential_stiffness(normal: Any, poisson: Any) -> Any:
+def find_tangential_stiffness(normal: Any, poisson: Any) -> Any:
     """``k_t = k_n / (2 (1 + nu))`` [N/m]: Table 1 has it to four digits for both its materials."""
     return normal / (2 * (1 + poisson))
 
@@ -163,9 +163,7 @@ def check_planes_along(periodic: Any, planes: Sequence[ContactPlane]) -> None:
             )
 
 
-def make_plane_arrays(
-    planes: Sequence[ContactPlane], friction: float
-) -> tuple[Floats, Floats, Floats]:
+def pack_planes(planes: Sequence[ContactPlane], friction: float) -> tuple[Floats, Floats, Floats]:
     """Points (w, 3) [m], unit normals (w, 3) and frictions (w,) of walls."""
     across = np.array([plane.normal for plane in planes], dtype=float).reshape(-1, 3)
     own = [friction if plane.friction is None else plane.friction for plane in planes]

@@ -170,9 +170,8 @@ def roll_on_rail(
     reach = QUIET * track.elastic_length + track.spacing / 2
     rail, on_rail = draw_roughness_lines(RAIL[roughness.rail], 2 * reach, speed, roughness, [seat])
     turn, levels = 2 * pi * rolling.wheel_radius, WHEEL[roughness.wheel]
-    drawn = [
-        draw_roughness_lines(levels, turn, speed, roughness, [seat, 1 + a]) for a in range(axles)
-    ]
+    seeds = [[seat, 1 + axle] for axle in range(axles)]
+    drawn = [draw_roughness_lines(levels, turn, speed, roughness, seed) for seed in seeds]
     wheel, on_wheel = drawn[0][0], np.stack([lines for _, lines in drawn], axis=1)
 
     def take_force(some: Floats) -> ComplexArray:

@@ -88,9 +88,7 @@ def find_roughness_power(levels: Sequence[float], frequency: Floats, speed: floa
     """
     along = np.log10(speed / frequency)
     level = np.interp(along, np.log10(WAVELENGTHS[::-1]), levels[::-1])
-    return np.asarray(
-        MICROMETRE**2 * 10 ** (level / 10) / (frequency * np.log(10) / 10), np.float64
-    )
+    return np.asarray(MICROMETRE**2 * 10 ** (level / 10) / (frequency * np.log(10) / 10), float)
 
 
 def find_contact_filter(frequency: Floats, speed: float, size: float) -> Floats:

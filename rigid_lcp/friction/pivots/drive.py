@@ -176,15 +176,13 @@ def settle_values(
 
 
 @njit(cache=True)
-def find_driven_change(
-    geometry: Geometry, contact: int, what: int, sense: float, df: Floats
-) -> None:
+def find_driven_change(geometry: Geometry, c: int, what: int, sense: float, df: Floats) -> None:
     """Add the driven force itself to the changes ``df``: f_N with its friction, or f_T (step 2)."""
-    n, t = geometry.normal[contact], geometry.tangent[contact]
+    n, t = geometry.normal[c], geometry.tangent[c]
     if what == NORMAL:
         df[n] = 1.0
         if t >= 0:
-            df[t] = geometry.mu[contact] * geometry.slip[contact]
+            df[t] = geometry.mu[c] * geometry.slip[c]
     elif what == TANGENTIAL:
         df[t] = sense
 

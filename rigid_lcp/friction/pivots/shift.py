@@ -18,12 +18,7 @@ import numpy as np
 
 from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.friction.pivots.drive import DONE, settle_values
-from rigid_lcp.friction.pivots.state import (
-    Pivots,
-    drive_offset,
-    measure_pivots_residual,
-    read_pivots,
-)
+from rigid_lcp.friction.pivots.state import Pivots, drive_offset, measure_residual, read_pivots
 from rigid_lcp.friction.pivots.updates import BREAKING, STATIC, multiply_geometry, refresh_reduced
 from rigid_lcp.friction.problem import FrictionProblem
 
@@ -66,7 +61,7 @@ def remove_shift(problem: FrictionProblem, state: Pivots, tolerance: float, few:
     more slowly.
     """
     exact, best = problem.offset[state.rows], read_pivots(problem, state)
-    least, idle, pace = measure_pivots_residual(problem, state, best), 0, 1.0
+    least, idle, pace = measure_residual(problem, state, best), 0, 1.0
     taken, floor = 0, SHIFT.least * state.unit
     for _ in range(SHIFT.steps if state.shift[0] > 0.0 else 0):
         if idle == SHIFT.patience:
@@ -91,7 +86,7 @@ def remove_shift(problem: FrictionProblem, state: Pivots, tolerance: float, few:
             pace *= 0.5
             continue
         force = read_pivots(problem, state)
-        residual = measure_pivots_residual(problem, state, force)
+        residual = measure_residual(problem, state, force)
         idle = 0 if residual < least else idle + 1
         if least <= tolerance and (taken or not residual < 0.5 * least):
             break
@@ -116,7 +111,7 @@ def find_lists_force(
         settle_values(state.geometry, state.reduced, state.b, nothing, state.f, state.a)
     found = read_pivots(problem, state)
     with np.errstate(over="ignore", invalid="ignore"):  # where eq. 28 is singular but to round-off
-        return found if measure_pivots_residual(problem, state, found) < residual else force
+        return found if measure_residual(problem, state, found) < residual else force
 
 
 def set_lists(state: Pivots, kinds: Ints) -> None:

@@ -153,7 +153,7 @@ def read_pivots(problem: FrictionProblem, state: Pivots) -> Floats:
     return force
 
 
-def measure_pivots_residual(problem: FrictionProblem, state: Pivots, force: Floats) -> float:
+def measure_residual(problem: FrictionProblem, state: Pivots, force: Floats) -> float:
     """Scale-free residual; contacts that slide already have a friction force of known sign."""
     slip = state.geometry.slip
     if not slip.any():
@@ -188,7 +188,7 @@ def judge_pivots(
     ended: int, where: int,
 ) -> FrictionSolution:  # fmt: skip
     """Judge the forces; a ray, or a shift that stays, become ``no solution`` if that is proved."""
-    residual = measure_pivots_residual(problem, state, force)
+    residual = measure_residual(problem, state, force)
     work = {"pivots": float(state.events[0])}
     velocity = problem.velocity(force)
     size = float(np.abs(problem.offset).max(initial=0.0))

@@ -240,9 +240,7 @@ def extrapolate(values: Floats, last: Floats, part: float) -> None:
 
 
 @njit(cache=True)
-def measure_step(
-    origin: Floats, values: Floats, last: Floats, local: Floats
-) -> tuple[float, float]:
+def measure_step(start: Floats, values: Floats, last: Floats, local: Floats) -> tuple[float, float]:
     """``(y - x) . (x - last)`` and ``|y - x|^2`` of a sweep from y to x, weighted with |diag W|.
 
     The first is positive if the sweep went against the way made since ``last``.
@@ -250,7 +248,7 @@ def measure_step(
     product = square = 0.0
     for i in range(values.shape[0]):
         for k in range(values.shape[1]):
-            back = origin[i, k] - values[i, k]
+            back = start[i, k] - values[i, k]
             weight = abs(local[i, k, k])
             product += weight * back * (values[i, k] - last[i, k])
             square += weight * back * back

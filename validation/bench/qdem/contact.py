@@ -28,12 +28,10 @@ MODELS = ("spheres", "surface")
 
 
 def make_cube(
-    cells: int, place: Any = (0, 0, 0), material: q.Material = STONE, name: str = "cube"
+    cells: int, low: Any = (0, 0, 0), material: q.Material = STONE, name: str = "cube"
 ) -> q.Body:
-    """A cube of ``cells**3 * 5`` tetrahedra with its least corner at ``place`` [m]."""
-    return q.Body(
-        make_box_mesh((SIDE,) * 3, (cells,) * 3, "five", tuple(place)), material, name=name
-    )
+    """A cube of ``cells**3 * 5`` tetrahedra with its least corner at ``low`` [m]."""
+    return q.Body(make_box_mesh((SIDE,) * 3, (cells,) * 3, "five", tuple(low)), material, name=name)
 
 
 Case = Callable[[str], tuple[q.Simulation, float]]

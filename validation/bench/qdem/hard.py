@@ -160,9 +160,7 @@ def check_locking(meshes: tuple[Cells, ...], finest_p2: Cells) -> list[Check]:
 
 def make_irregular_cube() -> Problem:
     """An irregular cube of 384 elements, clamped on one side."""
-    return clamp_mesh(
-        jitter_nodes(make_box_mesh((1.0, 1.0, 1.0), (4, 4, 4)), 0.2, seed=1), CONCRETE
-    )
+    return clamp_mesh(jitter_nodes(make_box_mesh((1.0,) * 3, (4, 4, 4)), 0.2, seed=1), CONCRETE)
 
 
 def check_near_critical(steps: int) -> list[Check]:

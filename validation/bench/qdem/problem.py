@@ -99,9 +99,8 @@ class Problem:
             if single.any():
                 run.fix(body, single, letter)
         if isinstance(amplitude, Series):
-            run.load(
-                body, self.loaded, Series(amplitude.times, np.outer(amplitude.values, self.force))
-            )
+            force = Series(amplitude.times, np.outer(amplitude.values, self.force))
+            run.load(body, self.loaded, force)
         elif amplitude is not None:
             run.load(body, self.loaded, self.force)
         return body, run

@@ -160,14 +160,12 @@ def find_touching(
         int((centre[:, 2].max() + cell) / cell) + 1,
     )  # fmt: skip
     head = np.full(shape, -1)
-    following = np.full(count, -1)
+    behind = np.full(count, -1)
     pairs = np.zeros((count * (8 if planar else 14), 2), dtype=np.int64)
     found = 0
     near = np.zeros(512, dtype=np.int64)
     for i in range(count):
-        number = find_pairs(
-            centre[i], radius[i] + margin, radius, centre, head, following, cell, near
-        )
+        number = find_pairs(centre[i], radius[i] + margin, radius, centre, head, behind, cell, near)
         for index in range(number):
             pairs[found, 0], pairs[found, 1] = i, near[index]
             found += 1
@@ -182,6 +180,6 @@ def find_touching(
                 pairs[found, 0], pairs[found, 1] = i, -3 - 2 * axis
                 found += 1
         x, y, z = find_cell(centre[i], cell, head.shape)
-        following[i] = head[x, y, z]
+        behind[i] = head[x, y, z]
         head[x, y, z] = i
     return pairs[:found]

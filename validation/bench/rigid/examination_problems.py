@@ -27,12 +27,7 @@ from validation.bench.rigid.examination_beds import (
     require_bodies,
     vary_load,
 )
-from validation.bench.rigid.friction_problems import (
-    NamedProblem,
-    change_problem,
-    list_stored,
-    list_suite,
-)
+from validation.bench.rigid.friction_problems import NamedProblem, list_stored, list_suite, vary
 from validation.bench.rigid.packings import pose_step
 from validation.bench.rigid.walls import MASSES, build_wall, count_bricks, draw_masses
 
@@ -103,7 +98,7 @@ def pose_suite(generator: Generator, index: int) -> Posed:
 
 def change(posed: Posed, generator: Generator) -> Posed:
     """Another order, q and friction."""
-    made = change_problem(posed.problem, generator)
+    made = vary(posed.problem, generator)
     return replace(posed, problem=made, recipe=f"{posed.recipe}, changed")
 
 

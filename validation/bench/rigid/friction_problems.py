@@ -111,10 +111,10 @@ def list_unseen(seeds: Iterable[int] = (1, 2)) -> list[NamedProblem]:
 
 
 def _change(each: NamedProblem, seed: int) -> FrictionProblem:
-    return change_problem(each.make(), np.random.default_rng(seed))
+    return vary(each.make(), np.random.default_rng(seed))
 
 
-def change_problem(problem: FrictionProblem, generator: np.random.Generator) -> FrictionProblem:
+def vary(problem: FrictionProblem, generator: np.random.Generator) -> FrictionProblem:
     """Another order of contacts, other friction, and q with noise; W stays that of real bodies.
 
     With bodies the noise is one of their velocities, so that q stays in the image of J.

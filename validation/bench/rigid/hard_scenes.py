@@ -102,9 +102,8 @@ def stack_cards(storeys: int, phi: float, mu: float) -> Simulation:
                 scene.add(Polygon(outline + np.array([x, base])), density=DENSITY)
             if k:
                 centre = (x - pitch / 2, base + 1 + slab / 2)
-                scene.add(
-                    Polygon.rectangle(pitch - wide / 2, slab), density=DENSITY, position=centre
-                )
+                shape = Polygon.rectangle(pitch - wide / 2, slab)
+                scene.add(shape, density=DENSITY, position=centre)
     scene.add(FLOOR, friction=mu)
     for number, body in enumerate(scene.bodies):
         scene.bodies[number] = replace(body, friction=mu)

@@ -191,9 +191,8 @@ def build_arch(stones: int, thickness: float, *, mu: float = 2.0, step: float = 
     scene = Scene(2)
     for k in range(stones):
         a, b = points[k], points[k + 1]
-        scene.add(
-            Polygon([inner * a, outer * a, outer * b, inner * b]), density=DENSITY, friction=mu
-        )
+        stone = Polygon([inner * a, outer * a, outer * b, inner * b])
+        scene.add(stone, density=DENSITY, friction=mu)
     scene.add(FLOOR)
     return Simulation(scene, step=step)
 

@@ -149,9 +149,8 @@ def edit_law(engine: str, law: str, text: str) -> str:
     if engine == "lammps":
         if not damps:
             text = re.sub(r"(tangential mindlin\S* \S+) \S+", r"\1 0.0", text)
-        return text.replace(
-            "coeff_restitution", "coeff_restitution" + " limit_damping" * (not pulls)
-        )
+        key = "coeff_restitution"
+        return text.replace(key, key + " limit_damping" * (not pulls))
     return text if damps else re.sub(r'("damping_tangential": )[^,}]+', r"\g<1>0.0", text)
 
 

@@ -100,11 +100,9 @@ class Figures:
     """Settlement after cycles 0, 1, ..., `CYCLES` [m]."""
 
 
-def load_bed(seed: int, *settings: str) -> Scene:
+def load_bed(seed: int, *extra: str) -> Scene:
     """The coarse scene of a seed under `SETTINGS` and more."""
-    return load_scene(
-        find_scene_file("karrech-coarse"), [*SETTINGS, f"sample.seed={seed}", *settings]
-    )
+    return load_scene(find_scene_file("karrech-coarse"), [*SETTINGS, f"sample.seed={seed}", *extra])
 
 
 def measure(window: Window, start: FloatArray, scene: Scene) -> Figures:

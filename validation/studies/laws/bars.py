@@ -20,14 +20,12 @@ def check_bars(rows: Sequence[dict[str, Any]]) -> list[Check]:
     checks = []
     for source in ("ballast", "families"):
         auto = found[source]["auto"]
-        for words, key, bar in (
+        for text, key, bar in (
             ("median error", "error", ERROR),
             ("90th percentile of the error", "error_90", ERROR_90),
         ):
             value = auto[key]
-            checks.append(
-                Check(f"{source}: {words}", value, f"<= {bar:g}", value <= bar, page=PAGE)
-            )
+            checks.append(Check(f"{source}: {text}", value, f"<= {bar:g}", value <= bar, page=PAGE))
         value = auto["coverage"]
         name = f"{source}: share of cases whose 90 % band holds the truth"
         checks.append(Check(name, value, f">= {COVERAGE:g}", value >= COVERAGE, page=PAGE))

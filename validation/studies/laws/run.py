@@ -92,11 +92,8 @@ def list_predictors() -> dict[str, Callable[[LawCase], float]]:
 def summarise(errors: Iterable[float]) -> Row:
     """Median and 90th percentile of absolute errors."""
     size = np.abs(np.array(list(errors)))
-    return {
-        "cases": len(size),
-        "error": float(np.median(size)),
-        "error_90": float(np.quantile(size, 0.9)),
-    }
+    middle, high = float(np.median(size)), float(np.quantile(size, 0.9))
+    return {"cases": len(size), "error": middle, "error_90": high}
 
 
 def judge_auto(cases: Sequence[LawCase]) -> list[Row]:

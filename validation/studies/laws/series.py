@@ -153,16 +153,14 @@ def draw_fast_families(random: np.random.Generator) -> dict[str, Curve]:
     }
 
 
-def read_off(
-    curve: Curve, last: float, random: np.random.Generator
-) -> tuple[FloatArray, FloatArray]:
+def read_off(curve: Curve, last: float, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
     """Cycles and readings: about seven a decade, with `READING` and `DIGIT` errors."""
-    gap = random.uniform(0.15, 0.5, 100).cumsum()
+    gap = rng.uniform(0.15, 0.5, 100).cumsum()
     cycle = np.exp(np.append(0.0, gap))
     cycle = cycle[cycle <= last]
     exact = np.asarray(curve(cycle), float)
     size = float(np.ptp(exact))
-    read = exact + READING * size * random.standard_normal(len(cycle))
+    read = exact + READING * size * rng.standard_normal(len(cycle))
     return cycle, np.round(read / (DIGIT * size)) * DIGIT * size
 
 

@@ -66,7 +66,5 @@ def check_bars(rows: Sequence[dict[str, Any]]) -> list[Check]:
     checks.append(Check("log: share of jumps nearer than nothing moved", share, ">= 0.9",
                         share >= 0.9, page=PAGE, why=why))  # fmt: skip
     left = overlap["karrech2007"] / overlap["estimate"]
-    return [
-        *checks,
-        Check("cell: overlap left by eq. 29", left, "<= 0.01", left <= 0.01, page=PAGE),
-    ]
+    checks.append(Check("cell: overlap left by eq. 29", left, "<= 0.01", left <= 0.01, page=PAGE))
+    return checks

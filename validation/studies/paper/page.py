@@ -57,9 +57,7 @@ def draw(rows: Sequence[Row], picture: Path) -> None:
     ):  # fmt: skip
         axis = axes[row, column]
         for number, k in enumerate(LENGTHS):
-            line = sorted(
-                (one["h"], one["errors"]) for one in jumps if (one["k_i"], one["k"]) == (k_i, k)
-            )
+            line = sorted((j["h"], j["errors"]) for j in jumps if (j["k_i"], j["k"]) == (k_i, k))
             h = [place for place, _ in line]
             axis.plot(h, [100 * e[NOTHING][0] for _, e in line], color="0.75", lw=0.8)
             axis.plot(h, [100 * e[law][0] for _, e in line], "o-", color=f"C{number}", ms=3,

@@ -55,9 +55,8 @@ def prepare_bed(seed: int) -> tuple[Scene, Motion]:
     seeds = [f"grains.{k}.seed={seed + 1000 * k}" for k in range(3)]
     file = load_scene(SCENE, seeds)
     scene = build_scene(file)
-    run = Simulation(
-        scene, step=PREPARED_STEP, tolerance=PREPARED_TOLERANCE, loads=make_loads(file)
-    )
+    loads = make_loads(file)
+    run = Simulation(scene, step=PREPARED_STEP, tolerance=PREPARED_TOLERANCE, loads=loads)
     run.advance(TAMPED)
     return scene, replace_rates(run.motion, 0 * run.motion.rates)
 

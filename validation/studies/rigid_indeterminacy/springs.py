@@ -118,12 +118,8 @@ def advance_springs(
                 nx, ny = (ax - bx) / distance, (ay - by) / distance
                 gap = distance - radius_a[c] - radius_b[c]
             px, py = ax - (radius_a[c] + 0.5 * gap) * nx, ay - (radius_a[c] + 0.5 * gap) * ny
-            rax, ray, rbx, rby = (
-                px - state[a, 0],
-                py - state[a, 1],
-                px - state[b, 0],
-                py - state[b, 1],
-            )
+            rax, ray = px - state[a, 0], py - state[a, 1]
+            rbx, rby = px - state[b, 0], py - state[b, 1]
             ux = state[a, 3] - state[a, 5] * ray - state[b, 3] + state[b, 5] * rby
             uy = state[a, 4] + state[a, 5] * rax - state[b, 4] - state[b, 5] * rbx
             push = max(-kn * gap - dashpot * (ux * nx + uy * ny), 0.0) if gap < 0.0 else 0.0

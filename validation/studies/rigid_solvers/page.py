@@ -79,9 +79,7 @@ def _describe_bars(rows: Sequence[Row]) -> str:
     words = f"Of {len(barred)} bars {len(barred) - len(missed)} are met."
     value = {check.name: f"{check.value:.3g}" for check in missed}
     value |= {check.name: "ours does not reach it" for check in missed if check.value >= ENDLESS}
-    lines = [
-        f"- {check.name}: {value[check.name]}, bar {check.asked}; {check.why}" for check in missed
-    ]
+    lines = [f"- {one.name}: {value[one.name]}, bar {one.asked}; {one.why}" for one in missed]
     return "\n".join([words + " Missed:" * bool(missed), *([""] if missed else []), *lines])
 
 
