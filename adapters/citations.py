@@ -12,6 +12,21 @@ CITATIONS = (
   volume  = {197}, number = {1--4}, pages = {80--94}, year = {2007},
   doi     = {10.1016/j.cma.2007.07.011}
 }"""),
+    ("viscoelastic bodies and the ballasted track (qdem)", r"""@article{nishiura2017,
+  author  = {Nishiura, Daisuke and Sakaguchi, Hide and Aikawa, Akira},
+  title   = {Development of viscoelastic multi-body simulation and impact response analysis of a
+             ballasted railway track under cyclic loading},
+  journal = {Materials},
+  volume  = {10}, number = {6}, pages = {615}, year = {2017},
+  doi     = {10.3390/ma10060615}
+}"""),
+    ("rigid grains (rigid)", r"""@incollection{schwager2002,
+  author    = {Schwager, Thomas and P{\"o}schel, Thorsten},
+  title     = {Rigid body dynamics of railway ballast},
+  booktitle = {System Dynamics of Long-Term Behaviour of Railway Vehicles, Track and Subgrade},
+  editor    = {Popp, K. and Schiehlen, W.},
+  series    = {Lecture Notes in Applied Mechanics}, publisher = {Springer}, year = {2002}
+}"""),
     ("the engine LIGGGHTS", r"""@article{kloss2012,
   author  = {Kloss, Christoph and Goniva, Christoph and Hager, Alice and Amberger, Stefan and
              Pirker, Stefan},

@@ -16,7 +16,14 @@ from pathlib import Path
 from typing import Any
 
 from trackbed.errors import UsageError
-from trackbed.run_files import MANIFEST, RESULT, is_written, read_object, refuse_format
+from trackbed.run_files import (
+    MANIFEST,
+    RESULT,
+    is_written,
+    read_object,
+    refuse_format,
+    refuse_links,
+)
 
 RUN_VERBS = ("status", "report", "export", "resume")
 
@@ -58,6 +65,8 @@ def choose_command(arguments: argparse.Namespace) -> Callable[[argparse.Namespac
     command: Callable[[argparse.Namespace], int] = arguments.command
     if arguments.verb not in RUN_VERBS:
         return command
+    refuse_links(arguments.run_folder)
+    refuse_links(arguments.run_folder / getattr(arguments, "variant", ""))
     kind = find_kind(arguments.run_folder)
     if kind is None or not kind.states:
         return command

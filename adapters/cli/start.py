@@ -44,6 +44,7 @@ def run_doctor(arguments: argparse.Namespace) -> int:
 
 def run_new(arguments: argparse.Namespace) -> int:
     """Copy a shipped scene to FOLDER/scene.toml; a scene that is there already is kept."""
+    from trackbed.run_files import refuse_writing
     from trackbed.scene_files import suggest_word
     from trackbed.scenes import find_scene_verb, list_scenes, read_template
 
@@ -51,7 +52,8 @@ def run_new(arguments: argparse.Namespace) -> int:
     if arguments.name not in names:
         raise UsageError(f"there is no scene {arguments.name}{suggest_word(arguments.name, names)}")
     path: Path = arguments.folder / "scene.toml"
-    path.parent.mkdir(parents=True, exist_ok=True)
+    with refuse_writing(path.parent):
+        path.parent.mkdir(parents=True, exist_ok=True)
     try:
         with path.open("x", encoding="utf-8") as stream:
             stream.write(read_template(arguments.name))

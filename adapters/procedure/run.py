@@ -21,7 +21,7 @@ from adapters.procedure.fixed import settle_fixed
 from adapters.procedure.progress import Progress
 from adapters.procedure.stages import Bed, Clock, Run, Variant
 from adapters.scene import Scene, load_scene
-from trackbed.run_files import list_differences, record_provenance, write_whole
+from trackbed.run_files import list_differences, record_provenance, refuse_writing, write_whole
 
 OWN_FILES = ("lock", "scene.toml", "load_series.csv", "dry_run")
 """What may be in a run folder before its manifest is written."""
@@ -204,7 +204,8 @@ def _write_dry_run(scene: Scene, run_path: Path) -> None:
     """Write the decks of the rain of grains and print the command that runs them."""
     engine = get_engine(scene.engine.name)
     folder = run_path / "dry_run"
-    folder.mkdir(parents=True, exist_ok=True)
+    with refuse_writing(run_path):
+        folder.mkdir(parents=True, exist_ok=True)
     radius = draw_radii(scene.sample.grain_radius.law, scene.grain_count, scene.sample.seed)
     position, height = draw_sample_start(
         radius, scene.container, scene.sample.relative_density_start, scene.sample.seed

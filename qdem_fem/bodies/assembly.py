@@ -222,7 +222,7 @@ class Assembly:
         return arrays
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Take the state that `stored` gave, under the same conditions."""
+        """Take the state that `pack_state` gave, under the same conditions."""
         fields = {name: arrays[name].astype(float) for name in FIELDS}
         if self.frames is not None:
             frames = {name: arrays[f"frame_{name}"].copy() for name in FRAME_ARRAYS}

@@ -128,7 +128,7 @@ class Contacts(ABC):
 
     @abstractmethod
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Take what `stored` gave."""
+        """Take what `pack_state` gave."""
 
     # --- for the time step ---------------------------------------------------------------------
 

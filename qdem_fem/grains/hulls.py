@@ -55,11 +55,11 @@ class GrainRecipe:
     """
 
     sphericity: float = 0.82
-    """psi, `qdem_fem.grains.find_sphericity` [-]."""
+    """psi, `find_sphericity` [-]."""
     sphericity_scatter: float = 0.03
     """Half the width of the uniform distribution of psi over the grains [-]."""
     roundness: float = 0.68
-    """`qdem_fem.grains.find_roundness` [-], about 0.62 to 0.85 at this mesh size."""
+    """`find_roundness` [-], about 0.62 to 0.85 at this mesh size."""
     roundness_scatter: float = 0.03
     corners: tuple[int, int] = (8, 9)
     """Fewest and most corners M; a grain has 8 (2 M - 4) tetrahedra and 5 M - 5 nodes."""
@@ -93,7 +93,7 @@ class GrainForm:
     """Triangles of the hull of the M corners, (2 M - 4, 3), outward."""
     nodes: Floats
     """M corners, the middle of every edge of `find_surface_edges` of ``corner_faces``, and the
-    inner nodes of `qdem_fem.grains.place_apex_and_spokes`; centroid at zero, (5 M - 5, 3)."""
+    inner nodes of `place_apex_and_spokes`; centroid at zero, (5 M - 5, 3)."""
     sphericity: float
     roundness: float
 

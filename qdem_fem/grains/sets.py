@@ -37,7 +37,7 @@ class GrainSet:
     corner_faces: Integers
     """Triangles of their corners, (sum of 2 M - 4, 3), by the numbers within the grain."""
     sizes: Floats
-    """`qdem_fem.grains.find_sieve_size` [m], (g,)."""
+    """`find_sieve_size` [m], (g,)."""
     sphericity: Floats
     roundness: Floats
 

@@ -185,7 +185,7 @@ class Damping:
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> Damping:
-        """What `stored` gave."""
+        """What `pack_state` gave."""
         given: list[Any] = [arrays[field.name] for field in fields(cls)]
         return cls(*(value if value.ndim else value.item() for value in given))
 

@@ -199,7 +199,7 @@ class RigidBodies:
         return {f"rigid_{name}": getattr(self._every, name) for name in STATE}
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Take what `stored` gave."""
+        """Take what `pack_state` gave."""
         for name in STATE:
             getattr(self._every, name)[:] = arrays[f"rigid_{name}"]
 

@@ -75,7 +75,7 @@ class Bed:
     displacement: Floats
     """Of all nodes [m], (n, 3)."""
     contact: dict[str, NDArray[Any]]
-    """Pairs and springs, as `Contacts.stored` gives them; empty before the last stage."""
+    """Pairs and springs, as `Contacts.pack_state` gives them; empty before the last stage."""
     rests: dict[str, dict[str, float]]
     """`qdem_fem.march.kinetic_damping.Rest` of each stage done, and its ``cpu_s``."""
     stands: dict[str, dict[str, Any]] = field(default_factory=dict)

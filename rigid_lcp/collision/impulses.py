@@ -84,7 +84,7 @@ class Collision:
     energy_change: float
     """Kinetic energy after less before [J]; with ``drive``, without the work of those walls."""
     residual: float
-    """Largest error of the rounds (`round_error`) [-]."""
+    """Largest error of the rounds (`find_round_error`) [-]."""
     status: Status
     rounds: int
     """Rounds until no contact approached."""

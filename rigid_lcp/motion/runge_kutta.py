@@ -106,7 +106,7 @@ class Rate:
     acceleration: Floats
     """Relative, (nc, dim) [m/s^2]."""
     residual: float = 0.0
-    """Error of the forces (`forces_error`) [-]."""
+    """Error of the forces (`find_forces_error`) [-]."""
 
 
 def advance_runge_kutta(

@@ -88,7 +88,7 @@ class Step:
     motion: Motion
     contacts: ContactForces
     residual: float
-    """Error of the impulses (scale-free natural residual), see `forces_error` [-]."""
+    """Error of the impulses (scale-free natural residual), `find_forces_error` [-]."""
     message: str = ""
     """What the solver has to say of impulses that it did not find."""
     scaled: bool = False

@@ -110,7 +110,7 @@ class ElasticNetwork:
         self.load = float(np.linalg.norm(free)) or 1.0
         self.newton_steps = 0
         self.force = np.zeros(jacobian.shape[0])
-        """Forces of the last `friction_step`, where the next begins."""
+        """Forces of the last `find_friction_step`, where the next begins."""
 
     @cached_property
     def delassus(self) -> sp.csr_array:

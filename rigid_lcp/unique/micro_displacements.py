@@ -45,7 +45,7 @@ from rigid_lcp.friction.problem import BodySpace, FrictionProblem, Status, find_
 from rigid_lcp.unique.elastic_network import find_spring_forces
 
 ForceLaw = Callable[[Floats, Floats, Floats], Floats]
-"""Eq. 38: ``law(deformation, stiffness, friction) -> force``, see `coulomb_spring`."""
+"""Eq. 38: ``law(deformation, stiffness, friction) -> force``, see `find_spring_forces`."""
 
 
 @dataclass(frozen=True)

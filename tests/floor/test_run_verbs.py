@@ -70,6 +70,20 @@ def test_what_a_story_has_no_verb_for_is_a_sentence(
     assert "\n  -> " in shown
 
 
+@pytest.mark.parametrize("words", [["status"], ["report"], ["export", "--to", "csv"], ["resume"]])
+def test_links_are_refused_by_every_verb(
+    words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What would be written to ``export`` or ``figures`` would follow a link out of the folder."""
+    (tmp_path / "mine").mkdir()
+    for name in ("export", "figures"):
+        folder = folder_of("rigid", tmp_path / f"run-{name}")
+        (folder / name).symlink_to(tmp_path / "mine")
+        assert main([words[0], str(folder), *words[1:]]) == 2
+        assert f"symbolic link ({name})" in capsys.readouterr().err
+    assert not list((tmp_path / "mine").iterdir())
+
+
 @pytest.mark.parametrize("kind", SCENES)
 def test_report_of_a_finished_run_is_shown(
     kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -347,14 +347,13 @@ def check_verbs(house: House) -> Iterator[Breach]:
 def check_references(house: House) -> Iterator[Breach]:
     """What a docstring of the product refers to, as in `House`, has that name somewhere in it."""
     known = set(re.findall(r"\w+", " ".join(house.modules.values())))
-    documented: list[tuple[str, int, str]] = []
+    texts: list[tuple[str, int, str]] = []
     for file, tree in house.trees.items():
         for node in ast.walk(tree):
             known.update(value for _, value in ast.iter_fields(node) if isinstance(value, str))
-            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
-                place = getattr(node, "lineno", 1)
-                documented.append((file, place, ast.get_docstring(node) or ""))
-    for file, line, text in documented:
+            if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+                texts.append((file, node.lineno, str(node.value.value)))
+    for file, line, text in texts:
         for name in re.findall(r"(?<!`)`([A-Za-z_][\w.]*)`(?!`)", text):
             if name.split(".")[-1] not in known and not name.startswith(("scipy.", "skfem.")):
                 yield Breach(file, line, "references", f"there is no {name}")

@@ -249,11 +249,11 @@ def test_fit_of_too_few_cycles_names_file_and_flags(
 
 
 def test_cite_is_bibtex(capsys: pytest.CaptureFixture[str]) -> None:
-    """``cite`` prints balanced BibTeX entries for method, engine and trackbed itself."""
+    """``cite`` prints balanced BibTeX entries for methods, engine and trackbed itself."""
     assert main(["cite"]) == 0
     text = capsys.readouterr().out
     assert text.count("{") == text.count("}")
-    for word in ("@article{karrech2007", "10.1016/j.cma.2007.07.011", "@article{kloss2012"):
+    for word in ("karrech2007", "10.1016/j.cma.2007.07.011", "nishiura2017", "schwager2002"):
         assert word in text
     assert f"version = {{{trackbed.__version__}}}" in text
 

@@ -27,7 +27,7 @@ FORMAT = 1
 
 def refuse_links(path: Path) -> None:
     """Raise `UsageError` if the folder holds a symbolic link: what writes there would follow it."""
-    with suppress(FileNotFoundError), os.scandir(path) as entries:
+    with suppress(FileNotFoundError, NotADirectoryError), os.scandir(path) as entries:
         links = sorted(entry.name for entry in entries if entry.is_symlink())
         if links:
             raise UsageError(

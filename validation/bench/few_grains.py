@@ -81,7 +81,7 @@ def find_shear_modulus(scene: Scene) -> float:
 
 
 TrackRun = Callable[..., Track]
-"""Runs a few grains on an engine, with the arguments of `track_run`, which does on LIGGGHTS."""
+"""Runs a few grains on an engine, with the arguments of `run_grains`, which does on LIGGGHTS."""
 
 
 def run_grains(

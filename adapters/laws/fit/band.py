@@ -32,7 +32,7 @@ def estimate_prediction_band(
     correlation; the fit is repeated on such series, and the scatter of its prediction is widened
     by Student's t for the effective number of cycles.
 
-    As in `fit_auto.find_outlook` it never reaches back beyond the last value by more than that
+    As in `find_outlook` it never reaches back beyond the last value by more than that
     reading's own error: a bed that has settled, and goes on by the law, does not rise, however
     badly it fits.
 

@@ -100,7 +100,7 @@ def fit_auto(
     series: Series, to_cycle: float, probability: float = 0.9, fail_at: float | None = None
 ) -> Prediction:
     """Predict the settlement at ``to_cycle`` from the slow laws together; see
-    `fit_auto.find_outlook`.
+    `find_outlook`.
 
     ``parameters`` of the result: ``exponent`` beta of the tail with its deviation, which the
     regime follows from, and under each law's name the settlement that it alone predicts (the

@@ -55,7 +55,7 @@ def make_slivers(altitude: float, cells: int = 4) -> tuple[Floats, Integers]:
 
 
 SLIVER_STEP = {0.3: 0.83, 0.1: 0.51, 0.03: 0.28, 0.01: 0.16}
-"""Critical step of `box_with_sliver` over that of the undisturbed mesh, by altitude."""
+"""Critical step of `make_slivers` over that of the undisturbed mesh, by altitude."""
 
 
 def make_graded(ratio: float, cells: int = 12) -> tuple[Floats, Integers]:

@@ -22,7 +22,7 @@ from validation.bench.qdem.problem import Problem, find_tip_node, make_smooth_st
 from validation.case import Check
 
 TIP_P2 = 92.655e-6
-"""Tip by quadratic tetrahedra, 72 x 8 x 8 cells (`qdem_judge.cantilever_p2`) [m]."""
+"""Tip by quadratic tetrahedra, 72 x 8 x 8 cells (`find_tip_p2`) [m]."""
 TIP_PAPER = 91.94e-6
 """Tip that the paper gives for 488,361 elements, QDEM and FEM alike [m]."""
 TIP_EQ_12 = 92.32156

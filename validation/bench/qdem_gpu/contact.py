@@ -161,7 +161,7 @@ MARCHES: dict[str, dict[str, Any]] = {
     "images restored": {"skin": 1e-3, "periodic": True, "restored": True},
     "a step for what is near": {"skin": 2e-4, "contacts": "near"},
 }
-"""What `contact_apart` is asked, by name."""
+"""What `compare_contacts` is asked, by name."""
 
 
 def compare_contacts() -> dict[str, float]:

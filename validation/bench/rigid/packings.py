@@ -49,7 +49,7 @@ class Bed:
     dim: int
     friction: float
     pairs: Integers
-    """Touching grains (nc, 2), see `pairs_touching`."""
+    """Touching grains (nc, 2), see `keep_touching`."""
     impulse: Floats
     """World impulses on the first of each pair in a step of 1 s, (nc, 3) [N s]."""
     unrest: float

@@ -48,8 +48,8 @@ Impulses = dict[str, list[float]]
 """Friction impulses over m* V_n that an engine gave, by setting."""
 
 SLIDES_FROM = 1.4
-"""Share of `sliding_begins` from which the sliding limit is asked for: below it the time in which
-the spring is first stretched still shows (1.6 % here, falling with the slip)."""
+"""Share of `find_sliding_start` from which the sliding limit is asked for: below it the time in
+which the spring is first stretched still shows (1.6 % here, falling with the slip)."""
 
 ORDER_STEPS = (100, 200, 400)
 ORDER_PHASES = 16

@@ -79,7 +79,7 @@ class SoftGrains:
     step: float
     """[s]"""
     contacts: tuple[Ints, Floats, Floats]
-    """Bodies (nc, 2), numbers (nc, 7) as in `pair_contacts`, forces (nc, 2) (n, t) [N], last."""
+    """Bodies (nc, 2), numbers (nc, 7) as in `find_pair_contacts`, last forces (nc, 2) [N]."""
     damping: float = DAMPING
     """Share of critical damping of a contact [-]."""
     work: float = 0.0
