@@ -64,7 +64,7 @@ def compute_stored_energy(
 
 
 def find_stress_numbers(h: Nine, lame_first: Any, lame_second: Any, half: Any) -> tuple[Nine, Any]:
-    """``P = T cof F`` with ``T = lambda tr(eps) I + 2 mu eps``, ``eps = (B - I)/2`` (eqs. 2-4).
+    """``P = T cof F`` with ``T = lambda tr(eps) I + 2 mu eps``, ``eps = (B - I)/2`` (eqs 2-4).
 
     Since ``B cof F = J F``, with ``K = H^T - cof H``, ``II = tr cof H``, ``III = det H``::
 
@@ -108,7 +108,7 @@ def find_fused_pulls(
     """Pulls of `find_stress_numbers` and `find_viscous_stress` together, with less work.
 
     With ``c_a = cof(F) grad N_a``, which is ``J`` times the gradient in the current
-    configuration: ``J L = sum_a w_a (x) c_a`` (eq. 5) and ``f_a = -V0 T c_a`` (eqs. 8-10).
+    configuration: ``J L = sum_a w_a (x) c_a`` (eq. 5) and ``f_a = -V0 T c_a`` (eqs 8-10).
     ``w``: edges of the velocity [m/s], as the edges of `compute_element_gradient`.  Returns the
     pulls, ``J`` and the power that viscosity takes, ``V0 J T_D : D`` [W].
     """

@@ -38,7 +38,7 @@ def compute_element_gradient(e: Nine, g: Nine) -> Nine:
 
 
 def compute_element_pulls(p: Nine, g: Nine) -> Nine:
-    """``P grad N_a`` of corners 1, 2, 3: what eqs. 9 and 10 sum up, with the sign turned.
+    """``P grad N_a`` of corners 1, 2, 3: what eqs 9 and 10 sum up, with the sign turned.
 
     The force on corner a is minus this; that on corner 0 is the sum of the three.
     """
@@ -58,7 +58,7 @@ def compute_element_pulls(p: Nine, g: Nine) -> Nine:
 def find_viscous_stress(
     h: Nine, d: Nine, viscous_first: Any, viscous_second: Any, half: Any
 ) -> Nine:
-    """``P = T_D cof F`` with ``T_D = lambda_D tr(D) I + 2 mu_D D``, ``L = Hdot F^-1`` (eqs. 5-7).
+    """``P = T_D cof F`` with ``T_D = lambda_D tr(D) I + 2 mu_D D``, ``L = Hdot F^-1`` (eqs 5-7).
 
     ``d``: rate of the displacement gradient [1/s]; viscosities [Pa s].  With ``C = cof F``,
     ``L = Hdot C^T / J``.

@@ -50,7 +50,7 @@ class Mesh(Table):
 
 
 class MaterialTable(Table):
-    """Isotropic linear viscoelastic material (eqs. 7-8)."""
+    """Isotropic linear viscoelastic material (eqs 7-8)."""
 
     young: Positive
     """Young's modulus [Pa]."""

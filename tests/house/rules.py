@@ -353,6 +353,12 @@ def check_references(house: House) -> Iterator[Breach]:
             known.update(value for _, value in ast.iter_fields(node) if isinstance(value, str))
             if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
                 texts.append((file, node.lineno, str(node.value.value)))
+    page = house.root / "docs" / "equations.md"
+    for number, row in enumerate(page.read_text().splitlines() if page.exists() else (), 1):
+        texts.append(("docs/equations.md", number, re.sub(r"`\S*[/-]\S*`|`\w+\.py`", "", row)))
+        for path in re.findall(r"`(\w+/[\w/.]+)`", row):
+            if not (house.root / path).exists():
+                yield Breach("docs/equations.md", number, "references", f"there is no {path}")
     for file, line, text in texts:
         for name in re.findall(r"(?<!`)`([A-Za-z_][\w.]*)`(?!`)", text):
             if name.split(".")[-1] not in known and not name.startswith(("scipy.", "skfem.")):

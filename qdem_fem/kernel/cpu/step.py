@@ -1,4 +1,4 @@
-"""The compiled time step: forces of the elements (eqs. 1-11), then the motion of the nodes.
+"""The compiled time step: forces of the elements (eqs 1-11), then the motion of the nodes.
 
 Elements are worked on in chunks, each with its own window of nodal forces
 (`qdem_fem.kernel.cpu.layout`), so that threads never write to the same place; the order of all sums
@@ -123,7 +123,7 @@ def add_chunk_forces(
     law: Any, viscous: Any, corners: Any, rows: Any, first_block: int, stop_block: int,
     displacement: Any, velocity: Any, forces: Any, shift: int,
 ) -> tuple[float, float]:  # fmt: skip
-    """Forces of the blocks of elements of one chunk (eqs. 1-10), added to its window.
+    """Forces of the blocks of elements of one chunk (eqs 1-10), added to its window.
 
     ``displacement`` [m], ``velocity`` [m/s], ``forces`` [N]: flat, four numbers a node.
     Returns how many of its elements are inverted or not finite, and the power that viscosity

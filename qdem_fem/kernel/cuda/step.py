@@ -1,6 +1,6 @@
 """The time step on a GPU: the twin of `qdem_fem.kernel.cpu.step`, from the same element functions.
 
-A step is two launches.  `build_element_forces`: one thread an element, forces of eqs. 1-10 added
+A step is two launches.  `build_element_forces`: one thread an element, forces of eqs 1-10 added
 to the nodes by atomics.  `build_node_motion`: one thread a node, which does all that happens to
 it, loads, velocity Verlet, rollers, given displacements and probes, each written once below.  The
 launches of a window follow each other in the order of the stream; nothing waits for the host.
@@ -133,7 +133,7 @@ def build_element_forces(strain: Strain, viscous: bool) -> Any:
         corners: Any, rows: Any, displacement: Any, velocity: Any, forces: Any, status: Any,
         taken: Any, half: Any, step: Any, k: Any,
     ) -> None:  # fmt: skip
-        """Add the forces of all elements to their nodes (eqs. 1-10) and count the bad ones.
+        """Add the forces of all elements to their nodes (eqs 1-10) and count the bad ones.
 
         ``corners`` (4, m): 4 x node number; ``rows`` (11 or 13, m): gradients [1/m], then
         stiffnesses and viscosities times volume; fields flat, four numbers a node; ``taken``
