@@ -102,7 +102,8 @@ def print_fields(content: dict[str, Any], as_json: bool) -> None:
         print(json.dumps(content, indent=2, allow_nan=False))
     else:
         for key, value in content.items():
-            print(f"{key.replace('_', ' '):28}{value}")
+            shown = f"{value:.6g}" if isinstance(value, float) else value
+            print(f"{key.replace('_', ' '):28}{'-' if shown in (None, '') else shown}")
 
 
 def show_page(path: Path, open_it: bool) -> None:
