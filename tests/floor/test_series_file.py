@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from math import pi
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -34,6 +35,17 @@ def columns(path: Path, text: str, names: tuple[str, str] = ("time", "p")) -> li
 def test_units_and_separators(tmp_path: Path, text: str) -> None:
     """Behind names, in brackets, in a row below; without one numbers are in SI units."""
     assert columns(tmp_path / "a.csv", text) == [[0.0, 0.5], pytest.approx([1e3, 2e3])]
+
+
+def test_units_are_what_they_are_named_after() -> None:
+    """Every one: 36 km/h are 10 m/s, a day of 24 h has 86,400 s, half a turn of 180 deg is pi."""
+    known = {
+        1: "s m N Pa m/s m/s2 m/s^2 rad rad/s Hz - 1", 1e-3: "ms mm mm/s", 1e-6: "us µs um µm",
+        1e-2: "cm %", 60: "min", 86400 / 24: "h", 1e3: "kN kPa", 1e6: "MN MPa", 1e9: "GPa",
+        10 / 36: "km/h", pi / 180: "deg °", 9.80665: "g",
+    }  # fmt: skip
+    expected = {unit: value for value, units in known.items() for unit in units.split()}
+    assert pytest.approx(expected, rel=1e-15, abs=0) == SI
 
 
 @pytest.mark.parametrize(

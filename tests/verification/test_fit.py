@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.special import stdtrit
 
 from adapters.bed.state import FloatArray
 from adapters.errors import JumpRefused, NotConverged, UsageError
@@ -116,6 +117,20 @@ def test_fit_noise_covers_correlated_residuals(correlation: float, reach: float)
         half = estimate_fit_noise(LOG, cycle, settlement, 60.0 + step, 0.9)
         inside += abs(float(found) - truth) <= half
     assert 0.83 < inside / many < 0.97
+
+
+def test_one_reading_more_than_parameters_leaves_one_degree_of_freedom() -> None:
+    """0, 1, 0 at even steps of ln N leave -1/3, 2/3, -1/3: a variance of 6/9 over one."""
+    found = fit_band.estimate_residual_noise(LOG, 2.0 ** np.arange(3), np.array([0.0, 1, 0]))
+    assert (found[0] ** 2, found[2]) == pytest.approx((2 / 3, 1))
+
+
+def test_noise_of_a_near_cycle_is_that_of_the_autoregression() -> None:
+    """Two cycles on 2 (1 - rho^2) of the variance; three times the scatter of 400 members."""
+    cycle, settlement = np.arange(1001.0, 2001.0), correlated_noise(5, 1000, 0.9, 1)[:, 0]
+    deviation, rho, freedom = fit_band.estimate_residual_noise(LOG, cycle, settlement)
+    half = estimate_fit_noise(LOG, cycle, settlement, 2002.0, 0.9) / stdtrit(freedom, 0.95)
+    assert half == pytest.approx(deviation * (2 - 2 * rho**2) ** 0.5, rel=3 / 800**0.5)
 
 
 def test_ignoring_correlation_would_not_cover() -> None:

@@ -276,6 +276,9 @@ def test_a_rate_that_changed_is_seen_and_the_past_forgotten() -> None:
     assert shorter.cycle == control.cycle
     assert 0.1 * decision.jump <= shorter.longest <= 0.5 * decision.jump
     assert decide(shorter, SETTINGS).attempt == 2
+    for missed, part in ((2, 0.5), (9, 0.3), (900, 0.1)):  # 0.9 / sqrt(missed), in [1/10, 1/2]
+        shorter = reject(control, decision, missed * SETTINGS.tolerance, SETTINGS)
+        assert shorter.longest == pytest.approx(part * decision.jump)
     forgotten = accept(control, decision, check, SETTINGS, after, settlement)
     assert [one.first_cycle for one in forgotten.stretches] == [after.first_cycle + 5]
 

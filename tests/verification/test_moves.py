@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from adapters.bed.container import Container
 from adapters.engines.fake import SETTLEMENT
 from adapters.errors import SceneError, UsageError
 from adapters.files.run_folder import RunFolder
@@ -85,11 +86,16 @@ def test_weights_are_those_of_noisy_means() -> None:
     assert weight[20] / weight[0] == pytest.approx(2 / 82)
 
 
-def test_profile_keeps_fluctuations() -> None:
-    """Grains at one height move down alike; outwards they move in proportion to their distance."""
+@pytest.mark.parametrize(
+    ("container", "axis"),
+    [(QUARTER, (0, 0)), (Container("box", ("y",), size_x=0.03, size_y=0.05), (0.015, 0))],
+)
+def test_profile_keeps_fluctuations(container: Container, axis: tuple[float, float]) -> None:
+    """Grains at one height move down alike; outwards they move in proportion to their distance
+    from the axis, in a box from its mirror or its middle."""
     position, radius = bed(4, count=300)
-    move = moved(get_move("profile"), position, radius)
-    ratio = move[:, :2] / position[-1, :, :2]
+    move = moved(get_move("profile"), position, radius, container=container)
+    ratio = move[:, :2] / (position[-1, :, :2] - axis)
     np.testing.assert_allclose(ratio, ratio[0, 0], rtol=1e-9)
     order = np.argsort(position[-1, :, 2])
     height, drop = position[-1, order, 2], move[order, 2]
@@ -166,6 +172,14 @@ def test_clip_shortens_without_turning(seed: int, quantile: float) -> None:
     assert (short == move).all(axis=1).sum() >= int(quantile * 39)
     np.testing.assert_allclose(np.cross(short, move) / before.max() ** 2, 0, atol=1e-12)
     np.testing.assert_array_equal(clip_moves(move, 1.0), move)
+
+
+def test_the_longest_twentieth_of_the_moves_is_cut() -> None:
+    """100 grains without neighbours go on by 1, 2 ... 100 um a unit of ln N: none beyond 95."""
+    speed = np.outer(np.arange(1, 101), [1e-6, 0, 0])
+    position = 1e4 * speed + np.multiply.outer(np.log(CYCLE / 30), speed)
+    move = moved(get_move("smoothed"), position, np.full(100, 1e-3))
+    np.testing.assert_allclose(move, np.log(80 / 50) * np.minimum(speed, 95e-6), atol=1e-13)
 
 
 @pytest.mark.long
