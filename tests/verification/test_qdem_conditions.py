@@ -68,6 +68,16 @@ def test_prescribed_nodes_are_where_they_should_be(given: Any) -> None:
     np.testing.assert_allclose(body.displacement[RIGHT, 2], expected, rtol=1e-13)
 
 
+def test_velocity_of_prescribed_nodes_is_level_with_them() -> None:
+    """(u(k+1) - u(k-1))/(2 dt), the mean of the speeds to and from here: t for u = t^2/2,
+    to round-off of u over dt t, here 10 times that of one number."""
+    body = block()
+    run = free(body)
+    run.prescribe(body, RIGHT, "z", lambda t: t * t / 2)
+    run.advance(20 * run.step)
+    np.testing.assert_allclose(body.velocity[RIGHT, 2], run.time, rtol=1e-12)
+
+
 def test_of_two_values_for_a_component_the_later_counts() -> None:
     body = block()
     run = free(body)

@@ -56,6 +56,14 @@ def test_slow_rail_is_the_static_one() -> None:
     np.testing.assert_allclose(taken, find_seat_share(places, TRACK), atol=1e-10)
 
 
+def test_a_sleeper_that_swings_by_itself_asks_nothing_of_the_rail() -> None:
+    """At w^2 = k/m of half a sleeper on its ballast, 1/k = 1/(modulus times spacing) - 1/pad;
+    losses of 1e-12 are left."""
+    ballast = 1 / (1 / (TRACK.modulus * TRACK.spacing) - 1 / NO_LOSS.pad)
+    alone = np.array([(ballast / NO_LOSS.sleeper) ** 0.5 / (2 * pi)])
+    assert abs(find_foundation_stiffness(alone, TRACK, NO_LOSS)[0]) < 1e-11 * TRACK.modulus
+
+
 @pytest.mark.parametrize("frequency", [40.0, 200.0, 370.0, 900.0])
 def test_rail_is_the_integral_over_its_wavenumbers(frequency: float) -> None:
     """w(x) = 1/(2 pi) integral e^(i q x)/(E I q^4 + s - w^2 m) dq; a seat takes s w over a, so its

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from rigid_lcp import BodySpace, HalfSpace, Scene, Simulation, make_box
 from rigid_lcp.friction.problem.definition import make_problem
-from rigid_lcp.unique.elastic_limit import find_elastic_limit
+from rigid_lcp.unique.elastic_limit import find_elastic_limit, reorder_problem
 from tests.rigid_elastic import find_least_forces
-from tests.rigid_static_problems import GRAVITY, beam, difference, pyramid, table, tower
+from tests.rigid_static_problems import GRAVITY, beam, bodies_2d, difference, pyramid, table, tower
 from validation.bench.rigid.packings import build_packing
 from validation.bench.rigid.static_grains import build_pyramid as pile
 from validation.bench.rigid.static_grains import renumber
@@ -66,6 +66,19 @@ def test_forces_do_not_depend_on_order_or_numbering(friction, across):
     sorted_back = np.empty((problem.contacts, 2))
     sorted_back[order] = again.r.reshape(-1, 2)
     assert difference(sorted_back.ravel(), answer.r) < 1e-10
+
+
+def test_contacts_that_only_move_along_their_normals_have_an_order():
+    """Three discs one on another: the same problem, to the bit, whichever contact comes first."""
+    high, mass = np.arange(3.0), np.array([1.0, 2.0, 4.0])
+    stack = [(k, k - 1, (0, high[k]), (0, 1)) for k in range(3)]
+    centre, load = np.outer(high + 0.5, [0, 1]), np.outer(mass, [0, -GRAVITY, 0])
+    one, other = (
+        reorder_problem(bodies_2d(some, centre, mass, mass / 8, load, 0.5))[0]
+        for some in (stack, stack[::-1])
+    )
+    np.testing.assert_array_equal(one.offset, other.offset)
+    np.testing.assert_array_equal(one.bodies.jacobian.toarray(), other.bodies.jacobian.toarray())
 
 
 @settings(max_examples=15, deadline=None)

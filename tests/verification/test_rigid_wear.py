@@ -175,6 +175,19 @@ def test_crossing_edges_share_the_wear_and_become_chamfers():
         assert made.shape.volume == pytest.approx(0.99, rel=1e-13)
 
 
+def test_a_corner_on_a_corner_wears_as_much_as_the_other():
+    """Two cubes on a diagonal, just apart: each loses half, at the corner next to the other."""
+    tip = np.array([0.5, 0.5, 0.5])
+    scene = Scene(3, [0, 0, 0])
+    for _ in range(2):
+        scene.add(CUBE, density=1.0)
+    state, near = start_wear(scene), 1.0001 * tip
+    rub_grains(state, contacts([CUBE, CUBE], [-near, near]), np.array([0.02]))
+    for grain, touched in zip(state.grains, (tip, -tip), strict=True):
+        assert grain.pending == pytest.approx([0.01])
+        assert CUBE.vertices[np.argmax(CUBE.vertices @ grain.normal[0])] == pytest.approx(touched)
+
+
 @pytest.mark.parametrize("shape", [SQUARE, CUBE])
 def test_chamfer_by_chamfer_is_one_chamfer_of_the_sum(shape):
     """Wear in ten parts, at any corner (or edge) of the chamfer, is wear at once."""
