@@ -2,30 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
-from tests.house.rules import (
-    PRODUCT,
-    RULES,
-    Breach,
-    House,
-    check_circles,
-    check_constants,
-    check_floor,
-    check_public_words,
-    check_references,
-    check_rooms,
-    check_studies,
-    check_verbs,
-    check_words,
-    weigh,
-)
+from tests.house import rules
+from tests.house.rules import PRODUCT, RULES, House, weigh
 
 ROOT = Path(__file__).parents[2]
-Check = Callable[[House], Iterator[Breach]]
 
 
 def test_house_keeps_its_rules() -> None:
@@ -78,51 +62,51 @@ def test_a_sound_house_has_no_breach(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("rule", "file", "text", "place"),
     [
-        (check_rooms, "adapters/bed/long.py", "x = 1\n" * 401, "long.py:401: rule 1"),
-        (check_rooms, "adapters/bed/bed_state.py", "", "bed_state.py:1: rule 1"),
-        (check_rooms, "adapters/moves/move.py", "", "move.py:1: rule 1"),
-        (check_rooms, "adapters/utils/one.py", "", "one.py:1: rule 1: named after nothing"),
-        (check_rooms, "adapters/alone/one.py", "", "adapters/alone:1: rule 1: 1 files"),
+        ("rooms", "adapters/bed/long.py", "x = 1\n" * 401, "long.py:401: rule 1"),
+        ("rooms", "adapters/bed/bed_state.py", "", "bed_state.py:1: rule 1"),
+        ("rooms", "adapters/moves/move.py", "", "move.py:1: rule 1"),
+        ("rooms", "adapters/utils/one.py", "", "one.py:1: rule 1: named after nothing"),
+        ("rooms", "adapters/alone/one.py", "", "adapters/alone:1: rule 1: 1 files"),
         (
-            check_circles, "adapters/bed/state.py",
+            "circles", "adapters/bed/state.py",
             "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n"
             "    from adapters.bed.radii import r\n",
             "adapters/bed/radii.py:1: rule 2: files import in a circle",
         ),
         (
-            check_circles, "adapters/bed/radii.py",
+            "circles", "adapters/bed/radii.py",
             "def f():\n    from adapters.jumps import slopes\n",
             "adapters/bed/radii.py:2: rule 2: rooms in a circle",
         ),
         (
-            check_public_words, "adapters/jumps/slopes.py",
+            "public_words", "adapters/jumps/slopes.py",
             "from adapters.bed.radii import sieve\n", "slopes.py:1: rule 3",
         ),
         (
-            check_public_words, "adapters/jumps/slopes.py",
+            "public_words", "adapters/jumps/slopes.py",
             "from adapters.bed import sieve\n", "slopes.py:1: rule 3: sieve is no public word",
         ),
-        (check_public_words, "adapters/bed/__init__.py", "", "does not say what the room is for"),
-        (check_floor, "trackbed/one.py", "import adapters.bed\n", "one.py:1: rule 4"),
-        (check_floor, "qdem_fem/one.py", "def f():\n    import rigid_lcp\n", "one.py:2: rule 4"),
-        (check_floor, "qdem_fem/one.py", "import validation.study\n", "one.py:1: rule 4"),
+        ("public_words", "adapters/bed/__init__.py", "", "does not say what the room is for"),
+        ("floor", "trackbed/one.py", "import adapters.bed\n", "one.py:1: rule 4"),
+        ("floor", "qdem_fem/one.py", "def f():\n    import rigid_lcp\n", "one.py:2: rule 4"),
+        ("floor", "qdem_fem/one.py", "import validation.study\n", "one.py:1: rule 4"),
         (
-            check_studies, "tests/unit/test_one.py",
+            "studies", "tests/unit/test_one.py",
             "from validation.studies.laws import run\n", "test_one.py:1: rule 5",
         ),
         (
-            check_studies, "tests/unit/test_one.py",
+            "studies", "tests/unit/test_one.py",
             "\nrows = open('validation/studies/laws/record.jsonl')\n", "test_one.py:2: rule 5",
         ),
-        (check_constants, "adapters/bed/radii.py", "SMALL = 1e-9\n", ""),
-        (check_verbs, "adapters/bed/radii.py", "def radii_of(): ...\n", "radii.py:1: verbs"),
-        (check_references, "adapters/bed/radii.py", '"""As `sift`."""\n', "radii.py:1: references"),
-        (check_words, "adapters/bed/radii.py", '"""What is made anew."""\n', "radii.py:1: plain"),
+        ("constants", "adapters/bed/radii.py", "SMALL = 1e-9\n", ""),
+        ("verbs", "adapters/bed/radii.py", "def radii_of(): ...\n", "radii.py:1: verbs"),
+        ("references", "adapters/bed/radii.py", '"""As `sift`."""\n', "radii.py:1: references"),
+        ("words", "adapters/bed/radii.py", '"""What is made anew."""\n', "radii.py:1: plain"),
     ],
 )  # fmt: skip
-def test_a_breach_is_named(tmp_path: Path, rule: Check, file: str, text: str, place: str) -> None:
+def test_a_breach_is_named(tmp_path: Path, rule: str, file: str, text: str, place: str) -> None:
     """Each rule names file, line and rule of what breaks it."""
-    said = "\n".join(map(str, rule(build_house(tmp_path, {file: text}))))
+    said = "\n".join(map(str, getattr(rules, f"check_{rule}")(build_house(tmp_path, {file: text}))))
     assert place in said
     assert bool(said) == bool(place)
 
@@ -134,7 +118,7 @@ def test_a_constant_has_one_home(tmp_path: Path) -> None:
         "adapters/jumps/band.py": "\nSMALL = 2e-9\n",
         "qdem_fem/one.py": "SMALL = 3e-9\n",
     }
-    (breach,) = check_constants(build_house(tmp_path, files))
+    (breach,) = rules.check_constants(build_house(tmp_path, files))
     assert str(breach).startswith("adapters/jumps/band.py:2: rule 6: SMALL")
 
 
