@@ -100,8 +100,8 @@ class Scene:
             remedy = f"give 0 to {MOST_FRICTION:g}"
             friction = require_number_in(friction, 0.0, MOST_FRICTION, "friction", where, remedy)
         if restitution is not None:
-            name, remedy = "restitution", "give 0 to 1"
-            restitution = require_number_in(restitution, 0.0, 1.0, name, where, remedy)
+            key, remedy = "restitution", "give 0 to 1"
+            restitution = require_number_in(restitution, 0.0, 1.0, key, where, remedy)
 
         def check_state(values: ArrayLike | None, usual: Floats | list[float], what: str) -> Floats:
             given = usual if values is None else values
