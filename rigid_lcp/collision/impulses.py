@@ -61,10 +61,10 @@ class CollisionNumbers:
     """Rounds of a collision, and how well their impulses have to be found."""
 
     rounds: int = 500
-    """Until the rest ends without restitution [-]: masses of a factor of 1e3 that touch anywhere
-    take some hundred;"""
+    """Rounds without friction, after which restitution is left out [-]: bodies whose masses differ
+    by a factor of 1e3 take some hundred."""
     rounds_with_friction: int = 50
-    """with it one in five of those has no end, and energy is lost anyway [-]."""
+    """The same with friction [-]: one in five has no end, and energy is lost anyway."""
     least_tolerance: float = 1e-16  # the smallest residual that is asked for [-]
     most_error: float = 1e-6  # (`find_round_error`) of impulses that change velocities [-]
     pivoting_contacts: int = 300  # up to so many in 2D are solved by pivoting first [-]

@@ -21,7 +21,7 @@ from rigid_lcp.motion.world import World
 
 @dataclass(frozen=True)
 class TouchNumbers:
-    """What touches, overlaps and rests, in the measures of the module's head."""
+    """When bodies touch and rest: gaps over `World.length`, speeds over `find_speed_scale`."""
 
     gap: float = 1e-9  # below which two bodies touch [-]
     aimed_gap: float = 0.25  # where a step that would end in an overlap is to end, in touches [-]

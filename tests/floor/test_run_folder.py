@@ -10,11 +10,12 @@ import subprocess
 import sys
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
 from trackbed.errors import DiskFull, UsageError
-from trackbed.run_files.folder import RunFolder, lock_folder
+from trackbed.run_files.folder import RunFolder, lock_folder, refuse_links
 from trackbed.run_files.whole import append_line, replace_file, seal_file, write_whole
 
 ROOT = Path(__file__).parents[2]
@@ -70,7 +71,7 @@ def test_second_writer_is_refused(room: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", [".lock", "state_1", "notes"])
-def test_links_are_refused(tmp_path: Path, name: str) -> None:
+def test_links_are_refused(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A symbolic link in the folder is named; the file behind it is neither cut nor read."""
     (tmp_path / "mine").write_text("mine")
     folder = Folder(tmp_path / "run")
@@ -79,6 +80,9 @@ def test_links_are_refused(tmp_path: Path, name: str) -> None:
     with pytest.raises(UsageError, match=rf"run: .*symbolic link \({name}\)"), folder.lock():
         pass
     assert (tmp_path / "mine").read_text() == "mine"
+    monkeypatch.setattr(Path, "iterdir", Mock(side_effect=PermissionError))
+    with pytest.raises(UsageError, match="get leave to read it"):
+        refuse_links(folder.path)
 
 
 def test_a_lock_that_becomes_a_link_is_not_followed(

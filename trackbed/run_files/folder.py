@@ -26,16 +26,23 @@ FORMAT = 1
 
 
 def refuse_links(path: Path) -> None:
-    """Raise `UsageError` if the folder holds a symbolic link: what writes there would follow it."""
-    with suppress(FileNotFoundError, NotADirectoryError), os.scandir(path) as entries:
-        links = sorted(entry.name for entry in entries if entry.is_symlink())
-        if links:
+    """Raise `UsageError` if the folder holds a symbolic link, which what writes there would follow,
+    or can not be read.  What is no folder holds none."""
+    links: list[str] = []
+    with suppress(FileNotFoundError, NotADirectoryError):
+        try:
+            links = sorted(entry.name for entry in path.iterdir() if entry.is_symlink())
+        except PermissionError as error:
             raise UsageError(
-                f"this run folder holds a symbolic link ({', '.join(links[:3])}), which may lead "
-                "anywhere; nothing was read or changed there",
-                where=str(path),
-                remedy="remove the link, or put the files themselves in its place",
-            )
+                "this folder can not be read", where=str(path), remedy="get leave to read it"
+            ) from error
+    if links:
+        raise UsageError(
+            f"this run folder holds a symbolic link ({', '.join(links[:3])}), which may lead "
+            "anywhere; nothing was read or changed there",
+            where=str(path),
+            remedy="remove the link, or put the files themselves in its place",
+        )
 
 
 def refuse_format(path: Path, manifest: Mapping[str, Any]) -> None:

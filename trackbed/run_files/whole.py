@@ -117,7 +117,7 @@ def read_object(path: Path) -> dict[str, Any] | None:
 
 
 def write_pvd(path: Path, files: Sequence[tuple[float, str]]) -> None:
-    """Write the PVD file that strings VTU files (time [s], or cycle; name from there) together."""
+    """Write a PVD file: the series of VTU ``files``, each (time [s] or cycle, path from there)."""
     lines = [
         '<?xml version="1.0"?>',
         '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">',
