@@ -180,7 +180,7 @@ def _find_faces(points: Floats, triangles: Ints) -> tuple[list[Ints], Floats, Fl
     speak of, vanish into the faces beside them.  Raises `ShapeError` where one plane takes all.
     """
     corner = points[triangles]
-    area = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    area = _find_areas(corner)
     squares = np.einsum("ti,ti->t", area, area)
     tolerance = FLATNESS * float(np.abs(points).max())
     loops: list[Ints] = []
@@ -203,6 +203,20 @@ def _find_faces(points: Floats, triangles: Ints) -> tuple[list[Ints], Floats, Fl
         float((points[loop] @ unit).mean()) for loop, unit in zip(loops, normals, strict=True)
     ]
     return loops, np.array(normals), np.array(distances)
+
+
+def _find_areas(corner: Floats) -> Floats:
+    """Twice the area vectors (t, 3) [m^2] of triangles with corners (t, 3, 3) [m].
+
+    Orthogonal to the edges within round-off of their length, however thin the triangle: a plain
+    cross product leans by round-off times length over altitude, out of the tolerance of its plane.
+    """
+    sides = np.roll(corner, -1, axis=1) - corner
+    squares = np.einsum("tki,tki->tk", sides, sides)
+    row, longest = np.arange(len(corner)), squares.argmax(axis=1)
+    base, side = sides[row, longest], sides[row, (longest + 1) % 3]
+    share = np.einsum("ti,ti->t", base, side) / squares[row, longest]
+    return np.cross(base, side - share[:, None] * base)
 
 
 def _trace_loop(points: Floats, corners: Ints, normal: Floats, tolerance: float) -> Ints:
