@@ -10,28 +10,23 @@ import numpy as np
 from scipy.special import stdtrit
 
 from adapters.bed import FloatArray
-from adapters.jumps.control import (
-    GROWTH,
-    JUMP_PROBABILITY,
-    SAFETY,
-    Control,
-    Decision,
-    Settings,
-    join_stretch,
-    trace_curve,
-)
+from adapters.jumps.control import JUMP, Control, Decision, Settings, join_stretch, trace_curve
 from adapters.jumps.forecast import Forecast, fit_forecast, integrate_gain
 from adapters.jumps.rates import Stretch, count_blocks, find_noise, find_rates
 from adapters.jumps.slopes import Landing, estimate_slopes, find_reseating, remove_moves
 
-ROLL_BACK = 2.0
-"""Realised error over the tolerance from which a jump is taken back."""
-CHANGED = 3.5
-"""Standard errors between a rate and its forecast from which the past is forgotten."""
-ALLOWANCE = 0.5
-"""Standard errors of each deviation that are left out where deviations of one sign are summed."""
-LEAST_ERROR = 0.01
-"""Realised error over the tolerance below which it counts as this much."""
+
+@dataclass(frozen=True)
+class CheckNumbers:
+    """Bounds of a jump's error, and of rates beside their forecasts."""
+
+    roll_back: float = 2.0  # realised error over the tolerance from which a jump is taken back [-]
+    changed: float = 3.5  # deviation of a rate from which the past is forgotten [standard errors]
+    allowance: float = 0.5  # of each deviation left out of sums of one sign [standard errors]
+    least_error: float = 0.01  # realised error over the tolerance that counts at least [-]
+
+
+CHECK = CheckNumbers()
 
 
 @dataclass(frozen=True)
@@ -82,7 +77,7 @@ def judge(
     start, end = float(control.cycle), float(window.first_cycle)
     deviation = compare_rate(before, every[:-1], window)
     drift = sum_drift(control.drift, deviation)
-    changed = max(drift) > CHANGED - ALLOWANCE
+    changed = max(drift) > CHECK.changed - CHECK.allowance
     if changed:
         expected = expect_by_two_rates(before, both, window, float(noises[-1]), start)
     else:
@@ -98,7 +93,7 @@ def judge(
     error = gained - expected.mean - decision.correction
     relative = error / total if total > 0 else (inf if error else 0.0)
     return Check(
-        accepted=abs(relative) <= ROLL_BACK * settings.tolerance,
+        accepted=abs(relative) <= CHECK.roll_back * settings.tolerance,
         gained=gained,
         expected=expected.mean,
         noise=expected.noise,
@@ -131,8 +126,8 @@ def compare_rate(before: Forecast, past: Sequence[Stretch], window: Stretch) -> 
     noise and of the forecast ``before`` it, made from ``past``."""
     start, end, k = float(window.first_cycle), float(window.last_cycle), len(window.gain)
     expected = float(before.gain(start, end)) / k
-    known = np.array(before.half_widths(start, end, JUMP_PROBABILITY)) / k
-    student = float(stdtrit(before.freedom, (1 + JUMP_PROBABILITY) / 2))
+    known = np.array(before.half_widths(start, end, JUMP.probability)) / k
+    student = float(stdtrit(before.freedom, (1 + JUMP.probability) / 2))
     noise = float(find_noise(past).variance[-1]) / k
     error = sqrt(noise + float((known / student) @ (known / student)))
     difference = window.rate - expected
@@ -142,19 +137,18 @@ def compare_rate(before: Forecast, past: Sequence[Stretch], window: Stretch) -> 
 def sum_drift(drift: tuple[float, float], deviation: float) -> tuple[float, float]:
     """Sums of deviations upwards and downwards with one more of them; standard errors.
 
-    S = max(0, S + d - `ALLOWANCE`), and the same of -d (Page's cumulative sum, 1954): windows that
-    all lie a little to one side of their forecasts ring where none would alone, as behind a rate
-    that drifts.  A sum from 0 exceeds `CHANGED` - `ALLOWANCE` where its one deviation exceeds
-    `CHANGED`.
+    S = max(0, S + d - `CHECK.allowance`), and the same of -d (Page's cumulative sum, 1954): windows
+    that all lie a little to one side of their forecasts ring where none would alone, as behind a
+    rate that drifts.  A sum from 0 rings where its one deviation exceeds `CHECK.changed`.
     """
     up, down = drift
-    return max(0.0, up + deviation - ALLOWANCE), max(0.0, down - deviation - ALLOWANCE)
+    return max(0.0, up + deviation - CHECK.allowance), max(0.0, down - deviation - CHECK.allowance)
 
 
 def expect_by_all(both: Forecast, start: float, end: float) -> Expected:
     """By the forecast of all windows on both sides."""
-    student = float(stdtrit(both.freedom, (1 + JUMP_PROBABILITY) / 2))
-    noise, form = (float(one) / student for one in both.half_widths(start, end, JUMP_PROBABILITY))
+    student = float(stdtrit(both.freedom, (1 + JUMP.probability) / 2))
+    noise, form = (float(one) / student for one in both.half_widths(start, end, JUMP.probability))
     return Expected(float(both.gain(start, end)), noise, form, both.shares(start, end))
 
 
@@ -210,7 +204,7 @@ def accept(
     """The state after a jump that is kept.
 
     The next one may be longer by a step-size controller's factor (proportional and integral),
-    0.9 (tol / e)^(0.7/2) (e_last / tol)^(0.4/2), between 1/5 and `GROWTH`, where e is what the
+    0.9 (tol / e)^(0.7/2) (e_last / tol)^(0.4/2), between 1/5 and `JUMP.growth`, where e is what the
     realised error exceeds its own standard error by.  Where the rate changed, the past is
     forgotten, and the next jump is at most half as long: what is left is one window.
     """
@@ -218,8 +212,8 @@ def accept(
     stretch = windows[-1]
     total = abs(control.settlement + check.gained)
     certain = abs(check.error) * total - hypot(check.noise, check.form) if total else 0.0
-    error = max(certain / (settings.tolerance * total) if total else 0.0, LEAST_ERROR)
-    factor = SAFETY * error**-0.35 * control.last_error**0.2
+    error = max(certain / (settings.tolerance * total) if total else 0.0, CHECK.least_error)
+    factor = JUMP.safety * error**-0.35 * control.last_error**0.2
     cycles, curve = trace_curve(stretch, settlement)
     if check.changed:
         windows, behind = windows[-1:], behind[-1:]
@@ -237,7 +231,7 @@ def accept(
         curve_cycle=past[0] + cycles,
         curve_settlement=past[1] + curve,
         last_jump=decision.jump,
-        longest=decision.jump * min(max(factor, 0.2), 0.5 if check.changed else GROWTH),
+        longest=decision.jump * min(max(factor, 0.2), 0.5 if check.changed else JUMP.growth),
         last_error=error,
         drift=(0.0, 0.0) if check.changed else check.drift,
         attempts=0,
@@ -252,5 +246,5 @@ def reject(control: Control, decision: Decision, error: float, settings: Setting
     the jump failed otherwise.
     """
     ratio = settings.tolerance / abs(error) if np.isfinite(error) and error else 0.0
-    factor = min(max(SAFETY * sqrt(ratio), 0.1), 0.5) if ratio else 0.5
+    factor = min(max(JUMP.safety * sqrt(ratio), 0.1), 0.5) if ratio else 0.5
     return replace(control, longest=decision.jump * factor, attempts=control.attempts + 1)

@@ -32,24 +32,26 @@ from adapters.jumps.rates import Stretch, find_noise, find_rates, fit_slope_tren
 from adapters.jumps.slopes import Landing, estimate_slopes, find_reseating, remove_moves
 from adapters.laws.fit import FIRST_WINDOW, WHY_NOT, WHY_NOT_PISTON, BoolArray, Regime
 
-JUMP_PROBABILITY = 0.9
-"""Chance with which a jump is to hold its tolerance."""
-SHORTEST_WINDOW, LONGEST_WINDOW = 10, 100
-"""Fewest and most cycles k of a window: grains are fitted on the one, a kill loses the other."""
-GROWTH = 2.0
-"""Longest jump over the last one that was kept."""
-REACH = 2.0
-"""Greatest ratio of the cycles after a jump to those before."""
-STATE_CHANGE = 0.05
-"""Greatest change of coordination number or elastic deflection that a jump may pass over."""
-SAFETY = 0.9
-"""Share of the tolerance that is aimed at."""
-MEMORY = 10.0
-"""Stretches that ended before N / 10 are forgotten: what a law of one exponent can span."""
 STATES = ("coordination", "deflection")
 """Columns of a `Stretch` that a jump leaves as they are, and that are compared behind it."""
-ATTEMPTS = 4
-"""Jumps tried from one state; then cycles are computed before the next."""
+
+
+@dataclass(frozen=True)
+class JumpNumbers:
+    """Length of a jump, and of the window behind it."""
+
+    probability: float = 0.9  # with which a jump is to hold its tolerance [-]
+    shortest_window: int = 10  # cycles k of a window: grains are fitted on the fewest,
+    longest_window: int = 100  # a kill loses the most [cycles]
+    growth: float = 2.0  # longest jump over the last one that was kept [-]
+    reach: float = 2.0  # greatest ratio of the cycles after a jump to those before [-]
+    state_change: float = 0.05  # most that `STATES` may change by over a jump, of their mean [-]
+    safety: float = 0.9  # share of the tolerance that is aimed at [-]
+    memory: float = 10.0  # stretches before N / 10 are forgotten: what one exponent can span [-]
+    attempts: int = 4  # jumps tried from one state; then cycles are computed before the next
+
+
+JUMP = JumpNumbers()
 
 
 @dataclass(frozen=True)
@@ -139,7 +141,7 @@ class Decision:
     correction: float = 0.0
     """What is to be gained beyond ``gain``, for the errors of earlier jumps [m]."""
     half_width: float = 0.0
-    """How far that can be off with `JUMP_PROBABILITY`, before it is tried [m]."""
+    """How far that can be off with `JUMP.probability`, before it is tried [m]."""
     limits: tuple[tuple[str, float], ...] = ()
     """Longest jump by each rule [cycles]."""
     binding: str = ""
@@ -175,7 +177,7 @@ def observe(control: Control, stretch: Stretch, settlement: float) -> Control:
         reseated=control.reseated + more,
         curve_cycle=control.curve_cycle + cycles,
         curve_settlement=control.curve_settlement + curve,
-        longest=control.longest * GROWTH,
+        longest=control.longest * JUMP.growth,
         attempts=0,
         window=len(stretch.gain),
     )
@@ -190,7 +192,7 @@ def join_stretch(stretches: tuple[Stretch, ...], new: Stretch) -> tuple[Stretch,
             for name in ("gain", "coordination", "deflection")
         )
         stretches, new = stretches[:-1], Stretch(last.first_cycle, *parts)
-    kept = [one for one in stretches if one.last_cycle * MEMORY >= new.last_cycle]
+    kept = [one for one in stretches if one.last_cycle * JUMP.memory >= new.last_cycle]
     return (*kept, new)
 
 
@@ -231,7 +233,7 @@ def decide(control: Control, settings: Settings, piston: Regime | None = None) -
                 exponent=one.exponent,
                 why=why_not[one.name],
             )
-    room = left - settings.healing - SHORTEST_WINDOW
+    room = left - settings.healing - JUMP.shortest_window
     if room < settings.shortest_jump:
         return replace(known, why="the end is too near for a jump")
     grid = np.unique(np.geomspace(1, room, 80).round())
@@ -248,7 +250,7 @@ def decide(control: Control, settings: Settings, piston: Regime | None = None) -
     moved = moved if moved * gain > 0 else 0.0
     every = tuple((name, float(value)) for name, value in limits.items())
     known = replace(known, limits=every, binding=binding)
-    if control.attempts >= ATTEMPTS:
+    if control.attempts >= JUMP.attempts:
         return replace(known, window=min(window, left), why="jumps from here were taken back")
     if jump < settings.shortest_jump:
         why = f"no jump pays: {binding} allows {jump} cycles, healing takes {settings.healing}"
@@ -283,14 +285,14 @@ def find_limits(
       name of the greater part.  And a rate that noise hides, so that its sign is not known, is not
       extrapolated, for many such jumps would add up; unless all cycles left gain too little.
     - *state*: coordination number and elastic deflection change by their trend, beyond its
-      standard error, no more than `STATE_CHANGE`.
+      standard error, no more than `JUMP.state_change`.
     - *observed*: by the errors of the jumps before, see `accept` and `reject`.
-    - *growth*: `GROWTH` times the last jump that was kept; the first one as long as its window.
-    - *reach*: `REACH` times the cycles done.
+    - *growth*: `JUMP.growth` times the last jump that was kept; the first as long as its window.
+    - *reach*: `JUMP.reach` times the cycles done.
     """
     here = float(control.cycle)
     gains = forecast.gain(here, here + grid)
-    allowed = SAFETY * settings.tolerance * np.abs(control.settlement + gains)
+    allowed = JUMP.safety * settings.tolerance * np.abs(control.settlement + gains)
     slope, slope_error = fit_slope_trend(find_rates(control.stretches))
     curvature = max(abs(slope) - slope_error, 0.0)
     missed = 0.5 * curvature * np.log1p(grid / here) ** 2
@@ -306,8 +308,8 @@ def find_limits(
         name: last,
         "state": min(find_state_limit(control, name) for name in STATES),
         "observed": control.longest,
-        "growth": float(control.window) if first else GROWTH * control.last_jump,
-        "reach": here * (REACH - 1),
+        "growth": float(control.window) if first else JUMP.growth * control.last_jump,
+        "reach": here * (JUMP.reach - 1),
     }
 
 
@@ -324,7 +326,7 @@ def find_state_limit(control: Control, name: str) -> float:
     change = max(abs(slope) - error, 0.0)
     if change <= 0 or mean == 0:
         return inf
-    return control.cycle * (exp(min(STATE_CHANGE * abs(mean) / change, 50.0)) - 1)
+    return control.cycle * (exp(min(JUMP.state_change * abs(mean) / change, 50.0)) - 1)
 
 
 def estimate_widths(
@@ -336,9 +338,9 @@ def estimate_widths(
     curve, lie from the forecast.
     """
     here = float(control.cycle)
-    noise, form = forecast.half_widths(here, here + lengths, JUMP_PROBABILITY)
+    noise, form = forecast.half_widths(here, here + lengths, JUMP.probability)
     curve = np.array(control.curve_cycle), np.array(control.curve_settlement)
-    low, high = bound_gain_by_laws(*curve, here + lengths, JUMP_PROBABILITY)
+    low, high = bound_gain_by_laws(*curve, here + lengths, JUMP.probability)
     gain = forecast.gain(here, here + lengths)
     apart = np.maximum(high - gain, gain - low)
     return noise, np.maximum(form, np.where(np.isfinite(apart), apart, 0.0))
@@ -355,21 +357,21 @@ def choose_window(
     the noise would hide allows none.  Where no k makes a jump pay, twice the last window.
     """
     here = float(control.cycle)
-    sizes = np.unique(np.geomspace(SHORTEST_WINDOW, LONGEST_WINDOW, 20).round())
+    sizes = np.unique(np.geomspace(JUMP.shortest_window, JUMP.longest_window, 20).round())
     variance = float(find_noise(control.stretches).variance[-1])
     known = float(1 / (forecast.weight @ forecast.error**2)) if forecast.error.any() else inf
     others = min(value for name, value in limits.items() if name not in ("noise", "laws"))
-    student = float(stdtrit(forecast.freedom, (1 + JUMP_PROBABILITY) / 2))
+    student = float(stdtrit(forecast.freedom, (1 + JUMP.probability) / 2))
     if variance > 0:
         error = 1 / np.sqrt(known + sizes / variance)
-        allowed = SAFETY * settings.tolerance * abs(control.settlement)
+        allowed = JUMP.safety * settings.tolerance * abs(control.settlement)
         reach = np.minimum(allowed / np.maximum(student * error * here, 1e-300), 50.0)
         certain = student * error <= abs(float(forecast.rate @ forecast.weight))
-        jumps = np.where(certain, np.minimum(here * np.expm1(reach), GROWTH * others), 0.0)
+        jumps = np.where(certain, np.minimum(here * np.expm1(reach), JUMP.growth * others), 0.0)
     else:
         jumps = np.full_like(sizes, others)
     pays = jumps >= settings.shortest_jump
     if not pays.any():
-        return min(2 * control.window, LONGEST_WINDOW)
+        return min(2 * control.window, JUMP.longest_window)
     gained = np.where(pays, 1 + np.minimum(jumps, 1e9) / (sizes + settings.healing), 0.0)
     return int(sizes[int(np.argmax(gained))])

@@ -3,16 +3,16 @@
 The logarithm has one slope a; a bed of few grains has bursts, so that a window's own slope can be
 several times its mean.  Here a is a random walk in ln N, as its drift is not known beforehand,
 
-    Var[a(N_2) - a(N_1)] = (`DRIFT` a_mean)^2 |ln(N_2 / N_1)|,
+    Var[a(N_2) - a(N_1)] = (`SLOPES.drift` a_mean)^2 |ln(N_2 / N_1)|,
 
 seen through the noise of each block of computed cycles; its best linear unbiased estimate
 (ordinary kriging, Matheron 1963) weighs the nearest blocks alone where cycles are quiet, and all
 of them where they are not.
 
 A bed that was moved by G may settle more than it would have: in the first cycle, as contacts that
-were moved do not bear yet, and by some kappa G / n in the n-th (docs/jumps.md).
-kappa is one number for a run, 0 with standard deviation `RESEATING` before any cycle is seen; the
-blocks behind jumps show it, since 1 / n falls much faster than 1 / N.
+were moved do not bear yet, and by some kappa G / n in the n-th (docs/jumps.md).  kappa is one
+number for a run, 0 with standard deviation `SLOPES.reseating` before any cycle is seen; the blocks
+behind jumps show it, since 1 / n falls much faster than 1 / N.
 """
 
 from __future__ import annotations
@@ -27,14 +27,18 @@ import numpy as np
 from adapters.bed import FloatArray, IntArray
 from adapters.jumps.rates import Stretch, find_noise
 
-DRIFT = 1.0
-"""Standard deviation of the slope's change over a unit of ln N, over the mean slope."""
-RESEATING = 0.1
-"""Standard deviation of kappa."""
-LONGEST_BLOCK = 0.35
-"""Greatest ln(end / start) of a block, so that it has one slope."""
-LONGEST_RESEATING = 1.1
-"""The same of cycles n since a jump, so that kappa is separable from the slope."""
+
+@dataclass(frozen=True)
+class SlopeNumbers:
+    """What is known of slopes before any cycle, and the length of their blocks."""
+
+    drift: float = 1.0  # deviation of the slope's change in a unit of ln N, over its mean [-]
+    reseating: float = 0.1  # standard deviation of kappa [-]
+    longest_block: float = 0.35  # greatest ln(end / start) of a block, so that it has one slope [-]
+    longest_reseating: float = 1.1  # that of n since a jump: kappa is separable from the slope [-]
+
+
+SLOPES = SlopeNumbers()
 
 
 @dataclass(frozen=True)
@@ -72,11 +76,11 @@ class Slopes:
     def kappa(self) -> tuple[float, float]:
         """Estimate of kappa and its standard error; below 0 too, or noise would slow every bed."""
         if not self.reseated.any():
-            return 0.0, RESEATING
-        known = np.append(RESEATING**2 / self.walk * self.reseated, 0.0)
+            return 0.0, SLOPES.reseating
+        known = np.append(SLOPES.reseating**2 / self.walk * self.reseated, 0.0)
         weights = np.linalg.solve(self.system, known)[:-1]
         explained = float(weights @ self.reseated)  # share of the prior variance
-        error = RESEATING * sqrt(min(max(1 - explained, 0.0), 1.0))
+        error = SLOPES.reseating * sqrt(min(max(1 - explained, 0.0), 1.0))
         return float(self.slope @ weights), error
 
 
@@ -93,7 +97,7 @@ def estimate_slopes(stretches: Sequence[Stretch], landings: Sequence[Landing] = 
     kappa = 0.0
     for _ in range(2):  # the walk's scale is the mean slope without what jumps add to it
         mean = float((slope - kappa * reseated) @ span) / float(span.sum())
-        walk = (DRIFT * (mean if mean > 0 else float(np.abs(slope).mean()))) ** 2 or 1.0
+        walk = (SLOPES.drift * (mean if mean > 0 else float(np.abs(slope).mean()))) ** 2 or 1.0
         system = assemble_kriging(place, noise / walk, reseated, walk)
         slopes = Slopes(place, slope, reseated, system, walk)
         kappa, _ = slopes.kappa()
@@ -111,7 +115,7 @@ def assemble_kriging(
     count = len(place)
     system = np.zeros((count + 1, count + 1))
     system[:count, :count] = np.diag(noise) - np.abs(place[:, None] - place) / 2
-    system[:count, :count] += RESEATING**2 / walk * np.outer(reseated, reseated)
+    system[:count, :count] += SLOPES.reseating**2 / walk * np.outer(reseated, reseated)
     system[:count, count] = system[count, :count] = 1
     return system
 
@@ -119,12 +123,12 @@ def assemble_kriging(
 def cut_slope_blocks(one: Stretch, landings: Sequence[Landing] = ()) -> list[tuple[Stretch, float]]:
     """A stretch cut at equal ratios of N, behind a jump of n; with each, what kappa = 1 adds [m].
 
-    No longer than `LONGEST_BLOCK` and `LONGEST_RESEATING`; a cycle is the shortest block.
-    Stretches begin behind cycle 0.
+    No longer than `SLOPES.longest_block`, or ``longest_reseating`` behind a jump; a cycle is the
+    shortest block.  Stretches begin behind cycle 0.
     """
     first, last = one.first_cycle, one.last_cycle
     start = max((landing.cycle for landing in landings if landing.cycle <= first), default=0)
-    longest = LONGEST_RESEATING if start else LONGEST_BLOCK
+    longest = SLOPES.longest_reseating if start else SLOPES.longest_block
     from_first = max(first - start, 1)
     count = max(1, int(np.ceil(np.log((last - start) / from_first) / longest)))
     edges = np.unique(np.geomspace(from_first, last - start, count + 1).round().astype(int))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,8 +14,7 @@ from adapters.bed.state import FloatArray
 from adapters.jumps import slopes as jump_slopes
 from adapters.jumps.rates import Stretch
 from adapters.jumps.slopes import (
-    LONGEST_BLOCK,
-    LONGEST_RESEATING,
+    SLOPES,
     Jumped,
     Landing,
     Slopes,
@@ -190,7 +190,7 @@ def test_what_a_moved_bed_settles_more_is_taken_off(monkeypatch: pytest.MonkeyPa
     assert missed[0] > 0.25 * SLOPE * np.log(130 / 70)
     assert np.abs(missed[1:]).max() < 0.5 * missed[0]
     assert (np.diff(np.abs(missed)) < 0).all()
-    monkeypatch.setattr(jump_slopes, "RESEATING", 1e-6)
+    monkeypatch.setattr(jump_slopes, "SLOPES", replace(SLOPES, reseating=1e-6))
     blind = jumping(log_gain, more, 4)
     assert np.abs(blind[1:]).max() > 5 * np.abs(missed[1:]).max()
 
@@ -217,7 +217,7 @@ def test_blocks_cut_no_cycle_and_lose_none() -> None:
         assert np.concatenate([b.gain for b in blocks]) == pytest.approx(one.gain)
         assert [b.first_cycle for b in blocks[1:]] == [b.last_cycle for b in blocks[:-1]]
         assert (blocks[0].first_cycle, blocks[-1].last_cycle) == (one.first_cycle, one.last_cycle)
-        start, longest = (4990, LONGEST_RESEATING) if made else (0, LONGEST_BLOCK)
+        start, longest = (4990, SLOPES.longest_reseating) if made else (0, SLOPES.longest_block)
         for block, extra in found:
             ratio = (block.last_cycle - start) / (block.first_cycle - start)
             assert len(block.gain) == 1 or ratio < np.exp(1.5 * longest)
@@ -248,7 +248,7 @@ def test_kappa_is_found_with_its_error_and_taken_out() -> None:
     found, error = slopes.kappa()
     assert found == pytest.approx(kappa, rel=0.2)
     assert abs(found - kappa) < 2 * error
-    assert error < 0.3 * jump_slopes.RESEATING
+    assert error < 0.3 * SLOPES.reseating
     bare = log_stretch(151, 175).gain.sum()
     left = remove_moves(known[1], landings, found).gain.sum() - bare
     assert abs(left) < 0.25 * (known[1].gain.sum() - bare)
@@ -256,4 +256,4 @@ def test_kappa_is_found_with_its_error_and_taken_out() -> None:
 
 def test_no_jump_tells_no_kappa() -> None:
     """Nothing is taken out, and the standard error stays what it was before."""
-    assert estimate_slopes([log_stretch(10, 70)]).kappa() == (0.0, jump_slopes.RESEATING)
+    assert estimate_slopes([log_stretch(10, 70)]).kappa() == (0.0, SLOPES.reseating)

@@ -11,16 +11,8 @@ from scipy.signal import lfilter
 
 from adapters.bed.state import FloatArray
 from adapters.jumps.band import estimate_band
-from adapters.jumps.check import ALLOWANCE, CHANGED, accept, judge, reject, sum_drift
-from adapters.jumps.control import (
-    GROWTH,
-    LONGEST_WINDOW,
-    Control,
-    Decision,
-    Settings,
-    decide,
-    observe,
-)
+from adapters.jumps.check import CHECK, accept, judge, reject, sum_drift
+from adapters.jumps.control import JUMP, Control, Decision, Settings, decide, observe
 from adapters.jumps.forecast import bound_gain_by_laws, fit_forecast, integrate_gain
 from adapters.jumps.rates import (
     Stretch,
@@ -224,7 +216,7 @@ def test_no_jump_pays_at_a_tolerance_of_1e_minus_6() -> None:
     assert decision.why.startswith("no jump pays: ")
     run = play(Curve(CURVES["power"]), 1, replace(SETTINGS, tolerance=1e-6, total_cycles=600))
     assert run.computed == 600
-    assert max(one.window for one in run.decisions) == LONGEST_WINDOW
+    assert max(one.window for one in run.decisions) == JUMP.longest_window
 
 
 def test_a_state_that_drifts_limits_the_jump() -> None:
@@ -259,7 +251,7 @@ def test_a_jump_that_went_as_forecast_stands() -> None:
     assert abs(check.error) < 0.1 * SETTINGS.tolerance
     grown = accept(control, decision, check, SETTINGS, after, settlement)
     assert (grown.cycle, grown.settlement) == (after.last_cycle, settlement)
-    assert decision.jump < grown.longest <= GROWTH * decision.jump
+    assert decision.jump < grown.longest <= JUMP.growth * decision.jump
     assert len(grown.stretches) == 2
 
 
@@ -288,7 +280,7 @@ def test_deviations_to_one_side_are_summed() -> None:
 
     A single one rings above 3.5 as before; as many to either side never do.
     """
-    bound = CHANGED - ALLOWANCE
+    bound = CHECK.changed - CHECK.allowance
     drift = (0.0, 0.0)
     for deviation, down in ((-1.7, 1.2), (-2.0, 2.7), (-2.2, 4.4)):
         drift = sum_drift(drift, deviation)
@@ -306,7 +298,7 @@ def test_a_sum_that_rings_forgets_the_past_and_begins_again() -> None:
     control, decision, after, settlement = jumped(rate=1.2e-6)
     check = judge(control, decision, SETTINGS, after, settlement)
     assert not check.changed
-    assert 0 < check.drift[0] == pytest.approx(check.deviation - ALLOWANCE)
+    assert 0 < check.drift[0] == pytest.approx(check.deviation - CHECK.allowance)
     kept = accept(control, decision, check, SETTINGS, after, settlement)
     assert kept.drift == check.drift
     assert len(kept.stretches) == 2
@@ -410,7 +402,9 @@ def test_a_rate_that_drifts_through_zero() -> None:
     errors = np.concatenate([run.errors for run in runs])
     assert np.mean(errors <= SETTINGS.tolerance) > 0.85
     assert abs(np.mean([run.settlement / run.truth - 1 for run in runs])) < 0.1
-    assert any(check["changed"] and abs(check["deviation"]) < CHANGED for check in runs[0].checks)
+    assert any(
+        check["changed"] and abs(check["deviation"]) < CHECK.changed for check in runs[0].checks
+    )
 
 
 def test_collapse_is_refused() -> None:
