@@ -17,9 +17,9 @@ from scipy.special import stdtrit
 from adapters.bed import FloatArray
 from adapters.jumps.rates import Rates, integrate_power
 from adapters.laws.fit import (
+    CANDIDATES,
     EXPONENTS,
-    PRIOR,
-    ROWS_FEWEST,
+    TAIL,
     Regime,
     find_increments,
     find_regime_of_weight,
@@ -81,7 +81,7 @@ def fit_forecast(rates: Rates) -> Forecast:
     """
     last = rates.last_cycle
     span = integrate_power(last, rates.start, rates.end)
-    prior = 1 / (1 + (EXPONENTS / PRIOR) ** 2)
+    prior = 1 / (1 + (EXPONENTS / TAIL.prior) ** 2)
     if not rates.gain.any() and not rates.variance.any():
         still = np.zeros_like(EXPONENTS)
         none = np.zeros((len(rates.gain), len(EXPONENTS)))
@@ -105,8 +105,8 @@ def bound_gain_by_laws(
     The middle ``probability`` of all laws on all windows (`fit.candidates`), fitted to the run's
     own curve: ``cycle`` (k,), ``settlement`` [m] (k,).  Infinitely far apart for too few cycles.
     """
-    if len(cycle) < 2 * ROWS_FEWEST or not np.ptp(settlement):
-        wide = np.full(len(ends), np.inf if len(cycle) < 2 * ROWS_FEWEST else 0.0)
+    if len(cycle) < 2 * CANDIDATES.rows_fewest or not np.ptp(settlement):
+        wide = np.full(len(ends), np.inf if len(cycle) < 2 * CANDIDATES.rows_fewest else 0.0)
         return -wide, wide
     few, means = thin_rows(cycle, settlement[:, None])
     with np.errstate(over="ignore", invalid="ignore"):

@@ -1,11 +1,11 @@
 """Fitting laws to a series: regime, candidates, band, refusal, prediction."""
 
-from adapters.laws.fit.candidates import ROWS_FEWEST, BoolArray, find_increments, thin_rows
+from adapters.laws.fit.candidates import CANDIDATES, BoolArray, find_increments, thin_rows
 from adapters.laws.fit.outlook import AGREE
 from adapters.laws.fit.prediction import fit_auto, fit_series, read_series
 from adapters.laws.fit.regime import (
     EXPONENTS,
-    PRIOR,
+    TAIL,
     WHY_NOT,
     WHY_NOT_PISTON,
     Regime,
@@ -14,7 +14,7 @@ from adapters.laws.fit.regime import (
 from adapters.laws.fit.residual import FIRST_WINDOW, compare_coordinates, compare_displacements
 
 __all__ = [
-    "AGREE", "EXPONENTS", "FIRST_WINDOW", "PRIOR", "ROWS_FEWEST", "WHY_NOT", "WHY_NOT_PISTON",
+    "AGREE", "CANDIDATES", "EXPONENTS", "FIRST_WINDOW", "TAIL", "WHY_NOT", "WHY_NOT_PISTON",
     "BoolArray", "Regime", "compare_coordinates", "compare_displacements", "find_increments",
     "find_regime_of_weight", "fit_auto", "fit_series", "read_series", "thin_rows",
 ]  # fmt: skip

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from adapters.bed import FloatArray
 from adapters.errors import UsageError
 from adapters.laws import get_law
-from adapters.laws.fit.regime import RESOLUTION, select_tail
+from adapters.laws.fit.regime import TAIL, select_tail
 
 BoolArray = NDArray[np.bool_]
 
@@ -21,15 +21,21 @@ SLOW_LAWS = ("log", "power", "hyperbolic", "stretched-exponential", "inverse-log
 """Laws whose rate falls: those with a term b N explode when they are extrapolated."""
 BOUNDED_LAWS = ("hyperbolic", "stretched-exponential", "inverse-log")
 """Those of them whose total has an end."""
-WINDOW_DECADES = (1.0, 2.0, np.inf)
-"""The tail alone knows best where the bed goes, all data best what noise is: neither is trusted."""
-ROWS_PER_DECADE = 24
-"""Cycles are averaged to so many a decade: each decade weighs the same, and a fit costs the same,
-whether a laboratory read 30 values or an engine computed every cycle."""
-ROWS_FEWEST = 4
-"""Fewest rows that show a regime."""
-VETO = 3.0
-"""A candidate that missed the held-out block by so many times the median miss has no vote."""
+
+
+@dataclass(frozen=True)
+class CandidateNumbers:
+    """Windows of the laws, the rows that they are fitted to, and their votes."""
+
+    window_decades: tuple[float, ...] = (1.0, 2.0, np.inf)
+    """The tail alone knows best where the bed goes, all data what noise is: neither is trusted."""
+    rows_per_decade: int = 24
+    """Means that cycles are thinned to: each decade weighs the same, and a fit costs the same."""
+    rows_fewest: int = 4  # that show a regime
+    veto: float = 3.0  # median misses of the held-out block with which a candidate has no vote [-]
+
+
+CANDIDATES = CandidateNumbers()
 
 
 @dataclass(frozen=True)
@@ -57,7 +63,7 @@ class Candidates:
         tested = admitted & ~np.isnan(self.miss)
         if not tested.any():
             return admitted
-        bound = VETO * np.nanmedian(np.where(tested, self.miss, np.nan), axis=0)
+        bound = CANDIDATES.veto * np.nanmedian(np.where(tested, self.miss, np.nan), axis=0)
         return admitted & ~(self.miss > bound)
 
     def median(self, votes: BoolArray) -> FloatArray:
@@ -78,18 +84,17 @@ class Candidates:
 
 
 def thin_rows(cycle: FloatArray, displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Means over bins evenly spaced in ln N, `ROWS_PER_DECADE`; the last row stays as it is.
+    """Means over bins evenly spaced in ln N, ``rows_per_decade``; the last row stays as it is.
 
     Less than a decade of data gets as many as a decade.  A bin's cycle is the geometric mean of its
-    own, so the unit of N does not matter.  What would leave fewer than `ROWS_FEWEST` rows is not
-    thinned.
+    own, so the unit of N does not matter.  Not thinned to fewer than ``rows_fewest`` rows.
     """
     span = np.log10(cycle[-1] / cycle[0])
-    place = np.log10(cycle / cycle[-1]) * ROWS_PER_DECADE / min(span, 1.0)
+    place = np.log10(cycle / cycle[-1]) * CANDIDATES.rows_per_decade / min(span, 1.0)
     number = np.floor(place + 1e-9)
     number[-1] = 1.0
     _, start, count = np.unique(number, return_index=True, return_counts=True)
-    if len(start) == len(cycle) or len(start) < ROWS_FEWEST:
+    if len(start) == len(cycle) or len(start) < CANDIDATES.rows_fewest:
         return cycle, displacement
     mean_log = np.add.reduceat(np.log(cycle), start) / count
     few = np.append(np.exp(mean_log[:-1]), cycle[-1])
@@ -99,7 +104,7 @@ def thin_rows(cycle: FloatArray, displacement: FloatArray) -> tuple[FloatArray, 
 def cut_windows(cycle: FloatArray) -> list[tuple[float, slice]]:
     """Decades and rows of the windows that differ from one another."""
     found: dict[int, tuple[float, slice]] = {}
-    for decades in WINDOW_DECADES:
+    for decades in CANDIDATES.window_decades:
         rows = select_tail(cycle, decades) if np.isfinite(decades) else slice(0, None)
         found.setdefault(rows.start, (decades, rows))
     return list(found.values())
@@ -127,11 +132,11 @@ def fit_constant_rates(cycle: FloatArray, displacement: FloatArray, to_cycle: fl
     """Increments of a + b N beside a logarithm, a row a window, (w, n); nan where not believed.
 
     Believed on a window where c + a ln N + b N misses the readings by no more than c + a N^b does,
-    to `RESOLUTION` of their range: both have a rate that falls slower than the logarithm's, and
-    only the first one's tends to a constant.
+    to `TAIL.resolution` of their range: both have a rate that falls slower than the logarithm's,
+    and only the first one's tends to a constant.
     """
     constant, power, last = get_law("log-linear"), get_law("power"), float(cycle[-1])
-    reading = (RESOLUTION * np.ptp(displacement, axis=0)) ** 2
+    reading = (TAIL.resolution * np.ptp(displacement, axis=0)) ** 2
     found = [np.full(displacement.shape[1], np.nan)]
     for _, rows in cut_windows(cycle):
         known, happened = cycle[rows], displacement[rows]

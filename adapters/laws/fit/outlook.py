@@ -11,7 +11,7 @@ from adapters.bed import FloatArray
 from adapters.files import make_too_few_error
 from adapters.laws import get_law
 from adapters.laws.fit.candidates import (
-    ROWS_FEWEST,
+    CANDIDATES,
     BoolArray,
     Candidates,
     find_candidates,
@@ -19,11 +19,9 @@ from adapters.laws.fit.candidates import (
     thin_rows,
 )
 from adapters.laws.fit.regime import (
-    CERTAIN,
     EXPONENTS,
-    RESOLUTION,
-    ROUND_OFF,
     SHAKEDOWN,
+    TAIL,
     Regime,
     count_independent,
     find_regimes,
@@ -39,7 +37,7 @@ JUDGED = 0.9
 band is asked for: a narrower one is no way round a refusal.  The study of laws measured the
 refusals at 90 %, the probability that regimes need too."""
 TO_TELL = "to see a regime"
-"""What `ROWS_FEWEST` rows are needed for, in the words of an error."""
+"""What `CANDIDATES.rows_fewest` rows are needed for, in the words of an error."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +64,7 @@ class Outlook:
     judged: tuple[FloatArray, FloatArray]
     """Low and high end of the band with probability `JUDGED`."""
     reading: FloatArray
-    """Error of a reading: its half-width with `JUDGED`, `RESOLUTION` of the range at least."""
+    """Error of a reading: its half-width with `JUDGED`, `TAIL.resolution` of the range at least."""
     counted_from: float = 0.0
     """The user's number of cycle 0, as in `Series`: for sentences."""
 
@@ -95,16 +93,16 @@ def find_outlook(
     not rise.  The band does not hold in the regimes ratcheting and collapse.
 
     Cycle 0 must be left out.  Raises `UsageError` for what no law can take and for fewer than
-    `ROWS_FEWEST` cycles.
+    `CANDIDATES.rows_fewest` cycles.
     """
     cycle, displacement = check_training_data(get_law("log"), cycle, displacement)
-    if len(cycle) < ROWS_FEWEST:
-        raise make_too_few_error(len(cycle), ROWS_FEWEST, TO_TELL, where="law auto")
+    if len(cycle) < CANDIDATES.rows_fewest:
+        raise make_too_few_error(len(cycle), CANDIDATES.rows_fewest, TO_TELL, where="law auto")
     few, means = thin_rows(cycle, displacement)
     last, regimes = displacement[-1], find_regimes(few, means)
     settled, reach = np.abs(displacement).max(axis=0), (float(cycle[-1]), to_cycle)
     bounded = np.array([regime.name == SHAKEDOWN for regime in regimes])
-    unbounded = np.array([regime.bounded < 1 - CERTAIN for regime in regimes]) & ~bounded
+    unbounded = np.array([regime.bounded < 1 - TAIL.certain for regime in regimes]) & ~bounded
     exponent = EXPONENTS[weigh_exponents(few, means).argmax(axis=0)]
     known = to_cycle == cycle[-1]
     with np.errstate(over="ignore", invalid="ignore"):  # judged in `fit.refusal`
@@ -132,7 +130,7 @@ def find_outlook(
 
         low, high, _ = find_band(probability)
         *judged, reading = find_band(JUDGED)
-    least = np.fmax(RESOLUTION * np.ptp(displacement, axis=0), ROUND_OFF * settled)
+    least = np.fmax(TAIL.resolution * np.ptp(displacement, axis=0), TAIL.round_off * settled)
     return Outlook(
         regimes, last + moved, low, high, candidates, votes, *reach, last, settled,
         judged=(judged[0], judged[1]), reading=np.fmax(reading, least),

@@ -12,7 +12,7 @@ from adapters.bed import FloatArray
 from adapters.errors import JumpRefused, NotConverged, UsageError
 from adapters.files import Series, make_too_few_error, read_series
 from adapters.laws.fit.band import estimate_prediction_band
-from adapters.laws.fit.candidates import ROWS_FEWEST, thin_rows
+from adapters.laws.fit.candidates import CANDIDATES, thin_rows
 from adapters.laws.fit.outlook import TO_TELL, LawSaid, compare_laws, find_outlook
 from adapters.laws.fit.refusal import Refusal, find_failure, find_refusals, predict_failure
 from adapters.laws.fit.regime import find_regimes
@@ -112,9 +112,9 @@ def fit_auto(
     """
     rows = series.cycle > 0
     cycle, settlement = series.cycle[rows], series.settlement[rows]
-    if len(cycle) < ROWS_FEWEST:
+    if len(cycle) < CANDIDATES.rows_fewest:
         raise make_too_few_error(
-            len(cycle), ROWS_FEWEST, TO_TELL, where=series.where or "law auto",
+            len(cycle), CANDIDATES.rows_fewest, TO_TELL, where=series.where or "law auto",
             left_out=series.left_out, else_do=", or name a law: --law log",
         )  # fmt: skip
     _check_target(series, float(cycle[-1]), to_cycle, probability, fail_at)
@@ -161,7 +161,7 @@ def _make_refusal(
 def find_regime(series: Series) -> str | None:
     """Regime of a series; None where it has fewer than four cycles after the start."""
     rows = series.cycle > 0
-    if rows.sum() < ROWS_FEWEST:
+    if rows.sum() < CANDIDATES.rows_fewest:
         return None
     return find_regimes(*thin_rows(series.cycle[rows], series.settlement[rows, None]))[0].name
 

@@ -14,20 +14,8 @@ import numpy as np
 
 from adapters.bed import FloatArray
 
-TAIL = 10.0
-"""The tail is the last decade: cycles from N_k / 10 to the last one, N_k."""
-TAIL_ROWS = 6
-"""Fewest cycles of a tail; where the last decade has fewer, earlier ones join."""
 EXPONENTS = np.linspace(-4.0, 6.0, 201)
 """Exponents beta that are weighed."""
-PRIOR = 0.5
-"""Half-width of beta's distribution (Cauchy's) before any data: half of it between rates that fall
-as N^-1.5 and as N^-0.5, about the logarithm; its long tails let an explosion be seen as one."""
-RESOLUTION = 1e-3
-"""Deviation of a reading at best, of the whole range: a digit of a curve of 300 is off by as much.
-A bed that has settled but for its last digit is at rest, whichever way that digit goes."""
-CERTAIN = 0.9
-"""Probability from which a bed is said to shake down, to ratchet or to collapse."""
 SHAKEDOWN, STEADY, RATCHETING, COLLAPSE = REGIMES = (
     "shakedown",
     "steady",
@@ -44,6 +32,25 @@ WHY_NOT_PISTON = {
     COLLAPSE: "the rate at which the piston sinks grows (collapse)",
 }
 """The same of a piston that breaks into a bed whose mean grain may even rise."""
+
+
+@dataclass(frozen=True)
+class TailNumbers:
+    """The end of a series, and what is said by it."""
+
+    ratio: float = 10.0  # of the last cycle, N_k, to its first one: it is the last decade [-]
+    rows: int = 6  # fewest cycles of it; where the last decade has fewer, earlier ones join
+    prior: float = 0.5
+    """Half-width of beta's distribution (Cauchy's) before any data [-]: rates from N^-1.5 to N^-0.5
+    have half of it; its long tails let an explosion be seen as one."""
+    resolution: float = 1e-3
+    """Deviation of a reading at best over the whole range [-], a digit of a curve of 300: a bed
+    that has settled but for its last digit is at rest, whichever way that goes."""
+    certain: float = 0.9  # probability from which a regime but steady is said [-]
+    round_off: float = 1e-12  # relative difference of means of equal readings [-]
+
+
+TAIL = TailNumbers()
 
 
 @dataclass(frozen=True)
@@ -69,9 +76,9 @@ class Regime:
 
 
 def select_tail(cycle: FloatArray, decades: float = 1.0) -> slice:
-    """Rows of the last ``decades``, at least `TAIL_ROWS` of them where there are so many."""
-    first = int(np.searchsorted(cycle, cycle[-1] / TAIL**decades * (1 - 1e-9)))
-    return slice(max(0, min(first, len(cycle) - TAIL_ROWS)), None)
+    """Rows of the last ``decades``, at least `TAIL.rows` of them where there are so many."""
+    first = int(np.searchsorted(cycle, cycle[-1] / TAIL.ratio**decades * (1 - 1e-9)))
+    return slice(max(0, min(first, len(cycle) - TAIL.rows)), None)
 
 
 def make_tail_column(ratio: FloatArray, exponent: FloatArray) -> FloatArray:
@@ -96,13 +103,13 @@ def weigh_exponents(cycle: FloatArray, displacement: FloatArray) -> FloatArray:
     columns /= np.linalg.norm(columns, axis=0)
     along = columns.T @ series
     total = (series * series).sum(axis=0)
-    reading = len(ratio) * (RESOLUTION * np.ptp(displacement, axis=0)) ** 2
+    reading = len(ratio) * (TAIL.resolution * np.ptp(displacement, axis=0)) ** 2
     missed = np.where(total > 0, np.maximum(total - along**2, 0.0) + reading, 1.0)
     best = missed.argmin(axis=0)
     residual = series - columns[:, best] * along[best, np.arange(series.shape[1])]
     counted = np.maximum(count_independent(residual), 4.0)
     fit = np.log(missed / missed.min(axis=0))
-    weight = np.exp(-(counted - 2) / 2 * fit) / (1 + (EXPONENTS[:, None] / PRIOR) ** 2)
+    weight = np.exp(-(counted - 2) / 2 * fit) / (1 + (EXPONENTS[:, None] / TAIL.prior) ** 2)
     return np.asarray(weight / weight.sum(axis=0))
 
 
@@ -114,10 +121,6 @@ def count_independent(residual: FloatArray) -> FloatArray:
     square = np.maximum((residual * residual).sum(axis=0), np.finfo(float).tiny)
     alike = np.clip((residual[1:] * residual[:-1]).sum(axis=0) / square, 0.0, 0.99)
     return np.asarray(len(residual) * (1 - alike) / (1 + alike))
-
-
-ROUND_OFF = 1e-12
-"""Relative difference of means of equal readings."""
 
 
 def fit_tail_residual(
@@ -140,12 +143,12 @@ def find_regimes(cycle: FloatArray, displacement: FloatArray) -> list[Regime]:
     """
     weight = weigh_exponents(cycle, displacement)
     tail = displacement[select_tail(cycle)]
-    still = np.ptp(tail, axis=0) <= ROUND_OFF * np.abs(tail).max(axis=0)  # means differ by that
+    still = np.ptp(tail, axis=0) <= TAIL.round_off * np.abs(tail).max(axis=0)
     return [find_regime_of_weight(*each) for each in zip(weight.T, still, strict=True)]
 
 
 def find_regime_of_weight(weight: FloatArray, still: bool) -> Regime:
-    """Regime where `EXPONENTS` have the probabilities ``weight``, (g,); each needs `CERTAIN`.
+    """Regime where `EXPONENTS` have the probabilities ``weight``, (g,); each needs `TAIL.certain`.
 
     - *collapse*: beta > 1, a rate that grows;
     - *ratcheting*: beta > 1/2, a rate nearer to a constant one than to that of the logarithm;
@@ -156,10 +159,10 @@ def find_regime_of_weight(weight: FloatArray, still: bool) -> Regime:
     bounded = float(weight[EXPONENTS < -1e-9].sum())
     mean = float(EXPONENTS @ weight)
     deviation = sqrt(max(float(EXPONENTS**2 @ weight) - mean**2, 0.0))
-    if still or bounded > CERTAIN:
+    if still or bounded > TAIL.certain:
         name = SHAKEDOWN
-    elif fast > CERTAIN:
-        name = COLLAPSE if growing > CERTAIN else RATCHETING
+    elif fast > TAIL.certain:
+        name = COLLAPSE if growing > TAIL.certain else RATCHETING
     else:
         name = STEADY
     return Regime(name, mean, deviation, bounded)
