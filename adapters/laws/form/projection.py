@@ -19,16 +19,19 @@ from adapters.laws.form.contract import check_training_data
 Column = Callable[[FloatArray, FloatArray], FloatArray]
 """phi(N, theta): N (k, 1), theta (m, g) to columns (k, g)."""
 
-GRID_ROWS = 200
-"""Cycles that the grid looks at; it only has to find the basin."""
-CHUNK = 1_000_000
-"""Numbers in one column array: bounds the memory."""
-STEPS = 60
-"""Damped steps at most; a handful suffices but in flat valleys."""
-GAIN_SMALL = 1e-8
-"""A step that lowers the sum of squares by less than this share ends a search."""
-STEP_SMALL = 1e-10
-"""A step of all shape parameters below this (in ln theta or theta) ends a search."""
+
+@dataclass(frozen=True)
+class SearchNumbers:
+    """The grid, and the damped steps from its best point."""
+
+    grid_rows: int = 200  # cycles that the grid looks at; it only has to find the basin
+    chunk: int = 1_000_000  # numbers in one column array: bounds the memory
+    steps: int = 60  # at most; a handful suffices but in flat valleys
+    gain_small: float = 1e-8  # part of the sum of squares: a step that gains less ends it [-]
+    step_small: float = 1e-10  # step of all shape parameters (ln theta or theta) that ends it [-]
+
+
+SEARCH = SearchNumbers()
 
 
 @dataclass(frozen=True)
@@ -75,7 +78,7 @@ def fit_shaped(
     column: Column, shapes: tuple[Shape, ...], cycle: FloatArray, displacement: FloatArray
 ) -> FloatArray:
     """Parameters c, a, theta, shape (2 + m, n), of n series (k, n) at cycles (k,)."""
-    width = max(1, CHUNK // len(cycle))
+    width = max(1, SEARCH.chunk // len(cycle))
     parts = [
         fit_chunk(column, shapes, cycle, displacement[:, start : start + width])
         for start in range(0, displacement.shape[1], width)
@@ -108,7 +111,7 @@ def search_grid(
     """The grid point that explains most of each series, shape (m, n), as searched variables."""
     grids = np.meshgrid(*(shape.make_grid() for shape in shapes), indexing="ij")
     points = np.stack([grid.ravel() for grid in grids])
-    rows = np.unique(np.linspace(0, len(cycle) - 1, min(len(cycle), GRID_ROWS)).astype(int))
+    rows = np.unique(np.linspace(0, len(cycle) - 1, min(len(cycle), SEARCH.grid_rows)).astype(int))
     unit, _ = normalise(centre(column(cycle[rows, None], _find_theta(shapes, points))))
     along = np.matmul(unit.T, centre(target[rows]))
     return points[:, np.argmax(along * along, axis=0)]
@@ -129,8 +132,7 @@ def _search(
 ) -> FloatArray:  # fmt: skip
     """Levenberg-Marquardt steps on the projected residual inside the bounds, all series at once.
 
-    ``start`` and the result: searched variables, shape (m, n).  A step is taken only where it
-    lowers the sum of squares, so the result is never worse than the grid's.
+    ``start`` and the result: searched variables, (m, n).  No step raises the sum of squares.
     """
     grids = [shape.make_grid() for shape in shapes]
     low = np.array([grid[0] for grid in grids])[:, None]
@@ -142,7 +144,7 @@ def _search(
     def find_residual(searched: FloatArray, series: FloatArray) -> FloatArray:
         return _project(column(times, _find_theta(shapes, searched)), series)[1]
 
-    for _ in range(STEPS):
+    for _ in range(SEARCH.steps):
         if not len(active):
             break
         here, series = best[:, active], target[:, active]
@@ -165,17 +167,14 @@ def _search(
         moved = np.abs(tried - here).max(axis=0)
         best[:, active] = np.where(better, tried, here)
         damping[active] = np.where(better, damping[active] / 5, damping[active] * 8)
-        settled = better & (square - lower <= GAIN_SMALL * square)
-        done = settled | (moved < STEP_SMALL) | (damping[active] > 1e8)
+        settled = better & (square - lower <= SEARCH.gain_small * square)
+        done = settled | (moved < SEARCH.step_small) | (damping[active] > 1e8)
         active = active[~done]
     return best
 
 
 def solve_damped_step(slopes: FloatArray, missed: FloatArray, damping: FloatArray) -> FloatArray:
-    """-(J'J + lambda diag J'J)^-1 J'r for one or two shape parameters, shape (m, n).
-
-    A parameter without any slope stays where it is.
-    """
+    """-(J'J + lambda diag J'J)^-1 J'r for one or two shape parameters, (m, n); 0 without slope."""
     gradient = (slopes * missed).sum(axis=1)
     square = (slopes * slopes).sum(axis=1)
     diagonal = np.where(square > 0, square, 1.0) * (1 + damping)
