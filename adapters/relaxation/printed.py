@@ -16,7 +16,7 @@ from scipy.optimize import minimize
 from adapters.bed import GRAVITY, BoolArray, FloatArray
 from adapters.relaxation.kernel import add_hertz_energy
 from adapters.relaxation.measured import Estimated
-from adapters.relaxation.smallest import SKIN
+from adapters.relaxation.smallest import SMALLEST
 
 
 class Energy:
@@ -26,7 +26,7 @@ class Energy:
         self.bed, self.evaluations = bed, 0
         self.weight = np.zeros_like(bed.position)
         self.weight[:, 2] = -GRAVITY * bed.before.mass
-        self.skin = SKIN * float(np.median(bed.scene.radius))
+        self.skin = SMALLEST.skin * float(np.median(bed.scene.radius))
         self._list(bed.position)
 
     def _list(self, position: FloatArray) -> None:

@@ -26,25 +26,25 @@ from adapters.bed import BoolArray, FloatArray, IntArray, Neighbours
 from adapters.relaxation.kernel import estimate_norm, fill_changes, fill_moves, solve_multipliers
 from adapters.relaxation.measured import Surroundings
 
-SLACK = 1e-5
-"""Weight of the multipliers in their own equations: keeps redundant contacts solvable."""
-SWAP_SHARE = 0.5
-"""Share of the pressed pairs that join the network at a time."""
-SKIN = 0.2
-"""Reach of the neighbour list beyond contact, in median radii."""
-NEAREST_ITERATIONS = 20
-"""Iterations that look for the nearest positions; later ones only for the next that fit."""
-OPEN_ITERATIONS, OPEN_SHARE = 25, 0.1
-"""Iterations after which contacts of the network that cannot be closed are let go, and the
-share of them each time."""
-ACCEPT_ITERATIONS, ITERATIONS_MAX = 45, 100
-"""Iterations after which any bed without overlaps beyond those of the network will do, and the
-most of them."""
-STEP_MAX = 0.5
-"""Greatest step of a grain in its own radii: beyond it the linearised contacts mislead."""
-PRODUCTS_NEAREST, PRODUCTS_FIT = 100, 1000
-"""Most products with J J^T in one linearised problem: of the first iterations, whose normals
-still turn, and of the later ones."""
+
+@dataclass(frozen=True)
+class SmallestNumbers:
+    """Iterations, the linearised problem of each, and what the network gives way by."""
+
+    slack: float = 1e-5  # weight of multipliers in their own equations, for redundant contacts [-]
+    swap_share: float = 0.5  # of the pressed pairs that join the network at a time [-]
+    skin: float = 0.2  # reach of the neighbour list beyond contact [median radii]
+    nearest_iterations: int = 20  # that look for the nearest positions; later ones for any that fit
+    open_iterations: int = 25  # after which contacts that cannot be closed are let go,
+    open_share: float = 0.1  # and the share of them each time [-]
+    accept_iterations: int = 45  # after which any bed with no overlap beyond the network's will do,
+    iterations_max: int = 100  # and the most of them
+    step_max: float = 0.5  # greatest step of a grain [radii]: beyond, linearised contacts mislead
+    products_nearest: int = 100  # with J J^T at most while normals still turn,
+    products_fit: int = 1000  # and in later iterations
+
+
+SMALLEST = SmallestNumbers()
 
 
 @dataclass
@@ -54,12 +54,9 @@ class _Rows:
     key: IntArray
     first: IntArray
     second: IntArray
-    member: BoolArray
-    """True for a contact of the network."""
-    target: FloatArray
-    """Overlap of a member, greatest overlap of any other row [m]."""
-    multiplier: FloatArray
-    """mu of each row, and that of the mean height last."""
+    member: BoolArray  # true for a contact of the network
+    target: FloatArray  # overlap of a member, greatest overlap of any other row [m]
+    multiplier: FloatArray  # mu of each row, and that of the mean height last
 
 
 def find_smallest_move(
@@ -80,12 +77,12 @@ def find_smallest_move(
     """
     radius, n = scene.radius, len(scene.radius)
     height_share = 1 / np.sqrt(n) if keep_height else 0.0
-    skin = SKIN * float(np.median(radius))
+    skin = SMALLEST.skin * float(np.median(radius))
     x, anchor = start.copy(), estimate
     rows = start_rows(network, overlap_cap, bound, n)
     listed_at = None
     norm, evaluations = 1.0, 0
-    for iteration in range(ITERATIONS_MAX):
+    for iteration in range(SMALLEST.iterations_max):
         if evaluations > evaluations_max:
             break
         if listed_at is None or np.linalg.norm(x - listed_at, axis=1).max() > skin / 2:
@@ -99,17 +96,17 @@ def find_smallest_move(
         violation = float(error.max(initial=0.0))
         lift = height_share * float((x - estimate)[:, 2].sum())
         swapped = 0
-        if 0 < iteration < NEAREST_ITERATIONS and violation < skin / 10:
+        if 0 < iteration < SMALLEST.nearest_iterations and violation < skin / 10:
             swapped = _swap(rows, gap)
         done = violation <= tolerance or (
-            iteration >= ACCEPT_ITERATIONS and near.overlap.max() <= accepted + tolerance
+            iteration >= SMALLEST.accept_iterations and near.overlap.max() <= accepted + tolerance
         )
         if iteration and not swapped and done and abs(lift) <= tolerance:
             return x, True, evaluations
-        products_max = PRODUCTS_NEAREST
-        if iteration >= NEAREST_ITERATIONS:
-            anchor, products_max = x, PRODUCTS_FIT
-            if iteration >= OPEN_ITERATIONS:
+        products_max = SMALLEST.products_nearest
+        if iteration >= SMALLEST.nearest_iterations:
+            anchor, products_max = x, SMALLEST.products_fit
+            if iteration >= SMALLEST.open_iterations:
                 _release(rows, excess, tolerance)
             rows.multiplier[:] = 0.0
         # x = anchor - J^T mu in delta(x_k) + J (x - x_k) = target, the slack's share put back
@@ -117,13 +114,13 @@ def find_smallest_move(
         fill_changes(rows.first, rows.second, near.normal, height_share, anchor - x, right)
         right[:-1] += near.overlap - rows.target
         right[-1] = height_share * float((anchor - estimate)[:, 2].sum())
-        right += SLACK * rows.multiplier
+        right += SMALLEST.slack * rows.multiplier
         products, _ = solve_multipliers(
             rows.first,
             rows.second,
             near.normal,
             height_share,
-            SLACK,
+            SMALLEST.slack,
             np.append(rows.member, True),
             right,
             norm,
@@ -136,7 +133,7 @@ def find_smallest_move(
         move = np.empty((n, 3))
         fill_moves(rows.first, rows.second, near.normal, height_share, rows.multiplier, move)
         step = anchor + move - x
-        length, limit = np.linalg.norm(step, axis=1), STEP_MAX * radius
+        length, limit = np.linalg.norm(step, axis=1), SMALLEST.step_max * radius
         x = x + step * np.minimum(1.0, limit / np.maximum(length, limit))[:, None]
     return x, False, evaluations
 
@@ -190,7 +187,7 @@ def _swap(rows: _Rows, gap: float) -> int:
     for kind in (rows.second >= 0, rows.second < 0):
         pressed = np.flatnonzero(kind & ~rows.member & (mu > gap))
         torn = np.flatnonzero(kind & rows.member & (mu < -gap))
-        count = min(int(np.ceil(SWAP_SHARE * len(pressed))), len(torn))
+        count = min(int(np.ceil(SMALLEST.swap_share * len(pressed))), len(torn))
         pressed = pressed[np.argsort(-mu[pressed])[:count]]
         torn = torn[np.argsort(mu[torn])[:count]]
         rows.target[pressed] = np.sort(rows.target[torn])[::-1]
@@ -204,5 +201,5 @@ def _swap(rows: _Rows, gap: float) -> int:
 def _release(rows: _Rows, excess: FloatArray, tolerance: float) -> None:
     """Let go of the widest open members of the network; their overlap stays an upper bound."""
     gaping = np.flatnonzero(rows.member & (excess < -tolerance) & (rows.multiplier[:-1] < 0))
-    count = int(np.ceil(OPEN_SHARE * len(gaping)))
+    count = int(np.ceil(SMALLEST.open_share * len(gaping)))
     rows.member[gaping[np.argsort(excess[gaping])[:count]]] = False
