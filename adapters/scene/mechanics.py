@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 from adapters.bed import (
@@ -21,14 +22,19 @@ from trackbed.scene_files import Problem
 
 COUNT_GREATEST = 10**8
 """Most grains a scene may have."""
-RAYLEIGH_SHARE_DOUBTFUL = 0.4
-"""Share of the Rayleigh time above which a time step is doubtful."""
-WIDTH_DOUBTFUL = 8
-"""Least width of a container, in mean grain diameters, that is free of doubt."""
-STEPS_DOUBTFUL = 100
-"""Least number of time steps a cycle that is free of doubt."""
-JUMP_DOUBTFUL = 10
-"""Cycles of a jump for each cycle fitted, above which noise is extrapolated and not a law."""
+
+
+@dataclass(frozen=True)
+class DoubtfulNumbers:
+    """Ends of what is free of doubt."""
+
+    rayleigh_share: float = 0.4  # greatest time step over the Rayleigh time [-]
+    width: int = 8  # least one of a container [mean grain diameters]
+    steps: int = 100  # least number of time steps a cycle
+    jump: int = 10  # most cycles of one for each cycle fitted: above, noise is extrapolated
+
+
+DOUBTFUL = DoubtfulNumbers()
 
 
 def _check_room(scene: Values) -> Iterator[Problem]:
@@ -52,16 +58,11 @@ def _check_tension(scene: Values) -> Iterator[Problem]:
 
 
 def _find_rayleigh_time(scene: Values) -> float:
-    grain = "material.grain."
     radii = find_radii(scene)
     if radii.smallest <= 0:
         raise NotValid
-    return find_rayleigh_time(
-        radii.smallest,
-        scene.need(grain + "density"),
-        scene.need(grain + "young"),
-        scene.need(grain + "poisson"),
-    )
+    named = (scene.need(f"material.grain.{one}") for one in ("density", "young", "poisson"))
+    return find_rayleigh_time(radii.smallest, *named)
 
 
 def _find_rayleigh_share(scene: Values) -> float:
@@ -130,11 +131,11 @@ CHECKS: tuple[Check, ...] = (
 
 def _warn_of_long_step(scene: Values) -> Iterator[Problem]:
     share = _find_rayleigh_share(scene)
-    if RAYLEIGH_SHARE_DOUBTFUL < share <= 1:
+    if DOUBTFUL.rayleigh_share < share <= 1:
         key = "rayleigh_share" if scene.get("engine.time_step") is None else "time_step"
         yield Problem(
             f"engine.{key}",
-            f"{share:.2g} of the Rayleigh time; above {RAYLEIGH_SHARE_DOUBTFUL} collisions "
+            f"{share:.2g} of the Rayleigh time; above {DOUBTFUL.rayleigh_share} collisions "
             "gain energy and settlement is doubtful",
         )
 
@@ -144,7 +145,7 @@ def _warn_of_narrow_bed(scene: Values) -> Iterator[Problem]:
     is_box = container.shape == "box"
     width = min(container.size_x, container.size_y) if is_box else 2 * container.radius
     ratio = width / (2 * scene.need("sample.grain_radius.mean"))
-    if ratio < WIDTH_DOUBTFUL:
+    if ratio < DOUBTFUL.width:
         yield Problem(
             "sample.grain_radius.mean",
             f"the container is {ratio:.2g} mean grain diameters wide: walls rule the result",
@@ -154,7 +155,7 @@ def _warn_of_narrow_bed(scene: Values) -> Iterator[Problem]:
 def _warn_of_few_steps(scene: Values) -> Iterator[Problem]:
     longest = _find_rayleigh_share(scene) * _find_rayleigh_time(scene)
     steps = 1 / (scene.need("loading.frequency") * longest)
-    if steps < STEPS_DOUBTFUL:
+    if steps < DOUBTFUL.steps:
         yield Problem("loading.frequency", f"a cycle is only {steps:.3g} time steps long")
 
 
@@ -173,10 +174,10 @@ def _warn_of_far_jump(scene: Values) -> Iterator[Problem]:
     if scene.get("procedure.settlement") == "history":  # by all cycles computed so far
         return
     h, k = max(scene.need("procedure.h")), scene.need("procedure.k")
-    if h > JUMP_DOUBTFUL * k:
+    if h > DOUBTFUL.jump * k:
         yield Problem(
             "procedure.h",
-            f"a jump of {h} cycles is fitted to {k}: above {JUMP_DOUBTFUL} times as many it "
+            f"a jump of {h} cycles is fitted to {k}: above {DOUBTFUL.jump} times as many it "
             "extrapolates their noise, and the bed may even rise",
         )
 
