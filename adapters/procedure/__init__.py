@@ -1,7 +1,7 @@
 """The procedure of Karrech et al. (2007): prepare, compute, jump, relax, resubmit."""
 
 from adapters.procedure import run
-from adapters.procedure.checks import FORCE_ERROR_GOAL, FORCE_START_CYCLES
+from adapters.procedure.checks import BOUNDS
 from adapters.procedure.history import AVERAGED, History, list_jumped_spans, sum_cost
 from adapters.procedure.progress import Progress
 from adapters.procedure.record import (
@@ -16,12 +16,12 @@ from adapters.procedure.record import (
     read_run_record,
 )
 from adapters.procedure.run import record_scene, refuse_differences
-from adapters.procedure.seating import HUNG, find_hung_cycles, format_spans
+from adapters.procedure.seating import SEATING, find_hung_cycles, format_spans
 from adapters.procedure.status import describe_result, judge_progress, read_status
 
 __all__ = [
-    "AVERAGED", "CONTROL", "FORCE_ERROR_GOAL", "FORCE_START_CYCLES", "HUNG", "History", "Progress",
-    "Record", "Track", "describe_result", "estimate_band_of_run", "find_comparable_cycle",
+    "AVERAGED", "BOUNDS", "CONTROL", "SEATING", "History", "Progress", "Record", "Track",
+    "describe_result", "estimate_band_of_run", "find_comparable_cycle",
     "find_hung_cycles", "format_spans", "judge_progress", "list_checks", "list_decisions",
     "list_jumped_spans", "make_plain", "read_run_record", "read_status", "record_scene",
     "refuse_differences", "run", "sum_cost",

@@ -11,24 +11,28 @@ from adapters.errors import EngineFailed, NotCredible
 from adapters.files import Window
 from adapters.scene import Scene
 
-FORCE_ERROR_BOUND = 0.25
-"""Greatest rms of piston force minus target, over the peak target, from the fourth cycle on."""
-FORCE_ERROR_GOAL = 0.03
-"""The same, as the report's goal."""
-FORCE_START_CYCLES = 3
-"""Cycles in which the piston finds the bed; its force is not judged in them."""
+
+@dataclass(frozen=True)
+class BoundNumbers:
+    """What is credible of a piston's force and of a jump's rise."""
+
+    force_error: float = 0.25  # greatest rms of force minus target in a cycle over its peak [-]
+    force_error_goal: float = 0.03  # the same, as the report's goal [-]
+    force_start_cycles: int = 3  # in which the piston finds the bed: its force is not judged
+    rise_floor: float = 1e-3  # less of the mean radius hurts nothing, whatever the window shows [-]
+
+
+BOUNDS = BoundNumbers()
 
 
 @dataclass(frozen=True)
 class WindowFigures:
     """The figures that are judged."""
 
-    overlap_share: float
-    """Greatest overlap over the smallest radius, all cycle ends."""
+    overlap_share: float  # greatest overlap over the smallest radius, all cycle ends
     energy_share: float
     """Greatest kinetic energy at a cycle end over the grains' weight times their mean radius."""
-    move_share: float
-    """Greatest mean move of the grains in one cycle over their mean radius."""
+    move_share: float  # greatest mean move of the grains in one cycle over their mean radius
     force_error: float
     """Greatest rms force error of the piston after the first cycles; nan in a short window."""
 
@@ -116,7 +120,7 @@ def measure(scene: Scene, window: Window) -> WindowFigures:
     )
     # The first state after a jump is at rest and not the engine's work: it is not judged.
     move = np.linalg.norm(np.diff(window.position, axis=0), axis=2).mean(axis=1)
-    force_error = window.piston.force_error(scene.steps_per_cycle)[FORCE_START_CYCLES:]
+    force_error = window.piston.force_error(scene.steps_per_cycle)[BOUNDS.force_start_cycles :]
     return WindowFigures(
         max(overlaps) / float(window.radius.min()),
         float(kinetic[1:].max() / (GRAVITY * np.sum(window.mass) * window.radius.mean())),
@@ -131,13 +135,13 @@ def check_bounds(scene: Scene, figures: WindowFigures) -> None:
     remedy = f"the time step is {share:.3g} of the Rayleigh time; " + (
         "shorten it below 0.2" if share > 0.2 else "look at the scene's load and stiffness"
     )
-    if figures.force_error > FORCE_ERROR_BOUND:
+    if figures.force_error > BOUNDS.force_error:
         remedy += f"; {advise_heavier_piston(scene)}"
     bounds = (
         ("the greatest overlap over the smallest radius", figures.overlap_share, OVERLAP_BOUND),
         ("kinetic energy over weight times radius at a cycle end", figures.energy_share, 1.0),
         ("the mean move in one cycle over the radius", figures.move_share, 1.0),
-        ("the piston's rms force error over the peak", figures.force_error, FORCE_ERROR_BOUND),
+        ("the piston's rms force error over the peak", figures.force_error, BOUNDS.force_error),
     )
     for what, value, bound in bounds:
         if value > bound:  # nan, which stands for "not judged", passes
@@ -155,10 +159,6 @@ def advise_heavier_piston(scene: Scene) -> str:
     )
 
 
-RISE_FLOOR = 1e-3
-"""A rise below this share of the mean radius hurts nothing, whatever the window shows."""
-
-
 def check_rise(scene: Scene, height: FloatArray, rise: FloatArray) -> None:
     """A jump does not lift a loaded bed by more than it moved in all of the jump's window.
 
@@ -168,7 +168,7 @@ def check_rise(scene: Scene, height: FloatArray, rise: FloatArray) -> None:
     """
     moved = float(np.ptp(np.median(height - height[0], axis=1)))
     lift = float(np.median(rise))
-    if lift > max(moved, RISE_FLOOR * scene.sample.grain_radius.mean):
+    if lift > max(moved, BOUNDS.rise_floor * scene.sample.grain_radius.mean):
         raise NotCredible(
             f"the law lifts the bed by {lift * 1e6:.4g} um in the jump, where it moved by"
             f" {moved * 1e6:.4g} um in all of the {len(height) - 1} cycles fitted",

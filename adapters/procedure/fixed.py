@@ -134,7 +134,7 @@ def find_history_gain(run: Run, bed: Bed, h: int) -> float | None:
     if p.settlement == "law" or h == 0:
         return None
     hung, outcomes = find_count_start(run, bed), run.folder.outcomes()
-    left_out = max(1, round(SEATING * p.k_i))
+    left_out = max(1, round(SEATING.first_share * p.k_i))
     begin = hung + (min(left_out, p.carried_cycles) if hung else left_out)  # k cycles are left
     known = [
         replace(one, first_cycle=one.first_cycle - hung)

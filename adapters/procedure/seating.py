@@ -13,6 +13,7 @@ forecast: from there on the bed takes the load for the first time.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,17 +24,22 @@ from adapters.procedure import stages
 from adapters.procedure.stages import Bed, Run
 from adapters.scene import Scene
 
-SEATING = 0.2
-"""Share of the first k_i cycles that is another process: the rained bed takes the load."""
-HUNG = 5.0
-"""Elastic deflection over that of the mean field, above which the piston hangs.
-
-Ten packings of the reference ensemble have 0.6 to 2.2 in every cycle from the fifth on, the one
-whose piston hangs 10 to 40 (docs/history.md); any bar from 3 to 10 tells the same ones,
-and moves the cycle at which it is carried by some.
-"""
 CONSTRAINED = 9 / 5
 """M / K of smooth spheres under isotropic stress: the mean of n_z^4 over that of n_z^2 / 3."""
+
+
+@dataclass(frozen=True)
+class SeatingNumbers:
+    """Which cycles are judged, and by what."""
+
+    first_share: float = 0.2  # of the first k_i cycles [-]: the rained bed takes the load
+    hung: float = 5.0
+    """Elastic deflection over that of the mean field, above which the piston hangs [-].  Ten beds
+    of the reference ensemble have 0.6 to 2.2 from the fifth cycle on, the one whose piston hangs 10
+    to 40 (docs/history.md); bars from 3 to 10 tell the same, some a few cycles later."""
+
+
+SEATING = SeatingNumbers()
 
 
 def estimate_constrained_modulus(
@@ -90,21 +96,19 @@ def bound_stress(scene: Scene) -> tuple[float, float]:
 def find_hung_cycles(scene: Scene, outcomes: Sequence[Outcome]) -> IntArray:
     """Computed cycles in which the piston hung, ascending.
 
-    Left out are cycles in which a bed takes the load for the first time (`SEATING`), and healing
-    ones: contacts that a jump has moved bear late.
+    Without those of `SEATING.first_share`, and healing ones: contacts that a jump moved bear late.
     """
     assert scene.procedure is not None
     rows = [row for one in outcomes for row in one.rows if row["kind"] == "computed"]
     cycle = np.array([row["cycle"] for row in rows], int)
-    hung = compare_deflection(scene, rows) > HUNG
-    return cycle[hung & (cycle > SEATING * scene.procedure.k_i)]
+    hung = compare_deflection(scene, rows) > SEATING.hung
+    return cycle[hung & (cycle > SEATING.first_share * scene.procedure.k_i)]
 
 
 def find_last_hung_cycle(run: Run, bed: Bed) -> int:
     """The last cycle up to the bed's in which its piston hung; 0 where it did not.
 
-    What the folder holds beyond the bed's cycle is not asked: a run that is resumed decides again
-    as it did.
+    A run that is resumed decides again as it did, whatever its folder holds beyond that cycle.
     """
     hung = find_hung_cycles(run.scene, run.folder.outcomes())
     return int(hung[hung <= bed.cycle].max(initial=0))
@@ -136,8 +140,8 @@ def warn_if_hung(run: Run, bed: Bed) -> None:
     if hung and bed.cycle < hung + p.k_i:
         run.progress.print_line(
             f"warning: the piston hung on few grains until cycle {hung}: it gave way by more than "
-            f"{HUNG:g} times what a bed of such grains does; a jump from cycle {bed.cycle} cannot "
-            'predict when they let it go. procedure.seating = "waits" computes on instead'
+            f"{SEATING.hung:g} times what a bed of such grains does; a jump from cycle {bed.cycle} "
+            'cannot predict when they let it go. procedure.seating = "waits" computes on instead'
         )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import isnan
 
-from adapters.procedure import HUNG, Record, find_hung_cycles, format_spans
+from adapters.procedure import SEATING, Record, find_hung_cycles, format_spans
 from adapters.report.error import COORDINATION_BAR, HEIGHT_BAR
 from adapters.report.numbers import Numbers
 from trackbed.report import (
@@ -91,8 +91,8 @@ def describe_hung_cycles(record: Record) -> str:
     )
     return make_paragraph(
         f"<strong>The piston hung on few grains in cycles {format_spans(cycles)}:</strong> it gave "
-        f"way by more than {HUNG:g} times what the mean field of Walton (1987) gives a bed of "
-        f"such grains. {advice}"
+        f"way by more than {SEATING.hung:g} times what the mean field of Walton (1987) gives a bed "
+        f"of such grains. {advice}"
     )
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from adapters.procedure import FORCE_ERROR_GOAL, FORCE_START_CYCLES, Record, Track, sum_cost
+from adapters.procedure import BOUNDS, Record, Track, sum_cost
 from adapters.report.error import COORDINATION_BAR, HEIGHT_BAR, Comparison, JumpFigures
 
 PROCEDURE, NOTHING, FITTED, FULL = (
@@ -74,7 +74,7 @@ def list_failures(
     force = [
         row["force_error"]
         for _, window in record.run.windows
-        for row in window.rows[FORCE_START_CYCLES:]
+        for row in window.rows[BOUNDS.force_start_cycles :]
     ]
     for name, values, bar in (
         (
@@ -92,7 +92,7 @@ def list_failures(
             [jump.height_change for jump in jumps],
             HEIGHT_BAR,
         ),
-        ("piston's rms force error in its worst cycle after three", force, FORCE_ERROR_GOAL),
+        ("piston's rms force error in its worst cycle after three", force, BOUNDS.force_error_goal),
     ):
         worst = np.nanmax(np.abs([0.0, *values]))
         if worst > bar:

@@ -16,8 +16,7 @@ from adapters.bed.state import make_no_contacts
 from adapters.errors import EngineFailed, NotCredible
 from adapters.files.window import PistonTrack, Window
 from adapters.procedure.checks import (
-    FORCE_ERROR_BOUND,
-    FORCE_START_CYCLES,
+    BOUNDS,
     WindowFigures,
     check_bounds,
     check_complete,
@@ -164,7 +163,7 @@ def test_force_error(cycle: int) -> None:
     force = plain.contact_force.copy()
     force[cycle * SAMPLES : (cycle + 1) * SAMPLES] += 0.3
     figures = measure(SCENE, tracked(contact_force=force))
-    expected = 0.15 if cycle >= FORCE_START_CYCLES else 0.0
+    expected = 0.15 if cycle >= BOUNDS.force_start_cycles else 0.0
     assert figures.force_error == pytest.approx(expected, rel=1e-12)
 
 
@@ -186,7 +185,7 @@ def test_elastic_deflection_is_what_the_piston_comes_back_by() -> None:
         ("overlap_share", OVERLAP_BOUND, "overlap over the smallest radius"),
         ("energy_share", 1.0, "kinetic energy"),
         ("move_share", 1.0, "mean move in one cycle"),
-        ("force_error", FORCE_ERROR_BOUND, "piston's rms force error"),
+        ("force_error", BOUNDS.force_error, "piston's rms force error"),
     ],
 )
 @pytest.mark.parametrize("excess", [1 + 1e-9, 10.0, np.inf])
