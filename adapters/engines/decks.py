@@ -20,7 +20,7 @@ import numpy as np
 
 from adapters.bed import GRAVITY, Container, FloatArray
 from adapters.engines.contract import EngineStart
-from adapters.engines.plan import EQUILIBRIUM_RATIO, count_cycle_steps, plan_seating, plan_settling
+from adapters.engines.plan import PLAN, count_cycle_steps, plan_seating, plan_settling
 from adapters.engines.process import ProcessEngine
 from adapters.scene import Scene
 
@@ -88,7 +88,7 @@ class DeckEngine(ProcessEngine):
         (folder / "grains.data").write_text(text)
         parameters: Parameters = {
             **asdict(plan_settling(scene, height)),
-            "equilibrium_ratio": EQUILIBRIUM_RATIO,
+            "equilibrium_ratio": PLAN.equilibrium_ratio,
             "steps_per_cycle": count_cycle_steps(scene),
         }
         return self._write(scene, folder, PARTS_PREPARE, parameters, piston=False)

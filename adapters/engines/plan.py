@@ -10,17 +10,21 @@ import numpy as np
 from adapters.bed import GRAVITY
 from adapters.scene import Scene
 
-EQUILIBRIUM_RATIO = 1e-6
-"""Kinetic (translational) over potential energy at which a bed counts as settled; section 2.3."""
-SETTLE_TIMES = 40
-"""Falling times after which a bed that still moves is given up."""
-SEAT_SPEED = 0.1
-"""Greatest speed of the piston while it finds the bed [m/s]."""
-SEAT_SHARE = 1.0
-"""Force that seats the piston, over the peak of the load."""
-SEAT_DRAG_SHARE = 0.5
-"""Greatest drag of the seating times the time step over the piston's mass: an explicit step turns
-a drag above 2 into growing oscillations, and one above 1 into oscillations."""
+
+@dataclass(frozen=True)
+class PlanNumbers:
+    """When a bed counts as settled, and how a piston finds it."""
+
+    equilibrium_ratio: float = 1e-6  # translational kinetic over potential energy [-]; section 2.3
+    settle_times: int = 40  # falling times after which a bed that still moves is given up [-]
+    seat_speed: float = 0.1  # greatest one of the piston while it finds the bed [m/s]
+    seat_share: float = 1.0  # force that seats the piston, over the peak of the load [-]
+    seat_drag_share: float = 0.5
+    """Greatest drag of the seating times the time step over the piston's mass [-]: an explicit step
+    turns a drag above 2 into growing oscillations, and one above 1 into oscillations."""
+
+
+PLAN = PlanNumbers()
 
 
 @dataclass(frozen=True)
@@ -29,25 +33,19 @@ class SettlePlan:
 
     check_steps: int
     """Between two looks at the energies; load cycles then start at multiples of their length."""
-    check_limit: int
-    """Looks after which a bed that still moves is given up."""
-    minimum_steps: int
-    """Before the first look that counts: at the start nothing moves yet."""
-    history_steps: int
-    """Between two rows of ``history.txt``."""
+    check_limit: int  # looks after which a bed that still moves is given up
+    minimum_steps: int  # before the first look that counts: at the start nothing moves yet
+    history_steps: int  # between two rows of ``history.txt``
 
 
 @dataclass(frozen=True)
 class SeatPlan:
     """How the piston is pressed on the bed and let go before the first cycle."""
 
-    force: float
-    """That presses [N], held up by a viscous drag of force over speed."""
-    speed: float
-    """Greatest speed [m/s]."""
+    force: float  # that presses [N], held up by a viscous drag of force over speed
+    speed: float  # greatest speed [m/s]
     steps: int
-    release_force: float
-    """That of the load's first instant [N]."""
+    release_force: float  # that of the load's first instant [N]
     release_steps: int
 
 
@@ -64,7 +62,7 @@ def plan_settling(scene: Scene, height: float) -> SettlePlan:
     check_steps = cycle * ceil(0.01 / (cycle * scene.time_step))
     return SettlePlan(
         check_steps,
-        ceil(SETTLE_TIMES * fall_steps / check_steps),
+        ceil(PLAN.settle_times * fall_steps / check_steps),
         ceil(1.2 * fall_steps),
         max(check_steps // 4, 1),
     )
@@ -79,12 +77,12 @@ def plan_seating(scene: Scene) -> SeatPlan:
     assert scene.loading is not None
     steps = scene.steps_per_cycle
     peak = float(scene.stress_at(np.linspace(0, 1, 1001)).max()) * scene.loaded_area
-    followed = SEAT_DRAG_SHARE * scene.loading.piston_mass * SEAT_SPEED / scene.time_step
-    press_s = 2 * scene.sample.grain_radius.law.greatest / SEAT_SPEED
+    followed = PLAN.seat_drag_share * scene.loading.piston_mass * PLAN.seat_speed / scene.time_step
+    press_s = 2 * scene.sample.grain_radius.law.greatest / PLAN.seat_speed
     cycles = ceil(press_s / (steps * scene.time_step))
     return SeatPlan(
-        min(SEAT_SHARE * peak, followed),
-        SEAT_SPEED,
+        min(PLAN.seat_share * peak, followed),
+        PLAN.seat_speed,
         cycles * steps,
         float(scene.stress_at(0.0)) * scene.loaded_area,
         ceil(cycles / 2) * steps,

@@ -15,20 +15,31 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from adapters.bed import list_wall_names
 from adapters.engines.contract import EngineRun, EngineStart
-from adapters.engines.plan import SETTLE_TIMES
+from adapters.engines.plan import PLAN
 from adapters.errors import EngineFailed, EngineMissing, NotConverged
 from adapters.scene import Scene
 
-POLL_S, POLL_MOST_S, POLL_SHARE = 0.05, 1.0, 1e-3
-"""Time between two looks at a running engine [s]; at a long run it grows to so great a part of its
-length, up to the second: a look costs 0.3 ms."""
-END_S = 10
-"""Time an engine has to end when it is asked to [s], before it is killed."""
+
+@dataclass(frozen=True)
+class ProcessNumbers:
+    """Times and lengths by which a process is watched."""
+
+    poll_s: float = 0.05  # between two looks at a running engine [s]: a look costs 0.3 ms,
+    poll_most_s: float = 1.0  # and at most in a long run [s],
+    poll_share: float = 1e-3  # where it is so great a part of the run's length [-]
+    end_s: float = 10  # for an engine to end when it is asked to, before it is killed [s]
+    start_s: float = 30  # from its start in which a second one beside it is looked for [s]
+    start_bytes: int = 1 << 16  # of its print in which the engines' first words are looked for
+    patience_s: float = 60  # for a program to print its version [s]
+
+
+PROCESS = ProcessNumbers()
 
 
 def _die_with_parent() -> None:
@@ -69,8 +80,8 @@ def run_process(
         try:
             pid = 0
             while pid == 0:
-                length = time.monotonic() - started
-                time.sleep(min(max(POLL_S, POLL_SHARE * length), POLL_MOST_S))
+                pause = max(PROCESS.poll_s, PROCESS.poll_share * (time.monotonic() - started))
+                time.sleep(min(pause, PROCESS.poll_most_s))
                 watch()
                 pid, status, usage = os.wait4(child.pid, os.WNOHANG)
         except BaseException:
@@ -81,7 +92,7 @@ def run_process(
 
 
 def end_process(child: subprocess.Popen[bytes]) -> None:
-    """Ask a process group to end, and kill what of it is left after `END_S`.
+    """Ask a process group to end, and kill what of it is left after `PROCESS.end_s`.
 
     A launcher that is killed cannot inform the tasks it started elsewhere: srun's belong to the
     daemon of SLURM, and would go on computing in the folder in which the run is resumed.
@@ -89,7 +100,7 @@ def end_process(child: subprocess.Popen[bytes]) -> None:
     try:
         with suppress(ProcessLookupError):
             os.killpg(child.pid, signal.SIGTERM)
-        until = time.monotonic() + END_S
+        until = time.monotonic() + PROCESS.end_s
         # Not reaped before the last signal: the number of its group stays its own.
         while time.monotonic() < until and not os.waitid(
             os.P_PID, child.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT
@@ -149,10 +160,6 @@ def explain_engine_failure(status: int, folder: Path) -> EngineFailed:
 
 COMPLETE = re.compile(r"^COMPLETE step \d+", re.MULTILINE)
 """The last line of every deck: no exit code proves that a run got so far."""
-START_S = 30
-"""Time from the start of an engine in which a second one beside it is looked for [s]."""
-START_BYTES = 1 << 16
-"""Part of what is printed in which the engines' first words are looked for."""
 
 
 def refuse_several(folder: Path, begun: re.Pattern[str], launch: str) -> None:
@@ -163,7 +170,7 @@ def refuse_several(folder: Path, begun: re.Pattern[str], launch: str) -> None:
     """
     try:
         with (folder / "screen.txt").open("rb") as stream:
-            text = stream.read(START_BYTES).decode(errors="replace")
+            text = stream.read(PROCESS.start_bytes).decode(errors="replace")
     except OSError:
         return
     runs = len(begun.findall(text))
@@ -175,10 +182,6 @@ def refuse_several(folder: Path, begun: re.Pattern[str], launch: str) -> None:
         )
         error.from_outside = True
         raise error
-
-
-PATIENCE_S = 60
-"""Time a program has to print its version [s]."""
 
 
 class ProcessEngine(ABC):
@@ -251,7 +254,7 @@ class ProcessEngine(ABC):
                     text=True,
                     errors="replace",
                     stdin=subprocess.DEVNULL,
-                    timeout=PATIENCE_S,
+                    timeout=PROCESS.patience_s,
                 )
         except (OSError, subprocess.TimeoutExpired) as error:
             raise EngineMissing(
@@ -290,7 +293,7 @@ class ProcessEngine(ABC):
         started, command = time.monotonic(), self.command(scene, deck)
 
         def watch_start() -> None:
-            if time.monotonic() - started < START_S:
+            if time.monotonic() - started < PROCESS.start_s:
                 refuse_several(folder, self.begun, self.launch)
             watch()
 
@@ -299,7 +302,7 @@ class ProcessEngine(ABC):
         text = (folder / "screen.txt").read_text(errors="replace")
         if "NOT SETTLED" in text:
             raise NotConverged(
-                f"the bed still moves after {SETTLE_TIMES} falling times",
+                f"the bed still moves after {PLAN.settle_times} falling times",
                 where=str(folder),
                 remedy="more damping (viscous_alpha), or a shorter time step",
             )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +22,7 @@ from adapters.bed import (
 from adapters.engines.contract import EngineStart
 from adapters.engines.decks import PISTON_MARGIN, bound_box, bound_section, clip_convex, copy_deck
 from adapters.engines.liggghts_decks import MIRROR_YOUNG
-from adapters.engines.plan import EQUILIBRIUM_RATIO, has_friction, plan_seating, plan_settling
+from adapters.engines.plan import PLAN, has_friction, plan_seating, plan_settling
 from adapters.engines.process import ProcessEngine
 from adapters.scene import Scene
 
@@ -62,7 +62,7 @@ class YadeEngine(ProcessEngine):
         """Write the rain of grains; see `adapters.engines.contract.Engine`."""
         content = gather_shared_parameters(scene, height)
         content["settle"] = asdict(plan_settling(scene, height))
-        content["settle"]["equilibrium_ratio"] = EQUILIBRIUM_RATIO
+        content["settle"]["equilibrium_ratio"] = PLAN.equilibrium_ratio
         content["grains"] = {"position": position.tolist(), "radius": radius.tolist()}
         return self._write(folder, "prepare.py", content)
 
@@ -118,15 +118,22 @@ def _describe_load(scene: Scene) -> dict[str, Any]:
     }
 
 
-VERLET_SHARE = 0.1
-"""How far a grain moves before YADE looks for new neighbours, in mean radii."""
-DISC_CORNERS = 96
-"""Corners of the polygon that stands for a disc-shaped piston."""
-RIM_WIDTH = 0.2
-"""How far inside a piston's rim grains still meet the rim, in mean radii: further than one moves in
-a load cycle, or than a contact is wide."""
 NO_WEIGHT = 1.0
 """Density of walls [kg/m^3]: nothing depends on it, and YADE wants one."""
+
+
+@dataclass(frozen=True)
+class YadeNumbers:
+    """Neighbours, and the rim of a piston."""
+
+    verlet_share: float = 0.1  # move of a grain before new neighbours are looked for [mean radii]
+    disc_corners: int = 96  # of the polygon that stands for a disc-shaped piston
+    rim_width: float = 0.2
+    """How far inside a piston's rim grains still meet the rim [mean radii]: further than one moves
+    in a load cycle, or than a contact is wide."""
+
+
+YADE = YadeNumbers()
 
 
 def find_damping_ratio(scene: Scene) -> float:
@@ -161,7 +168,7 @@ def gather_shared_parameters(scene: Scene, height: float) -> dict[str, Any]:
         "grain_count": scene.grain_count,
         "time_step": scene.time_step,
         "gravity": GRAVITY,
-        "verlet_distance": VERLET_SHARE * scene.sample.grain_radius.mean,
+        "verlet_distance": YADE.verlet_share * scene.sample.grain_radius.mean,
         "frictional": has_friction(scene),
         "materials": {m: dict(zip(names, values, strict=True)) for m, values in materials.items()},
         "pairs": _list_pairs(scene),
@@ -237,12 +244,12 @@ def cover_piston(container: Container, reach: float, grain: RadiusDistribution) 
         across = 2 * (np.array(high) + margin - corner)
         face = [corner, corner + np.array([0.0, across[1]]), corner + np.array([across[0], 0.0])]
         return {"triangles": np.array([face]).tolist()}
-    angle = -np.linspace(0.0, 2 * np.pi, DISC_CORNERS + 1)[:-1]
+    angle = -np.linspace(0.0, 2 * np.pi, YADE.disc_corners + 1)[:-1]
     circle = reach * np.column_stack([np.cos(angle), np.sin(angle)])
     floor = [-margin if axis in container.symmetry else -np.inf for axis in "xy"]
     return {
         "triangles": cover_rim(clip_convex(circle, floor)).tolist(),
-        "plane_reach": max(reach - RIM_WIDTH * grain.mean, 0.0),
+        "plane_reach": max(reach - YADE.rim_width * grain.mean, 0.0),
     }
 
 

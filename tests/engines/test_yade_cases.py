@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from adapters.bed import contact_law as law
-from adapters.engines.yade import DISC_CORNERS
+from adapters.engines.yade import YADE
 from tests.engines.test_yade import ALPHA, Bed
 from tests.yade_few_grains import track_run
 from tests.yade_piston import piston_forces, scene_partial
@@ -77,7 +77,7 @@ def test_a_partial_piston_pushes_once() -> None:
     near, beyond = reach - 0.1 * radius, reach + 2 * np.sqrt(2 * radius * overlap)
 
     def at(distance: float, corner: float) -> list[float]:
-        angle = 2 * np.pi * corner / DISC_CORNERS
+        angle = 2 * np.pi * corner / YADE.disc_corners
         place = [distance * np.cos(angle), distance * np.sin(angle)]
         return [*place, height - radius + overlap]
 

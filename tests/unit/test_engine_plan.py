@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adapters.engines.plan import SEAT_DRAG_SHARE, SEAT_SHARE, plan_seating
+from adapters.engines.plan import PLAN, plan_seating
 from adapters.scene.file import load_scene
 from trackbed.scenes import find_scene_file
 
@@ -16,7 +16,7 @@ SHIPPED = ("karrech", "karrech-coarse", "karrech-partial")
 def test_shipped_scenes_are_seated_by_the_peak(name: str) -> None:
     scene = load_scene(find_scene_file(name))
     peak = float(scene.stress_at(np.linspace(0, 1, 1001)).max()) * scene.loaded_area
-    assert plan_seating(scene).force == SEAT_SHARE * peak
+    assert plan_seating(scene).force == PLAN.seat_share * peak
 
 
 @pytest.mark.parametrize("mass", [1e-6, 1e-4, 3e-3])
@@ -30,5 +30,5 @@ def test_drag_of_a_light_piston_is_one_the_step_can_follow(mass: float, load: fl
     )
     plan = plan_seating(scene)
     factor = 1 - plan.force / plan.speed * scene.time_step / mass
-    assert 1 - SEAT_DRAG_SHARE - 1e-12 <= factor < 1
+    assert 1 - PLAN.seat_drag_share - 1e-12 <= factor < 1
     assert plan.force <= amplitude * scene.loaded_area * (1 + 1e-12)

@@ -8,6 +8,7 @@ import shutil
 import signal
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -233,7 +234,7 @@ def test_engine_ends_with_its_run_when_python_lives_on(
 
     Tasks that belong to another process, as srun's do, end with their launcher; it is asked.
     """
-    monkeypatch.setattr(engine_process, "END_S", end_s)
+    monkeypatch.setattr(engine_process, "PROCESS", replace(engine_process.PROCESS, end_s=end_s))
 
     def interrupted() -> None:
         if (tmp_path / "started").exists():
