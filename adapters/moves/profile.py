@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -9,30 +10,32 @@ import numpy as np
 from adapters.bed import Container, FloatArray
 from adapters.moves.contract import Jump, Move, restore_mean
 
-GRAINS_PER_LAYER = 60
-"""At least so many between two knots of the profile: their mean has an eighth of the scatter."""
-LAYERS_MOST = 4
-"""No more knots than a profile has features: bedding below, bulk, loose top."""
-BLOCKS_MOST = 4
-"""Parts of a window from which the scatter of a grain's move is taken, at most."""
+
+@dataclass(frozen=True)
+class ProfileNumbers:
+    """Knots of the profile, and parts of the window."""
+
+    grains_per_layer: int = 60  # between two knots at least: the mean has an eighth of the scatter
+    layers_most: int = 4  # knots, as many as features: bedding below, bulk, loose top
+    blocks_most: int = 4  # parts of a window from which the scatter of a grain's move is taken
+
+
+PROFILE = ProfileNumbers()
 
 
 def find_displacement(jump: Jump) -> FloatArray:
     """u_z(z), piecewise linear and 0 on the floor, and u_r = c r from the axis [m], shape (n, 3).
 
     Both fitted to the moves of all grains' own laws, loose ones counting little
-    (`weigh_grains`).  Every grain keeps its place in the profile: fluctuations are
-    frozen.  The mean vertical move is that of the law of the mean path.  In a box the axis is
-    the middle, or the mirror.
-
-    Do not use it under a piston that covers a
-    part of the section: what it presses down, the profile spreads over all of it.
+    (`weigh_grains`).  Every grain keeps its place in the profile: fluctuations are frozen.  The
+    mean vertical move is that of the law of the mean path.  In a box the axis is the middle, or the
+    mirror.  Not under a piston on a part of the section: what that presses down goes everywhere.
     """
     place, own = jump.place, jump.extrapolate_grains()
     weight = weigh_grains(extrapolate_blocks(jump))
     root = np.sqrt(weight)
     move = np.empty_like(own)
-    layers = int(np.clip(len(place) // GRAINS_PER_LAYER, 1, LAYERS_MOST))
+    layers = int(np.clip(len(place) // PROFILE.grains_per_layer, 1, PROFILE.layers_most))
     knots = np.concatenate([[0.0], np.quantile(place[:, 2], np.arange(1, layers + 1) / layers)])
     hats = np.column_stack([np.interp(place[:, 2], knots, row) for row in np.eye(layers + 1)[1:]])
     found = np.linalg.lstsq(root[:, None] * hats, root * own[:, 2], rcond=None)[0]
@@ -55,13 +58,13 @@ def find_axis(container: Container) -> FloatArray:
 def extrapolate_blocks(jump: Jump) -> FloatArray:
     """The same jump as each of ``b`` equal parts of the window predicts it [m], shape (b, n, 3).
 
-    Parts share the states between them.  ``b`` is `BLOCKS_MOST`, less where a part would be shorter
-    than the law wants it; 0 where not even two parts are long enough.
+    Parts share the states between them.  ``b`` is `PROFILE.blocks_most`, less where a part would be
+    shorter than the law wants it; 0 where not even two parts are long enough.
     """
     law, path = jump.law, jump.position - jump.position[0]
     first, start = law.first_state, float(jump.cycle[-1])
     spans = len(path) - 1 - first
-    blocks = min(BLOCKS_MOST, spans // max(law.minimum_cycles - 1, 1))
+    blocks = min(PROFILE.blocks_most, spans // max(law.minimum_cycles - 1, 1))
     if blocks < 2:
         return np.empty((0, *path.shape[1:]))
     ends = first + np.linspace(0, spans, blocks + 1).round().astype(int)
