@@ -76,35 +76,24 @@ class Control:
     """What is known at a state with every cycle since the last jump computed."""
 
     cycle: int
-    settlement: float
-    """Since the preparation [m]."""
-    windows: tuple[Stretch, ...] = ()
-    """Computed cycles that still count, healing ones left out."""
+    settlement: float  # since the preparation [m]
+    windows: tuple[Stretch, ...] = ()  # computed cycles that still count, healing ones left out
     behind: tuple[Stretch, ...] = ()
     """The same with healing cycles from the second on, which show kappa best."""
-    landings: tuple[Landing, ...] = ()
-    """Jumps that were kept."""
-    kappa: float = 0.0
-    """Of `adapters.jumps.slopes`."""
-    ahead: float = 0.0
-    """What the bed has settled beyond its own rates, all jumps together [m]."""
-    reseated: float = 0.0
-    """What it settled more because it was moved [m]."""
+    landings: tuple[Landing, ...] = ()  # jumps that were kept
+    kappa: float = 0.0  # of `adapters.jumps.slopes`
+    ahead: float = 0.0  # what the bed has settled beyond its own rates, all jumps together [m]
+    reseated: float = 0.0  # what it settled more because it was moved [m]
     curve_cycle: tuple[float, ...] = ()
     curve_settlement: tuple[float, ...] = ()
     """The run's own curve since the past was forgotten last [m]."""
-    last_jump: int = 0
-    """Length of the last jump that was kept; 0 before the first."""
-    longest: float = inf
-    """Longest jump by the errors observed."""
-    last_error: float = 1.0
-    """Realised error of the last jump over its tolerance."""
+    last_jump: int = 0  # length of the last jump that was kept; 0 before the first
+    longest: float = inf  # longest jump by the errors observed
+    last_error: float = 1.0  # realised error of the last jump over its tolerance
     drift: tuple[float, float] = (0.0, 0.0)
     """What rates exceeded their forecasts by, summed upwards and downwards (`jumps.check`)."""
-    attempts: int = 0
-    """Jumps from this state that were taken back."""
-    window: int = FIRST_WINDOW
-    """Cycles of the last window."""
+    attempts: int = 0  # jumps from this state that were taken back
+    window: int = FIRST_WINDOW  # cycles of the last window
 
     @cached_property
     def stretches(self) -> tuple[Stretch, ...]:

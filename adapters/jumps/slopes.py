@@ -45,10 +45,8 @@ SLOPES = SlopeNumbers()
 class Landing:
     """Where a jump ended."""
 
-    cycle: int
-    """Cycles done behind it."""
-    moved: float
-    """G, by which the mean grain was moved [m]."""
+    cycle: int  # cycles done behind it
+    moved: float  # G, by which the mean grain was moved [m]
 
 
 @dataclass(frozen=True, eq=False)

@@ -113,10 +113,7 @@ def cut_windows(cycle: FloatArray) -> list[tuple[float, slice]]:
 def find_increments(
     cycle: FloatArray, displacement: FloatArray, to_cycle: float | FloatArray
 ) -> dict[tuple[str, float], FloatArray]:
-    """Increment to ``to_cycle``, shape (n,), of every law on every window that determines it.
-
-    To m cycles at once: shape (m, n).
-    """
+    """Increment to ``to_cycle``, (n,), or to m, (m, n), of each law on each window telling it."""
     found = {}
     last = float(cycle[-1])
     for decades, rows in cut_windows(cycle):

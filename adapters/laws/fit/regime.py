@@ -16,12 +16,8 @@ from adapters.bed import FloatArray
 
 EXPONENTS = np.linspace(-4.0, 6.0, 201)
 """Exponents beta that are weighed."""
-SHAKEDOWN, STEADY, RATCHETING, COLLAPSE = REGIMES = (
-    "shakedown",
-    "steady",
-    "ratcheting",
-    "collapse",
-)
+REGIMES = ("shakedown", "steady", "ratcheting", "collapse")
+SHAKEDOWN, STEADY, RATCHETING, COLLAPSE = REGIMES
 WHY_NOT = {
     RATCHETING: "the settlement rate falls too slowly (ratcheting)",
     COLLAPSE: "the settlement rate grows (collapse)",
@@ -58,12 +54,9 @@ class Regime:
     """Regime of one series, and the exponent it follows from."""
 
     name: str
-    exponent: float
-    """Mean of beta; the rate falls as N^(beta - 1)."""
-    deviation: float
-    """Standard deviation of beta."""
-    bounded: float
-    """Probability of beta < 0: that the total has an end."""
+    exponent: float  # mean of beta; the rate falls as N^(beta - 1)
+    deviation: float  # standard deviation of beta
+    bounded: float  # probability of beta < 0: that the total has an end
 
     @property
     def jump_allowed(self) -> bool:
