@@ -27,24 +27,24 @@ from qdem_fem.grains.measures import (
 )
 from qdem_fem.grains.meshing import find_radius_ratios, make_grain_elements, place_apex_and_spokes
 
-CANDIDATES = 10
-"""Random points of which the one farthest from the corners so far becomes a corner."""
-LIFT_MOST = 1.05
-LIFT_STEPS = 6
-"""Lifts that are tried, evenly, before a bracket is halved."""
-STRETCH_MOST = 1.2
-"""Largest logarithmic stretch of the longest axis."""
-ROUNDNESS_WITHIN = 0.01
-"""How near the asked roundness counts as met; it jumps where a node ceases to be a ridge."""
-HALVINGS_MOST = 8
-BENT_INWARD = 1e-9
-"""Angle between normals below which an edge may not be bent inward [rad]."""
-LOWERED = 0.9
-"""Factor on the lift of a node whose neighbour's edge is bent inward."""
-DRAWS_MOST = 60
-"""Sets of corners that are drawn for one grain, before its wish counts as out of reach."""
-RATIO_LEAST = 0.2
-"""Smallest radius ratio of a tetrahedron; a grain with a flatter one is drawn again."""
+
+@dataclass(frozen=True)
+class HullNumbers:
+    """Search for a grain of the asked shape."""
+
+    candidates: int = 10  # random points; the farthest from the corners becomes one [-]
+    greatest_lift: float = 1.05  # from flat faces, 0, towards the sphere, 1 [-]
+    lifts: int = 6  # tried, evenly, before a bracket is halved [-]
+    halvings: int = 8  # of the bracket, at most [-]
+    greatest_stretch: float = 1.2  # greatest logarithmic one of the longest axis [-]
+    roundness_within: float = 0.01  # of the asked one is met [-]: it jumps where a ridge ends
+    bent_inward: float = 1e-9  # angle between normals that an edge may be bent inward [rad]
+    lowering: float = 0.9  # factor on the lift of a node beside an edge bent inward [-]
+    draws: int = 60  # sets of corners for one grain, before its wish is out of reach [-]
+    ratio: float = 0.2  # least radius ratio of a tetrahedron [-]: flatter ones are drawn again
+
+
+HULLS = HullNumbers()
 
 
 @dataclass(frozen=True)
@@ -89,8 +89,7 @@ class GrainRecipe:
 class GrainForm:
     """A grain of no particular size."""
 
-    corner_faces: Integers
-    """Triangles of the hull of the M corners, (2 M - 4, 3), outward."""
+    corner_faces: Integers  # triangles of the hull of the M corners, (2 M - 4, 3), outward
     nodes: Floats
     """M corners, the middle of every edge of `find_surface_edges` of ``corner_faces``, and the
     inner nodes of `place_apex_and_spokes`; centroid at zero, (5 M - 5, 3)."""
@@ -102,7 +101,7 @@ def place_corners_apart(generator: np.random.Generator, count: int) -> Floats:
     """Points on the unit sphere (count, 3), each the best of some random ones (Mitchell 1991)."""
     chosen = np.empty((0, 3))
     while len(chosen) < count:
-        tries = generator.standard_normal((CANDIDATES, 3))
+        tries = generator.standard_normal((HULLS.candidates, 3))
         tries /= np.linalg.norm(tries, axis=1)[:, None]
         nearest = (tries @ chosen.T).max(axis=1, initial=-1.0)
         chosen = np.vstack([chosen, tries[np.argmin(nearest)]])
@@ -121,14 +120,14 @@ def find_hull_faces(points: Floats) -> Integers:
 def draw_grain(generator: np.random.Generator, recipe: GrainRecipe) -> GrainForm:
     """One random grain; the same for the same state of ``generator``.
 
-    Corners are drawn again, up to `DRAWS_MOST` times, where those drawn can not be given the
+    Corners are drawn again, up to `HULLS.draws` times, where those drawn can not be given the
     sphericity and roundness that were drawn first, or leave a sliver.  Raises `MeshError` if none
     will do.
     """
     psi = recipe.sphericity + recipe.sphericity_scatter * generator.uniform(-1, 1)
     roundness = recipe.roundness + recipe.roundness_scatter * generator.uniform(-1, 1)
     reached: list[float] = []
-    for _ in range(DRAWS_MOST):
+    for _ in range(HULLS.draws):
         count = int(generator.integers(recipe.corners[0], recipe.corners[1] + 1))
         drawn = _Drawn(generator, count)
         form = drawn.solve(psi, roundness, reached)
@@ -136,7 +135,7 @@ def draw_grain(generator: np.random.Generator, recipe: GrainRecipe) -> GrainForm
             return form
     got = f"roundness {min(reached):.2f} to {max(reached):.2f}" if reached else "less sphericity"
     raise MeshError(
-        f"none of {DRAWS_MOST} random grains has sphericity {psi:.3f} and roundness "
+        f"none of {HULLS.draws} random grains has sphericity {psi:.3f} and roundness "
         f"{roundness:.3f} without a sliver; reached was {got}",
         where="grain recipe",
         remedy="ask for a roundness well within that range, more sphericity, or other corners",
@@ -160,10 +159,10 @@ def make_flat_form(points: Floats) -> GrainForm:
     inner = place_apex_and_spokes(surface, faces, count)
     nodes = np.vstack([surface, inner]) - inner[0]
     worst = find_radius_ratios(nodes, make_grain_elements(nodes, corner_faces)).min()
-    if worst < RATIO_LEAST:
+    if worst < HULLS.ratio:
         raise MeshError(
             f"its flattest tetrahedron has a radius ratio of {worst:.2g}", where="grain shape",
-            remedy=f"keep the corners farther apart: {RATIO_LEAST:g} is the least",
+            remedy=f"keep the corners farther apart: {HULLS.ratio:g} is the least",
         )  # fmt: skip
     volume = integrate_polyhedron(nodes, faces).volume
     psi = find_sphericity(volume, find_surface_area(nodes, faces))
@@ -179,9 +178,7 @@ class _Drawn:
         edges = find_surface_edges(self.corner_faces)
         middles = points[edges.nodes].mean(axis=1)
         self.count = count
-        generator.random(
-            len(middles)
-        )  # of no use since grains have no dents; seeds keep their grains
+        generator.random(len(middles))  # of no use without dents; seeds keep their grains
         self.flat = np.vstack([points, middles])
         self.outward = middles / np.linalg.norm(middles, axis=1)[:, None] - middles
         self.faces = quarter_faces(self.corner_faces, edges)
@@ -198,11 +195,11 @@ class _Drawn:
             nodes = self.flat.copy()
             nodes[self.count :] += lifts[:, None] * self.outward
             _, angle = find_edge_angles(nodes, self.faces, self.edges)
-            inward = np.unique(self.edges.opposite[angle < -BENT_INWARD])
+            inward = np.unique(self.edges.opposite[angle < -HULLS.bent_inward])
             inward = inward[inward >= self.count] - self.count
             if not len(inward):
                 break
-            lifts[inward] *= LOWERED
+            lifts[inward] *= HULLS.lowering
         return nodes
 
     def stretch_nodes(self, nodes: Floats, psi: float) -> Floats | None:
@@ -216,9 +213,9 @@ class _Drawn:
             area = find_surface_area(nodes * np.exp(size * self.axes), self.faces)
             return find_sphericity(volume, area) - psi
 
-        if find_excess(0.0) < 0 or find_excess(STRETCH_MOST) > 0:
+        if find_excess(0.0) < 0 or find_excess(HULLS.greatest_stretch) > 0:
             return None
-        size = brentq(find_excess, 0.0, STRETCH_MOST, xtol=1e-12)
+        size = brentq(find_excess, 0.0, HULLS.greatest_stretch, xtol=1e-12)
         return nodes * np.exp(size * self.axes)
 
     def solve(self, psi: float, roundness: float, reached: list[float]) -> GrainForm | None:
@@ -235,11 +232,11 @@ class _Drawn:
             return reached[-1] - roundness, nodes
 
         below: float | None = None
-        for lift in np.linspace(0.0, LIFT_MOST, LIFT_STEPS):
+        for lift in np.linspace(0.0, HULLS.greatest_lift, HULLS.lifts):
             found = try_lift(float(lift))
             if found is None:
                 below = None
-            elif abs(found[0]) <= ROUNDNESS_WITHIN:
+            elif abs(found[0]) <= HULLS.roundness_within:
                 return self._make_form(found[1], psi, reached[-1])
             elif found[0] < 0:
                 below = float(lift)
@@ -251,12 +248,12 @@ class _Drawn:
         self, below: float, above: float, psi: float, tried: Any, reached: list[float]
     ) -> GrainForm | None:
         """The bracket of two lifts halved until the roundness is near enough; None if it jumps."""
-        for _ in range(HALVINGS_MOST):
+        for _ in range(HULLS.halvings):
             middle = (below + above) / 2
             found = tried(middle)
             if found is None:
                 return None
-            if abs(found[0]) <= ROUNDNESS_WITHIN:
+            if abs(found[0]) <= HULLS.roundness_within:
                 return self._make_form(found[1], psi, reached[-1])
             below, above = (middle, above) if found[0] < 0 else (below, middle)
         return None
@@ -267,7 +264,7 @@ class _Drawn:
         inner = place_apex_and_spokes(turned, self.faces, self.count)
         nodes = np.vstack([turned, inner]) - inner[0]
         worst = find_radius_ratios(nodes, make_grain_elements(nodes, self.corner_faces)).min()
-        return GrainForm(self.corner_faces, nodes, psi, roundness) if worst >= RATIO_LEAST else None
+        return GrainForm(self.corner_faces, nodes, psi, roundness) if worst >= HULLS.ratio else None
 
 
 SHAPE = draw_grain

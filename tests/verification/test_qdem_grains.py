@@ -15,9 +15,7 @@ from qdem_fem.files.arrays import Floats, Integers
 from qdem_fem.files.errors import MeshError
 from qdem_fem.grains.grading import BALLAST, Grading, draw_sizes
 from qdem_fem.grains.hulls import (
-    LIFT_MOST,
-    RATIO_LEAST,
-    ROUNDNESS_WITHIN,
+    HULLS,
     GrainRecipe,
     draw_grain,
     find_hull_faces,
@@ -217,13 +215,13 @@ def test_a_grain_is_what_was_asked(seed: int, psi: float, roundness: float) -> N
     faces = quarter_faces(form.corner_faces, find_surface_edges(form.corner_faces))
     surface = form.nodes[: 4 * corners - 6]
     assert sphericity(surface, faces) == pytest.approx(psi, rel=1e-9)
-    assert find_roundness(surface, faces) == pytest.approx(roundness, abs=ROUNDNESS_WITHIN)
+    assert find_roundness(surface, faces) == pytest.approx(roundness, abs=HULLS.roundness_within)
     _, angle = find_edge_angles(surface, faces, find_surface_edges(faces))
     # 1e-9 before the stretch, which may magnify it by the squared ratio of the axes, e^7.2
     assert angle.min() > -2e-6
     mesh = make_grain_tetrahedra(form.nodes, form.corner_faces)
     assert len(mesh.elements) == 8 * (2 * corners - 4)
-    assert find_radius_ratios(mesh.nodes, mesh.elements).min() >= RATIO_LEAST
+    assert find_radius_ratios(mesh.nodes, mesh.elements).min() >= HULLS.ratio
     _, volumes = find_gradients(mesh.nodes, mesh.elements)
     solid = integrate_polyhedron(surface, faces)
     assert volumes.sum() == pytest.approx(solid.volume, rel=1e-12)
@@ -245,7 +243,7 @@ def test_out_of_reach_says_what_was_reached() -> None:
     recipe = GrainRecipe(roundness=0.98, roundness_scatter=0.0)
     with pytest.raises(MeshError, match=r"roundness 0\.980 .*reached was roundness 0\."):
         draw_grain(np.random.default_rng(0), recipe)
-    assert LIFT_MOST > 1
+    assert HULLS.greatest_lift > 1
 
 
 @pytest.mark.parametrize(
