@@ -13,34 +13,35 @@ from qdem_fem.bodies import Body, find_element_step
 from qdem_fem.contact.system import System
 from qdem_fem.files import Floats
 
-LANCZOS_TOLERANCE = 1e-3
-"""Relative residual; the eigenvalue's own error is of the order of its square."""
-ROUNDS = 20
-ROUND_TOLERANCE = 1e-4
-SHORT = 1 / 3
-"""Share of the median element's own step below which ``2/omega`` is remarkably short: even meshes
-are at 1.3, random points' at 0.6 to 0.8, one element of a thirtieth of its altitude at 0.35."""
-SAMPLE = 4096
-"""Elements of a body that are looked at for the median."""
-PROBE_STRAIN = 1e-9
-"""Strain of the motions that are tried."""
+
+@dataclass(frozen=True)
+class CriticalNumbers:
+    """Search for the highest mode, and the remark on an element that makes the step short."""
+
+    residual: float = 1e-3  # of the eigenvector, relative [-]; the eigenvalue errs by its square
+    rounds: int = 20  # of Lanczos' method at most, where the material is viscous [-]
+    round_change: float = 1e-4  # relative change of the step that ends them [-]
+    short_step: float = 1 / 3
+    """Share of the median element's own step below which ``2/omega`` is short [-]: even meshes are
+    at 1.3, random points' at 0.6 to 0.8, one element of a thirtieth of its altitude at 0.35."""
+    samples: int = 4096  # elements of a body that are looked at for the median [-]
+    strain: float = 1e-9  # of the motions that are tried [-]
+
+
+CRITICAL = CriticalNumbers()
 
 
 @dataclass(frozen=True)
 class CriticalStep:
     """Where the explicit scheme becomes unstable, and which element governs it."""
 
-    value: float
-    """Critical time step [s], on the safe side by the residual of the iteration."""
-    omega: float
-    """Highest angular frequency, without viscosity [rad/s]."""
+    value: float  # critical time step [s], on the safe side by the residual of the iteration
+    omega: float  # highest angular frequency, without viscosity [rad/s]
     element: int
     """The element that governs it: the one with most energy in that motion; -1 where there is no
     deformable body."""
-    body: str
-    """The body that element is in, by whose mesh it is numbered."""
-    mode: Floats
-    """The governing motion, largest component 1, (n, 3)."""
+    body: str  # the body that element is in, by whose mesh it is numbered
+    mode: Floats  # the governing motion, largest component 1, (n, 3)
     remark: str = ""
     """What to know of a step that one element makes much shorter than the others need."""
 
@@ -85,14 +86,14 @@ def find_highest_mode(
     step, rate = inf, 0.0
     if not (multiply(start, 0.0).any() or (viscous and multiply(start, 1.0).any())):
         return inf, 0.0, np.zeros((n, 3))  # all is held
-    for _ in range(ROUNDS):
+    for _ in range(CRITICAL.rounds):
         operator = LinearOperator((3 * n, 3 * n), matvec=partial(multiply, rate=rate), dtype=float)
         if 3 * n <= 24:  # too small for Lanczos
             matrix = np.stack([operator.matvec(e) for e in np.eye(3 * n)])
             values, vectors = np.linalg.eigh((matrix + matrix.T) / 2)
             value, vector = values[-1], vectors[:, -1]
         else:
-            values, vectors = eigsh(operator, k=1, which="LA", tol=LANCZOS_TOLERANCE, v0=start)
+            values, vectors = eigsh(operator, k=1, which="LA", tol=CRITICAL.residual, v0=start)
             value, vector = values[0], vectors[:, 0]
         residual = float(np.linalg.norm(operator.matvec(vector) - value * vector))
         stiffness = float(vector @ multiply(vector, 0.0))
@@ -101,7 +102,7 @@ def find_highest_mode(
             damping = float(vector @ (multiply(vector, 1.0) - multiply(vector, 0.0)))
         before, step = step, find_lagged_viscous_step(stiffness + residual, damping)
         start, rate = vector, 2 / step if np.isfinite(step) else 0.0
-        if not viscous or abs(step - before) < ROUND_TOLERANCE * step:
+        if not viscous or abs(step - before) < CRITICAL.round_change * step:
             break
     return step, stiffness, vector.reshape(n, 3) / root
 
@@ -118,7 +119,7 @@ def find_critical_step(
     if not len(assembly.elements):
         still = np.zeros((assembly.n_nodes, 3))
         return CriticalStep(inf, 0.0, -1, run.bodies[0].name, still)
-    size = PROBE_STRAIN * max(float(np.ptp(body.nodes, axis=0).max()) for body in run.bodies)
+    size = CRITICAL.strain * max(float(np.ptp(body.nodes, axis=0).max()) for body in run.bodies)
     follows = run.master != np.arange(len(run.master))
 
     def accelerate(u: Floats, v: Floats) -> Floats:
@@ -146,18 +147,18 @@ def find_critical_step(
 
 
 def describe_short_step(run: System, stiffness: float, governing: Body, element: int) -> str:
-    """Which element makes the step short, where ``2/sqrt(stiffness)`` is `SHORT`; else nothing.
+    """Which element makes the step short, where ``2/sqrt(stiffness)`` is so; else nothing.
 
     ``stiffness`` [1/s^2]: of the governing motion, without what viscosity takes from the step.
     """
     samples = (
-        find_element_step(body, slice(None, None, 1 + len(body.elements) // SAMPLE))
+        find_element_step(body, slice(None, None, 1 + len(body.elements) // CRITICAL.samples))
         for body in run.bodies
         if not body.rigid
     )
     usual = float(np.median(np.concatenate(list(samples))))
     own = 2 / sqrt(stiffness) if stiffness > 0 else inf
-    if not own < SHORT * usual:
+    if not own < CRITICAL.short_step * usual:
         return ""
     return (
         f"element {element} of {governing.name} makes the critical step {own / usual:.2g} times "

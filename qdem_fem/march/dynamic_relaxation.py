@@ -32,35 +32,34 @@ from qdem_fem.march.rigid_motions import check_held
 from qdem_fem.march.state import State
 from qdem_fem.march.steps import find_inverted
 
-UNCHECKED_MOST = 32
-"""Most steps between two evaluations of the true residual, while forces are nearly linear."""
-RESIDUAL_DRIFT = 0.05
-"""Relative difference of predicted and true residual that asks for more of them."""
-SLOPE_LEFT = 0.3
-"""A step is long enough when the slope along it has dropped to this share."""
-TRIALS = 12
-"""Lengths tried along one direction."""
-UNIT_ROUNDING = 2.2e-16
-"""Residual over ``|M u|`` at which the last bits of the displacement are felt."""
-STALLS = 200
-"""Steps that may be spent there."""
+
+@dataclass(frozen=True)
+class RelaxationNumbers:
+    """Step lengths, checks of the residual, and the end by rounding."""
+
+    interval: int = 32  # most steps between two true residuals, while forces are near linear [-]
+    residual_drift: float = 0.05  # of predicted and true residual that asks for more of them [-]
+    slope_left: float = 0.3  # share of the slope along a step at which it is long enough [-]
+    trials: int = 12  # of lengths along one direction [-]
+    rounding: float = 2.2e-16  # residual over ``|M u|`` at which the last bits of u are felt [-]
+    stalls: int = 200  # steps that may be spent there [-]
+
+
+RELAXATION = RelaxationNumbers()
 
 
 @dataclass(frozen=True)
 class StaticAnswer:
     """How well the equilibrium is met, and what it cost."""
 
-    residual: float
-    """|f_int + f_ext| on what is free, over |f_ext| or, if larger, the reactions."""
+    residual: float  # |f_int + f_ext| on what is free, over |f_ext| or, if larger, the reactions
     error_estimate: float
     """Bound on the relative error of the displacement in the energy norm: all of the residual is
     taken to pull the softest motion that the iteration met.  A residual alone says little of a
     slender body; this says too much, usually by one to three orders of magnitude.  NaN where no
     step was needed, so that no motion was met."""
-    steps: int
-    """Evaluations of the forces, each the cost of a time step."""
-    cpu_s: float
-    """Processor time [s]."""
+    steps: int  # evaluations of the forces, each the cost of a time step
+    cpu_s: float  # processor time [s]
 
 
 def relax(simulation: State, tolerance: float, max_steps: int) -> StaticAnswer:
@@ -166,15 +165,15 @@ def _solve_problem(
     while True:
         size = problem.force_scale(total, r)
         small = np.linalg.norm(r)
-        if small <= UNIT_ROUNDING * np.linalg.norm(u[stiff] / weight[stiff]):
+        if small <= RELAXATION.rounding * np.linalg.norm(u[stiff] / weight[stiff]):
             stalls += 1
-        if small <= tolerance * size or problem.steps >= max_steps or stalls >= STALLS:
+        if small <= tolerance * size or problem.steps >= max_steps or stalls >= RELAXATION.stalls:
             total, _ = forces(u)
             r = project(total)
             found.note(u, r, size, problem)
             if found.residual <= tolerance or problem.steps >= max_steps:
                 return found
-            if stalls >= STALLS:
+            if stalls >= RELAXATION.stalls:
                 found.ended = "where rounding keeps it"
                 return found
             restart = True
@@ -199,8 +198,8 @@ def _solve_problem(
         unchecked = 0 if checked else unchecked + 1
         if checked:
             sure = u
-            loose = drift > RESIDUAL_DRIFT
-            interval = max(1, interval // 4) if loose else min(2 * interval, UNCHECKED_MOST)
+            loose = drift > RELAXATION.residual_drift
+            interval = max(1, interval // 4) if loose else min(2 * interval, RELAXATION.interval)
         before, r = r, project(total)
         z = weight * r
         ratio = max(0.0, float(z @ (r - before)) / rz)
@@ -282,7 +281,7 @@ class StaticProblem:
         predicts.  None when elements turn inside out however short the step is.
         """
         slope = float(direction @ r)
-        for _ in range(TRIALS):
+        for _ in range(RELAXATION.trials):
             trial, sound = self.find_forces(u + sigma * direction)
             if sound:
                 break
@@ -295,10 +294,10 @@ class StaticProblem:
         if not checked:
             return length, total + length * change, 0.0
         predicted = total + length * change
-        for _ in range(TRIALS):
+        for _ in range(RELAXATION.trials):
             true, sound = self.find_forces(u + length * direction)
             left = float(direction @ self.project(true))
-            if sound and abs(left) <= SLOPE_LEFT * slope:
+            if sound and abs(left) <= RELAXATION.slope_left * slope:
                 break
             if not sound:
                 length /= 4

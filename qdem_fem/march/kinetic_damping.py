@@ -32,19 +32,25 @@ from qdem_fem.march.energies import find_energy
 from qdem_fem.march.state import State
 from qdem_fem.march.steps import march
 
-STEPS_A_LOOK = 40
-"""Steps between two looks at the kinetic energy."""
-WAIT = 4
-"""Looks without a greater kinetic energy after which a body is past its peak: a grain that
-topples while it trembles goes on."""
-CHECK = 25
-"""Looks between two judgements of the state."""
-SLOW, SLIDE = 15, 5e-3
-"""Judgements without rest after which bodies are left twice as long, up to this time [s]: what
-slides comes to g t/2 between two stops, millimetres a second on hard springs.  Every other
-judgement is of a stretch with the short `WAIT`: what trembles meanwhile would pass for loose.
-Bodies that are stopped all together are, behind as many, stopped one by one every other judgement:
-where some ring, out of step or fed by their sliders, the sum of all has no peak."""
+
+@dataclass(frozen=True)
+class KineticNumbers:
+    """Looks at the kinetic energy, peaks, judgements of rest."""
+
+    look: int = 40  # steps between two looks [-]
+    wait: int = 4  # looks without a greater energy that tell a peak [-]; what topples goes on
+    looks: int = 25  # between two judgements of the state [-]
+    slow_after: int = 15
+    """Judgements without rest [-] after which bodies are left twice as long, up to
+    ``longest_wait``: what slides comes to g t/2 between two stops, millimetres a second on hard
+    springs.  Every other judgement is of a stretch with the short ``wait``: what trembles meanwhile
+    would pass for loose.  Bodies that are stopped all together are, behind as many, stopped one by
+    one every other judgement: where some ring, out of step or fed by their sliders, the sum of all
+    has no peak."""
+    longest_wait: float = 5e-3  # [s]
+
+
+KINETIC = KineticNumbers()
 
 
 @dataclass(frozen=True)
@@ -55,15 +61,11 @@ class Rest:
     """Root mean square of `find_resultants` over the mean contact force on a vertex [-]."""
     kinetic: float
     """Kinetic energy over that of springs and elements [-]; greatest since the last judgement."""
-    loose: float
-    """Share of bodies on which `find_resultants` exceed half the weight [-]."""
-    touching: int
-    """Vertices that touch."""
-    peaks: int
-    """Times that a body was stopped, or all together."""
+    loose: float  # share of bodies on which `find_resultants` exceed half the weight [-]
+    touching: int  # vertices that touch
+    peaks: int  # times that a body was stopped, or all together
     steps: int
-    time: float
-    """Simulated [s]."""
+    time: float  # simulated [s]
 
 
 def find_resultants(run: State) -> Floats:
@@ -149,27 +151,22 @@ class Damping:
 
     peak: Floats
     """Kinetic energy of each body, or of all, since it was stopped, the greatest [J], (b,)."""
-    since: NDArray[np.int64]
-    """Looks since then, (b,)."""
-    landed: NDArray[np.bool_]
-    """Which have been `find_grounded` since then, (b,)."""
-    first: int
-    """Steps done when it began."""
-    begun: float
-    """Time then [s]."""
+    since: NDArray[np.int64]  # looks since then, (b,)
+    landed: NDArray[np.bool_]  # which have been `find_grounded` since then, (b,)
+    first: int  # steps done when it began
+    begun: float  # time then [s]
     peaks: int = 0
-    wait: int = WAIT
-    """Looks without a greater kinetic energy after which a body is stopped."""
+    wait: int = KINETIC.wait  # looks without a greater kinetic energy after which a body is stopped
     judged: int = 0
 
     def stops_each(self, each: bool) -> bool:
         """Whether bodies are stopped one by one until the next judgement."""
-        return each or (self.judged >= SLOW and self.judged % 2 == 1)
+        return each or (self.judged >= KINETIC.slow_after and self.judged % 2 == 1)
 
     @property
     def waits(self) -> int:
-        """``wait``, and `WAIT` every other judgement."""
-        return WAIT if self.judged % 2 else self.wait
+        """``wait``, and the short one every other judgement."""
+        return KINETIC.wait if self.judged % 2 else self.wait
 
     @classmethod
     def from_run(cls, run: State) -> Damping:
@@ -192,7 +189,7 @@ class Damping:
 
 def find_rest(
     run: State, unbalanced: float, kinetic: float, loose: float, most: float,
-    progress: Callable[[Rest], None] | None = None, look: int = STEPS_A_LOOK, each: bool = True,
+    progress: Callable[[Rest], None] | None = None, look: int = KINETIC.look, each: bool = True,
     damping: Damping | None = None, keep: Callable[[Damping], None] | None = None,
     fall: bool = False,
 ) -> Rest:  # fmt: skip
@@ -228,15 +225,16 @@ def find_rest(
             state.peaks += int(past.sum()) if alone else 1
             state.peak[past] = 0.0
             state.since[past] = 0
-        if looks < CHECK:
+        if looks < KINETIC.looks:
             continue
         done, time = run.steps_done - state.first, run.time - state.begun
         rest = _judge_rest(run, greatest, state.peaks, done, time)
         looks, greatest = 0, 0.0
         state.judged += 1
-        if state.judged % SLOW == 0:
-            state.wait = max(state.wait, min(2 * state.wait, int(SLIDE / (look * run.step))))
-        if not each and state.judged >= SLOW:  # peaks of bodies are none of their sum
+        if state.judged % KINETIC.slow_after == 0:
+            longest = int(KINETIC.longest_wait / (look * run.step))
+            state.wait = max(state.wait, min(2 * state.wait, longest))
+        if not each and state.judged >= KINETIC.slow_after:  # peaks of bodies are none of their sum
             state.peak[:], state.since[:] = 0.0, 0
         if progress is not None:
             progress(rest)

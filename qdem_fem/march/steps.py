@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from math import isnan
 
 import numpy as np
@@ -17,9 +18,17 @@ from qdem_fem.march.energies import find_energy
 from qdem_fem.march.leapfrog import constrain_state, stagger_velocities
 from qdem_fem.march.state import State
 
-WINDOW_STEPS = 4096
-UNSTABLE_GROWTH = 10.0
-"""Kinetic energy over all energy ever put in, above which a motion is called unstable."""
+
+@dataclass(frozen=True)
+class MarchNumbers:
+    """Windows of compiled steps, and the alarm."""
+
+    least_window: int = 16  # steps of a window [-],
+    greatest_window: int = 4096  # and the most
+    unstable_growth: float = 10.0  # of kinetic energy over all ever put in: unstable [-]
+
+
+MARCH = MarchNumbers()
 
 
 def march(
@@ -46,7 +55,8 @@ def march(
     samples = Samples(motion.steps_done, steps, stride, len(nodes))
     if samples.first_step == motion.steps_done and len(samples.record):
         samples.record[0] = assembly.field("displacement")[nodes]
-    most = max(16, min(WINDOW_STEPS, assembly.window_work // max(1, len(assembly.elements))))
+    work = assembly.window_work // max(1, len(assembly.elements))
+    most = max(MARCH.least_window, min(MARCH.greatest_window, work))
     end = motion.steps_done + steps
     window = assembly.advance_window if run.contacts is None else run.contacts.advance_window
     try:
@@ -134,7 +144,7 @@ def check_motion(run: State, bad: float) -> None:
     motion = run.motion
     put_in = motion.put_in + abs(motion.work[:2]).sum() + abs(motion.gravity_work)
     ratio = run.step / run.critical_step.value
-    if not kinetic <= UNSTABLE_GROWTH * put_in and (ratio > 1 or not np.isfinite(kinetic)):
+    if not kinetic <= MARCH.unstable_growth * put_in and (ratio > 1 or not np.isfinite(kinetic)):
         critical = run.critical_step
         raise Unstable(
             f"the motion grew without bound: {kinetic:.3g} J of kinetic energy from "

@@ -12,6 +12,7 @@ from scipy.linalg import eigh
 import qdem_fem as q
 from qdem_fem.files import Floats, Integers
 from qdem_fem.files.errors import ElementInverted, StepWarning, Unstable
+from qdem_fem.march import steps
 from qdem_fem.mesh.generation import jitter_nodes, make_box_mesh
 from qdem_fem.mesh.tetrahedra import TetMesh
 from validation.bench.qdem import hard, judge
@@ -98,7 +99,7 @@ def test_energy_bound_is_broken_above_the_critical_step(monkeypatch: pytest.Monk
     """At 1.001 of the judge's step energy grows by 1.09 each step: the check fails, not the run."""
     problem = hard.make_irregular_cube()
     share = 1.001 / hard.compare_steps(problem)
-    monkeypatch.setattr("qdem_fem.march.steps.UNSTABLE_GROWTH", 1e30)
+    monkeypatch.setattr(steps, "MARCH", replace(steps.MARCH, unstable_growth=1e30))
     energy = hard.sample_energy(problem, share, 600, 100)
     assert energy.max() / energy[0] > 1 / (1 - 0.99**2)
 

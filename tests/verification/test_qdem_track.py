@@ -163,8 +163,8 @@ def test_what_rings_while_the_sum_of_all_grows_is_stopped_by_itself(
 ) -> None:
     """A cube falls, so all together have no peak; the other rings on its springs with a third of
     what bears it, and goes on for ever, unless bodies are stopped one by one now and then."""
-    monkeypatch.setattr(kinetic_damping, "SLOW", slow)
-    monkeypatch.setattr(kinetic_damping, "CHECK", 200)
+    numbers = replace(kinetic_damping.KINETIC, slow_after=slow, looks=200)
+    monkeypatch.setattr(kinetic_damping, "KINETIC", numbers)
     mass, size = 2700.0 * 0.05**3, (0.05, 0.05, 0.05)
     sunk, omega = mass * 9.81 / (8 * STIFFNESS), np.sqrt(8 * STIFFNESS / mass)
     places = ((0.0, RADIUS - sunk), (0.2, 2.0))
@@ -197,22 +197,21 @@ def test_no_equilibrium_in_time_is_an_error() -> None:
         kinetic_damping.find_rest(stacked(True), 1e-3, 1e-4, 0.0, 1e-3, look=1)
 
 
-@pytest.mark.parametrize(("share", "last"), [(0.02, 50), (0.5, kinetic_damping.WAIT)])
+@pytest.mark.parametrize(("share", "last"), [(0.02, 50), (0.5, kinetic_damping.KINETIC.wait)])
 def test_what_does_not_rest_is_left_longer_between_stops(
     share: float, last: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Doubled again and again, up to the time in which a slide gathers way, of looks so long."""
     run, waits = stacked(True), []
-    monkeypatch.setattr(kinetic_damping, "SLOW", 2)
-    monkeypatch.setattr(kinetic_damping, "CHECK", 2)
-    monkeypatch.setattr(kinetic_damping, "SLIDE", run.step / share)
+    numbers = replace(kinetic_damping.KINETIC, slow_after=2, looks=2, longest_wait=run.step / share)
+    monkeypatch.setattr(kinetic_damping, "KINETIC", numbers)
 
     def keep(state: kinetic_damping.Damping) -> None:
         waits.append(state.wait)
 
     with pytest.raises(NotConverged):
         kinetic_damping.find_rest(run, 0.0, 0.0, 0.0, 39 * run.step, look=1, keep=keep)
-    first = kinetic_damping.WAIT
+    first = kinetic_damping.KINETIC.wait
     doubled = [min(first * 2 ** (n // 2), max(last, first)) for n in range(1, len(waits) + 1)]
     assert waits == doubled
     assert waits[-1] == last
