@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from rigid_lcp import BodySpace, solve_friction
 from rigid_lcp.friction.problem.definition import make_problem
 from rigid_lcp.friction.problem.proofs import (
-    CERTAIN_ENERGY,
+    PROOFS,
     find_least_energy,
     gives_energy,
     prove_forces_insufficient,
@@ -49,7 +49,7 @@ def test_a_w_of_bodies_never_gives_energy(seed, dim, mu):
     contacts = int(generator.integers(1, 8))
     jacobian = generator.standard_normal((contacts * dim, 3)) * 10.0 ** generator.integers(-6, 6)
     problem = make_problem(jacobian @ jacobian.T, np.ones(contacts * dim), mu, dim)
-    assert find_least_energy(problem)[0] >= -1e-12 > -CERTAIN_ENERGY
+    assert find_least_energy(problem)[0] >= -1e-12 > -PROOFS.certain_energy
 
 
 def test_the_proof_is_not_asked_of_bodies():

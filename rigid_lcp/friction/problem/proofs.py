@@ -10,6 +10,7 @@ and what an error in W makes of that may have any sign.  Nothing promises a solu
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -19,19 +20,24 @@ from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.friction.problem.cones import find_natural_map
 from rigid_lcp.friction.problem.definition import FrictionProblem
 
-DESCENT_STEPS = 3000
-"""Of the descent: forces that balance each other are found in some dozens, rarely in a thousand."""
-CERTAIN_ENERGY = 1e-10
-"""Energy over that of the same forces on the mean diagonal of W that is no round-off [-]."""
-EQUILIBRATIONS = 3
-"""Rounds of scaling rows and columns to entries of one: HiGHS takes what is below 1e-9 for zero."""
-INFEASIBLE, MARGIN = 1e-7, 1e-12
-"""Approach that is left beside the largest [-]; round-off of a proof's sums beside their parts."""
+
+@dataclass(frozen=True)
+class ProofNumbers:
+    """Descent to the least energy, and forces that do not suffice."""
+
+    descent_steps: int = 3000  # at most [-]: forces in balance take some dozens, rarely a thousand
+    certain_energy: float = 1e-10  # over that on the mean diagonal of W: no round-off [-]
+    equilibrations: int = 3  # of rows and columns [-]: HiGHS takes what is below 1e-9 for zero
+    approach_left: float = 1e-7  # over the largest, that no forces stop [-]
+    round_off: float = 1e-12  # of a proof's sums, over their parts [-]
+
+
+PROOFS = ProofNumbers()
 
 
 def find_least_energy(problem: FrictionProblem) -> tuple[float, Floats]:
     """``rho r . W r`` [-] of forces r in K of length one, and these, (nc * dim,): where a descent
-    from equal normal forces ends, or becomes less than -`CERTAIN_ENERGY`.
+    from equal normal forces ends, or becomes less than -`PROOFS.certain_energy`.
 
     Negative: a proof that W gives energy.  Positive: no proof that it does not, as the least of a
     form that is not convex may be elsewhere.  The steps, ``r -> P_K(r - S r / |S|)`` with S the
@@ -43,10 +49,10 @@ def find_least_energy(problem: FrictionProblem) -> tuple[float, Floats]:
     force = np.zeros(len(problem.offset))
     force[:: problem.dim] = problem.contacts**-0.5
     energy, ahead, momentum = float(force @ (form @ force)), force, 1.0
-    for _ in range(DESCENT_STEPS):
+    for _ in range(PROOFS.descent_steps):
         step = _project_forces(ahead - (form @ ahead) / largest, problem)
         size = float(np.linalg.norm(step))
-        if size == 0.0 or energy < -CERTAIN_ENERGY:
+        if size == 0.0 or energy < -PROOFS.certain_energy:
             break
         step /= size
         reached = float(step @ (form @ step))
@@ -64,10 +70,9 @@ def find_least_energy(problem: FrictionProblem) -> tuple[float, Floats]:
 def gives_energy(problem: FrictionProblem) -> bool:
     """Whether forces are found on which W gives energy; never where it is made of bodies."""
     return (
-        problem.bodies is None
-        and problem.contacts > 0
-        and find_least_energy(problem)[0] < -CERTAIN_ENERGY
-    )
+        problem.bodies is None and problem.contacts > 0
+        and find_least_energy(problem)[0] < -PROOFS.certain_energy
+    )  # fmt: skip
 
 
 def _project_forces(force: Floats, problem: FrictionProblem) -> Floats:
@@ -102,7 +107,7 @@ def prove_forces_insufficient(problem: FrictionProblem, slip: Ints | None = None
         edges.append(sp.csr_array((direction.ravel(), (np.arange(contacts * dim), columns))))
     approach = sp.csr_array(-(problem.delassus[::dim] @ sp.hstack(edges)))
     lengths = np.ones(contacts)
-    for _ in range(EQUILIBRATIONS):
+    for _ in range(PROOFS.equilibrations):
         for axis in (0, 1):
             size = abs(approach).max(axis=axis).toarray().ravel()
             factor = 1.0 / np.where(size > 0.0, size, 1.0)
@@ -114,14 +119,11 @@ def prove_forces_insufficient(problem: FrictionProblem, slip: Ints | None = None
     bound = problem.offset[::dim] * lengths
     bound /= float(np.abs(bound).max()) or 1.0
     found = linprog(
-        np.append(np.zeros(approach.shape[1]), 1.0),
-        A_ub=sp.hstack([approach, np.full((contacts, 1), -1.0)]),
-        b_ub=bound,
-        bounds=(0, None),
-        method="highs",
-    )
-    if found.status != 0 or found.fun <= INFEASIBLE:
+        np.append(np.zeros(approach.shape[1]), 1.0), bounds=(0, None), method="highs",
+        A_ub=sp.hstack([approach, np.full((contacts, 1), -1.0)]), b_ub=bound,
+    )  # fmt: skip
+    if found.status != 0 or found.fun <= PROOFS.approach_left:
         return False
     proof = np.maximum(-found.ineqlin.marginals, 0.0)
-    lessened = approach.T @ proof < -MARGIN * (abs(approach).T @ proof)
+    lessened = approach.T @ proof < -PROOFS.round_off * (abs(approach).T @ proof)
     return bool(bound @ proof < 0.0 and not lessened.any())
