@@ -50,19 +50,25 @@ if TYPE_CHECKING:
     from qdem_fem.march import Simulation
 
 
-FIRM = {f"firm {k}/8": k / 8 for k in range(7, 0, -1)}
-"""Powers of ``softness`` by which the springs of these stages are softer."""
+FIRM = {f"firm {k}/8": k / 8 for k in range(7, 0, -1)}  # powers of ``softness`` of their springs
 STAGES = ("bed", "crib", *FIRM, "hard", "rest")
-FALLS = ("bed", "crib")
-"""Stages in which grains fall."""
-SCATTER = 0.3
-"""Horizontal speed at which grains begin to fall, root mean square [m/s].  Grains that fall plumb
-onto each other and are stopped there stand as towers; poured ones do not."""
-KEEP = 300.0
-"""Seconds between two times that a stage is saved."""
-ROUGH, FIRMER = (0.1, 1e-3, 0.02), (0.1, 0.1, 0.02)
-"""Unbalanced, kinetic and loose share that end stages in which grains fall, and those of stiffer
-springs: there a few of thousands of grains always roll, with most of the energy."""
+FALLS = ("bed", "crib")  # stages in which grains fall
+
+
+@dataclass(frozen=True)
+class BedNumbers:
+    """Preparation of a bed; three numbers are unbalanced, kinetic and loose share of `Rest` [-]."""
+
+    scatter: float = 0.3
+    """Horizontal speed at which grains begin to fall, root mean square [m/s].  Grains that fall
+    plumb onto each other and are stopped there stand as towers; poured ones do not."""
+    saving_interval: float = 300.0  # of a stage [s]
+    falling: tuple[float, float, float] = (0.1, 1e-3, 0.02)  # end stages in which grains fall,
+    firming: tuple[float, float, float] = (0.1, 0.1, 0.02)
+    """And those of stiffer springs: a few grains always roll there, with most of the energy."""
+
+
+BED = BedNumbers()
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +78,7 @@ class Bed:
     stage: str
     nodes: list[Floats]
     """Reference positions of each body's nodes [m]; grains below, beside, then the sleeper."""
-    displacement: Floats
-    """Of all nodes [m], (n, 3)."""
+    displacement: Floats  # of all nodes [m], (n, 3)
     contact: dict[str, NDArray[Any]]
     """Pairs and springs, as `Contacts.pack_state` gives them; empty before the last stage."""
     rests: dict[str, dict[str, float]]
@@ -95,7 +100,7 @@ def prepare_bed(
 ) -> Bed:  # fmt: skip
     """The bed in the file ``path``; made there, stage after stage, where it is not yet.
 
-    A stage is saved every `KEEP` seconds in a file beside it, and where it finds no equilibrium:
+    A stage is saved now and then in a file beside it, and where it finds no equilibrium:
     a kill loses less, and more ``patience`` goes on from there.
     Raises `CheckpointError` for a file of another recipe, `NotConverged` where a stage finds no
     equilibrium, `MeshError` where grains have no room below or beside the sleeper.
@@ -150,7 +155,7 @@ def run_stage(
     run = Simulation([*bodies.values()], gravity=recipe.gravity, threads=threads, contact=contact)
     if SLEEPER in bodies:
         guide_sleeper(run, bodies[SLEEPER], upright=stage == "crib")
-    shares = FIRMER if stage in FIRM else ROUGH
+    shares = BED.firming if stage in FIRM else BED.falling
     if stage in ("hard", "rest"):
         shares = (recipe.unbalanced, recipe.kinetic, recipe.loose)
     report = None if progress is None else (lambda rest: progress(stage, rest))
@@ -204,9 +209,9 @@ class Sitting:
             ) from error  # fmt: skip
 
     def save_if_due(self, damping: Damping) -> None:
-        """Save it, `KEEP` seconds after the last time."""
+        """Save it, `BED.saving_interval` after the last time."""
         self.damping = damping
-        if time.monotonic() - self.saved >= KEEP:
+        if time.monotonic() - self.saved >= BED.saving_interval:
             self.save()
 
     def save(self) -> None:
@@ -236,10 +241,10 @@ def place_start_nodes(
 
 
 def scatter(grains: Sequence[Body], seed: int) -> None:
-    """Give each grain a horizontal velocity of its own, of root mean square `SCATTER`."""
+    """Give each grain a horizontal velocity of its own, of root mean square `BED.scatter`."""
     random = np.random.default_rng([seed, len(grains)])
     for grain in grains:
-        x, y = SCATTER / np.sqrt(2) * random.normal(size=2)
+        x, y = BED.scatter / np.sqrt(2) * random.normal(size=2)
         grain.velocity = np.tile([x, y, 0.0], (len(grain.nodes), 1))
 
 
@@ -270,12 +275,8 @@ def enter_bed(run: Simulation, bed: Bed) -> None:
 def write_bed(path: Path, recipe: BedRecipe, bed: Bed) -> None:
     """Write a bed, atomically."""
     stream = BytesIO()
-    head = {
-        "recipe": recipe.format_json(),
-        "stage": bed.stage,
-        "rests": bed.rests,
-        "stands": bed.stands,
-    }
+    state = {"stage": bed.stage, "rests": bed.rests, "stands": bed.stands}
+    head = {"recipe": recipe.format_json(), **state}
     np.savez_compressed(
         stream, head=json.dumps(head), nodes=np.concatenate(bed.nodes),
         counts=[len(nodes) for nodes in bed.nodes], displacement=bed.displacement,

@@ -62,7 +62,7 @@ def test_a_killed_stage_goes_on_to_the_same_bits(
     whole: Bed, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Killed three times: peaks, steps, places are those of a stage that was not."""
-    monkeypatch.setattr(track_bed, "KEEP", 0.0)
+    monkeypatch.setattr(track_bed, "BED", replace(track_bed.BED, saving_interval=0.0))
     recipe, part = recipe_at(tmp_path), tmp_path / "bed.part.npz"
     for _ in range(3):
         with pytest.raises(Killed):
@@ -75,7 +75,7 @@ def test_a_killed_stage_goes_on_to_the_same_bits(
 
 @pytest.mark.long
 def test_more_patience_goes_on_where_less_gave_up(whole: Bed, tmp_path: Path) -> None:
-    """The message names the time; what was computed is not lost, whatever `KEEP` is."""
+    """The message names the time; what was computed is not lost, whatever the saving interval."""
     recipe, part = recipe_at(tmp_path), tmp_path / "bed.part.npz"
     short = replace(recipe, patience=0.5 * whole.rests["bed"]["time"])
     with pytest.raises(

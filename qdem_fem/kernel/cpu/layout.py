@@ -12,19 +12,24 @@ from qdem_fem.kernel.cpu.arrays import Layout
 from qdem_fem.kernel.cpu.lanes import count_lane
 from qdem_fem.kernel.cpu.ordering import order_for_locality
 
-ALIGNMENT = 64
-"""Bytes of a cache line: a node's four numbers never straddle two of them."""
-LARGE_PAGE = 1 << 21
-"""Bytes of a large page of memory."""
-CHUNK_ELEMENTS = 32_768
-CHUNKS_LEAST, CHUNKS_MOST = 4, 256
-PARALLEL_ELEMENTS = 2_048
-"""Fewer elements than this make one chunk."""
-PIECE_NODES = 2_048
-INTERLEAVE = 16
-"""Elements of a block stand this far apart in the order, so that few of them share a node."""
-
+ALIGNMENT = 64  # bytes of a cache line: a node's four numbers never straddle two of them
+LARGE_PAGE = 1 << 21  # bytes of a large page of memory
 Floats = NDArray[np.floating]
+
+
+@dataclass(frozen=True)
+class LayoutNumbers:
+    """Sizes of what threads share, and the order of elements."""
+
+    parallel_elements: int = 2_048  # fewer make one chunk [-]
+    chunk_elements: int = 32_768  # of a chunk [-],
+    least_chunks: int = 4  # but so many chunks at least
+    most_chunks: int = 256  # and at most
+    piece_nodes: int = 2_048  # of a piece of the motion, at most [-]
+    interleave: int = 16  # a block's elements stand so far apart in order: few share a node [-]
+
+
+LAYOUT = LayoutNumbers()
 
 
 def make_aligned_zeros(count: int, dtype: DTypeLike) -> Floats:
@@ -45,9 +50,9 @@ def make_aligned_zeros(count: int, dtype: DTypeLike) -> Floats:
 
 def count_chunks(n_elements: int) -> int:
     """Chunks of a mesh: a number of the mesh alone, so that results do not depend on threads."""
-    if n_elements < PARALLEL_ELEMENTS:
+    if n_elements < LAYOUT.parallel_elements:
         return 1
-    wanted = max(CHUNKS_LEAST, min(CHUNKS_MOST, n_elements // CHUNK_ELEMENTS))
+    wanted = max(LAYOUT.least_chunks, min(LAYOUT.most_chunks, n_elements // LAYOUT.chunk_elements))
     return 1 << (wanted.bit_length() - 1)
 
 
@@ -56,12 +61,9 @@ class Packed:
     """A mesh in the kernel's order."""
 
     layout: Layout
-    node_order: Integers
-    """User's number of every kernel node, (n,)."""
-    node_place: Integers
-    """Kernel's number of every user node, (n,)."""
-    window_count: int
-    """Numbers in the windows of forces."""
+    node_order: Integers  # user's number of every kernel node, (n,)
+    node_place: Integers  # kernel's number of every user node, (n,)
+    window_count: int  # numbers in the windows of forces
     node_window: Integers
     """A shift of a window that holds the node, by kernel number, (n,); -1 for unused nodes."""
 
@@ -109,7 +111,7 @@ def build_layout(
 
     used = int(window_stop.max())
     cuts = np.unique(
-        np.concatenate([window_low, window_stop, np.arange(0, used, PIECE_NODES), [0, used]])
+        np.concatenate([window_low, window_stop, np.arange(0, used, LAYOUT.piece_nodes), [0, used]])
     )
     holds = (window_low <= cuts[:-1, None]) & (window_stop >= cuts[1:, None])
     chunk_of = np.where(holds.sum(axis=1) == 1, np.argmax(holds, axis=1), chunks)
@@ -153,8 +155,8 @@ def _add_loose(packed: Packed, loose: Integers | None) -> Packed:
 
 
 def _interleave(order: Integers, lanes: int) -> Integers:
-    """Take the lanes of a block from ``INTERLEAVE`` elements apart."""
-    tile = lanes * INTERLEAVE
+    """Take the lanes of a block from `LAYOUT.interleave` elements apart."""
+    tile = lanes * LAYOUT.interleave
     whole = len(order) // tile * tile
-    tiles = order[:whole].reshape(-1, lanes, INTERLEAVE).transpose(0, 2, 1)
+    tiles = order[:whole].reshape(-1, lanes, LAYOUT.interleave).transpose(0, 2, 1)
     return np.concatenate([tiles.ravel(), order[whole:]])
