@@ -54,12 +54,10 @@ class GrainRecipe:
     Raises `MeshError` for values that no grain of this kind can have.
     """
 
-    sphericity: float = 0.82
-    """psi, `find_sphericity` [-]."""
+    sphericity: float = 0.82  # psi, `find_sphericity` [-]
     sphericity_scatter: float = 0.03
     """Half the width of the uniform distribution of psi over the grains [-]."""
-    roundness: float = 0.68
-    """`find_roundness` [-], about 0.62 to 0.85 at this mesh size."""
+    roundness: float = 0.68  # `find_roundness` [-], about 0.62 to 0.85 at this mesh size
     roundness_scatter: float = 0.03
     corners: tuple[int, int] = (8, 9)
     """Fewest and most corners M; a grain has 8 (2 M - 4) tetrahedra and 5 M - 5 nodes."""

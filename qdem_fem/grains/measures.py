@@ -13,21 +13,26 @@ import numpy as np
 from qdem_fem.files import Floats, Integers
 from qdem_fem.mesh import find_area_vectors
 
-FIRST_PLANES = 1e3
-"""Distance of the planes that the search for an inscribed sphere starts from, over the extent."""
-PIVOTS_MOST = 500
-OUTSIDE = 1e-12
-"""Over the extent: what a plane may be violated by, when the inscribed sphere is accepted."""
+
+@dataclass(frozen=True)
+class InscribedNumbers:
+    """Search for the largest inscribed sphere; lengths are over the extent of the body."""
+
+    first_planes: float = 1e3  # distance of the planes that it starts from [-]
+    pivots: int = 500  # at most [-]
+    outside: float = 1e-12  # by which a plane may be violated at the end [-]
+    least_share: float = 1e-12  # of a plane in the one that enters, for which it may leave [-]
+
+
+INSCRIBED = InscribedNumbers()
 
 
 @dataclass(frozen=True)
 class Solid:
     """Volume integrals of a polyhedron of unit density."""
 
-    volume: float
-    """V = integral dV [m^3]; negative where the faces are seen clockwise from outside."""
-    centroid: Floats
-    """integral x dV / V [m], (3,)."""
+    volume: float  # V = integral dV [m^3]; negative where the faces are seen clockwise from outside
+    centroid: Floats  # integral x dV / V [m], (3,)
 
 
 def integrate_polyhedron(nodes: Floats, faces: Integers) -> Solid:
@@ -64,10 +69,8 @@ class Edges:
 
     nodes: Integers
     """The two nodes of each edge, (e, 2), as the first of its faces runs through them."""
-    faces: Integers
-    """The two faces of each edge, (e, 2)."""
-    opposite: Integers
-    """The third node of each of these faces, (e, 2)."""
+    faces: Integers  # the two faces of each edge, (e, 2)
+    opposite: Integers  # the third node of each of these faces, (e, 2)
 
 
 def find_surface_edges(faces: Integers) -> Edges:
@@ -184,17 +187,18 @@ def find_inscribed_sphere(nodes: Floats, faces: Integers) -> tuple[Floats, float
     reach = ((nodes[faces[:, 0]] - origin) * normal).sum(axis=1)
     start = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3)
     rows = np.column_stack([np.vstack([start, normal]), np.ones(len(normal) + 4)])
-    bound = np.concatenate([np.full(4, FIRST_PLANES * extent), reach])
+    bound = np.concatenate([np.full(4, INSCRIBED.first_planes * extent), reach])
     basis = np.arange(4)
-    for _ in range(PIVOTS_MOST):
+    for _ in range(INSCRIBED.pivots):
         inverse = np.linalg.inv(rows[basis])
         x = inverse @ bound[basis]
         slack = bound - rows @ x
         enters = int(np.argmin(slack))
-        if slack[enters] >= -OUTSIDE * extent:
+        if slack[enters] >= -INSCRIBED.outside * extent:
             break
         weight = inverse.T @ np.array([0.0, 0.0, 0.0, 1.0])
         share = inverse.T @ rows[enters]
-        ratio = np.where(share > OUTSIDE, weight / np.where(share > OUTSIDE, share, 1.0), np.inf)
+        may_leave = share > INSCRIBED.least_share
+        ratio = np.where(may_leave, weight / np.where(may_leave, share, 1.0), np.inf)
         basis[int(np.argmin(ratio))] = enters
     return origin + x[:3], float(x[3])

@@ -104,8 +104,7 @@ class _Found:
 
     displacement: Floats
     residual: float = np.inf
-    energy: float = np.inf
-    """``r M^-1 r`` of the true residual [J]."""
+    energy: float = np.inf  # ``r M^-1 r`` of the true residual [J]
     steps: int = 0
     ended: str = "the most allowed"
     lengths: list[float] = field(default_factory=list)

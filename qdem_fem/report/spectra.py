@@ -19,26 +19,30 @@ from qdem_fem.files import Floats, UsageError
 
 ComplexArray = npt.NDArray[np.complex128]
 
-UNEVEN_INTERVAL = 1e-6
-"""Greatest departure of a time interval from the mean one, relative."""
-PADDING = 8
-"""Samples a spectrum is padded to, over those of the record, when peaks are sought."""
-DECAYS = (0.0, 2.0, 6.0, 20.0, 60.0)
-"""Decays over the record that a fit may start from."""
+UNEVEN_INTERVAL = 1e-6  # greatest departure of a time interval from the mean one, relative [-]
+
+
+@dataclass(frozen=True)
+class ModeNumbers:
+    """Search for damped modes."""
+
+    padding: int = 8  # samples of a padded spectrum over those of the record [-]
+    decays: tuple[float, ...] = (0.0, 2.0, 6.0, 20.0, 60.0)  # over the record, fits begin there [-]
+    floor: float = 1e-3  # least amplitude over the greatest [-]
+    remainder: float = 1e-10  # of a fit, over the record, in which no mode is sought [-]
+
+
+MODES = ModeNumbers()
 
 
 @dataclass(frozen=True)
 class Mode:
     """One damped cosine A exp(-decay (t - t_0)) cos(2 pi f (t - t_0) + phase)."""
 
-    frequency: float
-    """Of the damped motion [Hz]."""
-    decay: float
-    """[1/s]; damping ratio = decay / (2 pi f), where that is small."""
-    amplitude: float
-    """At the first sample, t_0; unit of the series."""
-    phase: float
-    """[rad]"""
+    frequency: float  # of the damped motion [Hz]
+    decay: float  # [1/s]; damping ratio = decay / (2 pi f), where that is small
+    amplitude: float  # at the first sample, t_0; unit of the series
+    phase: float  # [rad]
 
 
 def find_amplitudes(time: Floats, values: Floats) -> tuple[Floats, Floats]:
@@ -102,7 +106,7 @@ def find_mobility(
 
 
 def find_peak_frequencies(
-    time: Floats, values: Floats, count: int = 1, floor: float = 1e-3
+    time: Floats, values: Floats, count: int = 1, floor: float = MODES.floor
 ) -> list[Mode]:
     """The ``count`` strongest damped cosines of a record of free motion, strongest first.
 
@@ -131,7 +135,7 @@ def find_peak_frequencies(
         starts = [
             [*start, peak * duration, decay]
             for peak in {_find_highest_peak(left, step, windowed) for windowed in (True, False)}
-            for decay in DECAYS
+            for decay in MODES.decays
         ]
         start = min(starts, key=lambda one: _square_misfit(one, elapsed / duration, target))
         fit = least_squares(
@@ -145,7 +149,7 @@ def find_peak_frequencies(
         if found[-1].amplitude < floor * max(mode.amplitude for mode in found):
             break
         start, modes = list(fit.x), found
-        if np.abs(left).max() < 1e-10:
+        if np.abs(left).max() < MODES.remainder:
             break
     return sorted(modes, key=lambda mode: -mode.amplitude)
 
@@ -155,10 +159,10 @@ def _find_highest_peak(values: Floats, step: float, windowed: bool) -> float:
 
     A Hann window finds modes that last, and would hide one that dies out at once.
     """
-    length = PADDING * len(values)
+    length = MODES.padding * len(values)
     weight = _make_hann(len(values)) if windowed else np.ones(len(values))
     spectrum = np.abs(np.fft.rfft(weight * values, length))
-    lowest = PADDING // 2
+    lowest = MODES.padding // 2
     top = lowest + int(np.argmax(spectrum[lowest:-1]))
     before, at, after = spectrum[top - 1 : top + 2]
     bend = before - 2 * at + after

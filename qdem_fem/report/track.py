@@ -22,12 +22,9 @@ from qdem_fem.report.spectra import find_mobility, smooth_spectrum, transform_re
 
 GRAINS = ("B1", "B2", "B3", "B2a")
 SENSORS = ("S1", "S2", "S3")
-BANDWIDTH = 20.0
-"""Of the Parzen window [Hz], as in Figs. 9 to 12."""
-HIGHEST = 1000.0
-"""Frequency up to which the paper reads its spectra [Hz]."""
-FEWEST_SAMPLES = 5
-"""Samples of a record that has spectra: with rest before them, second differences leave four."""
+BANDWIDTH = 20.0  # of the Parzen window [Hz], as in Figs. 9 to 12
+HIGHEST = 1000.0  # frequency up to which the paper reads its spectra [Hz]
+FEWEST_SAMPLES = 5  # of a record with spectra [-]: rest before them, second differences leave four
 
 
 def find_accelerations(time: Floats, values: Floats) -> tuple[Floats, Floats]:

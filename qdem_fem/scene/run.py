@@ -17,14 +17,23 @@ from qdem_fem.tables import Prepared
 from trackbed.run_files import RESULT, note_signals, read_object, write_pvd, write_whole
 from trackbed.run_files import folder as run_folder
 
-CHUNK_WORK = 50_000_000
-"""Element-steps between two looks at the clock and the signals: a second or a few."""
-ENERGY = 100
-"""Least steps between rows of energies, unless asked otherwise: a row costs as much as twenty."""
 ENERGIES = ("kinetic", "elastic", "external")
 CONTACT_ENERGIES = ("contact", "friction")
 VISCOUS_ENERGY = ("viscous",)
 CHECKPOINT, COST = "checkpoint.npz", "cost.json"
+
+
+@dataclass(frozen=True)
+class PlanNumbers:
+    """How often a run records and looks up, unless asked otherwise."""
+
+    samples: int = 2000  # of the probes in a run [-]
+    energy_rows: int = 200  # in a run [-],
+    energy_steps: int = 100  # and steps between two at least [-]: a row costs as much as twenty
+    chunk_work: int = 50_000_000  # element-steps between looks at clock and signals [-]: seconds
+
+
+PLAN = PlanNumbers()
 
 
 class RunFolder(run_folder.RunFolder):
@@ -54,16 +63,14 @@ class Plan:
     They depend on the scene alone, so that an interrupted run writes what a whole one does.
     """
 
-    step: float
-    """[s]"""
+    step: float  # [s]
     total: int
     sampling: int
     chunk: int
     """Steps that are computed at one go; fixed, as sums over them round differently otherwise."""
     energy: int
     fields: int
-    every_field: bool
-    """Whether fields are written on the way, or only at the end."""
+    every_field: bool  # whether fields are written on the way, or only at the end
 
     def find_next_stop(self, done: int) -> int:
         """Steps at which the computation comes back next."""
@@ -87,13 +94,14 @@ def make_plan(prepared: Prepared, step: float) -> Plan:
     def round_steps(interval: float, unit: int) -> int:
         return unit * max(1, round(interval / (unit * step)))
 
-    sampling = round_steps(output.sampling or duration / 2000, 1)
+    spacing = max(duration / PLAN.energy_rows, PLAN.energy_steps * step)
+    sampling = round_steps(output.sampling or duration / PLAN.samples, 1)
     return Plan(
         step=step,
         total=sampling * max(1, ceil(duration / (sampling * step) - 1e-6)),
         sampling=sampling,
-        chunk=sampling * max(1, CHUNK_WORK // (elements * sampling)),
-        energy=round_steps(output.energy_interval or max(duration / 200, ENERGY * step), sampling),
+        chunk=sampling * max(1, PLAN.chunk_work // (elements * sampling)),
+        energy=round_steps(output.energy_interval or spacing, sampling),
         fields=round_steps(output.vtu_interval or duration, sampling),
         every_field=output.vtu_interval is not None,
     )
@@ -103,13 +111,10 @@ def make_plan(prepared: Prepared, step: float) -> Plan:
 class Done:
     """A run at its end."""
 
-    run: Any
-    """`qdem_fem.Simulation`"""
+    run: Any  # `qdem_fem.Simulation`
     bodies: dict[str, Any]
-    plan: Plan | None
-    """None for a static answer."""
-    cost: dict[str, float]
-    """``cpu_s`` and ``wall_s`` [s] of advancing, all sittings together."""
+    plan: Plan | None  # None for a static answer
+    cost: dict[str, float]  # ``cpu_s`` and ``wall_s`` [s] of advancing, all sittings together
     static: dict[str, float] = field(default_factory=dict)
     """``residual`` and ``error_estimate`` of a static answer [-], ``steps`` it took."""
 

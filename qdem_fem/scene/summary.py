@@ -13,10 +13,8 @@ from qdem_fem.scene.energy_account import list_energy_facts
 from qdem_fem.scene.run import Done, RunFolder
 from qdem_fem.tables import Prepared
 
-MOVING = 1e-3
-"""Share of the greatest displacement below which a component does not count as moving."""
-FREE_SAMPLES = 50
-"""Least number of samples of free motion in which modes are sought."""
+MOVING = 1e-3  # share of the greatest displacement below which a component does not move [-]
+FREE_SAMPLES = 50  # of free motion at least, for modes to be sought in it [-]
 
 
 def summarise_run(prepared: Prepared, done: Done, folder: RunFolder) -> dict[str, Any]:

@@ -30,14 +30,10 @@ import numpy as np
 from qdem_fem.contact.search import PeriodicWidth
 from qdem_fem.files import ConditionError, Floats, is_real
 
-SKIN_OF_SPHERES = 0.1
-"""Thickness of the skin of the neighbour list, over the smallest radius."""
-ALONG = 1e-6
-"""Sine of the angle to an axis below which a wall is along it."""
-CONTACTS = 3
-"""Contacts that a vertex may have at once for the time step still to be below the critical one."""
-NEAR: Literal["near"] = "near"
-"""In place of their number: those it may have with what is within the skin now."""
+SKIN_OF_SPHERES = 0.1  # thickness of the neighbour list's skin, over the smallest radius [-]
+ALONG_SINE = 1e-6  # of the angle to an axis below which a wall is along it [-]
+CONTACTS = 3  # of a vertex at once for the time step still to be below the critical one [-]
+NEAR: Literal["near"] = "near"  # instead: as many as it may have within the skin now
 
 
 def find_tangential_stiffness(normal: Any, poisson: Any) -> Any:
@@ -155,7 +151,7 @@ def check_planes_along(periodic: Any, planes: Sequence[ContactPlane]) -> None:
         raise ConditionError(f"{periodic!r} is no PeriodicWidth", where="contact, periodic")
     for number, plane in enumerate(planes):
         normal = np.asarray(plane.normal, dtype=float)
-        if abs(normal[periodic.number]) > ALONG * np.linalg.norm(normal):
+        if abs(normal[periodic.number]) > ALONG_SINE * np.linalg.norm(normal):
             raise ConditionError(
                 f"its normal has a part along {periodic.axis}, where the width is periodic",
                 where=f"contact, plane.{number}",

@@ -36,10 +36,8 @@ from qdem_fem.contact.spheres import (
 from qdem_fem.files import Floats, Integers
 from qdem_fem.mesh import find_area_vectors
 
-DEPTH = 0.1
-"""Greatest depth, over the median edge of the surfaces."""
-SHARP = 0.9
-"""Cosine between the normals of two faces below which their edge is one that may cross others."""
+DEPTH = 0.1  # greatest one, over the median edge of the surfaces [-]
+SHARP_COSINE = 0.9  # between two faces' normals: below, their edge may cross others [-]
 
 
 @dataclass(frozen=True)
@@ -96,7 +94,7 @@ def place_points(parts: int) -> Floats:
 
 
 def find_sharp_edges(nodes: Floats, faces: Integers) -> tuple[Integers, Integers]:
-    """Edges (e, 2) where a surface turns by more than `SHARP`, outward, and what is across them.
+    """Edges (e, 2) where a surface turns sharply outward (`SHARP_COSINE`), and what is across them.
 
     ``nodes`` (n, 3) [m], ``faces`` (f, 3) outward.  The second is (e, 2): the nodes opposite of
     each edge in its two faces.
@@ -114,7 +112,7 @@ def find_sharp_edges(nodes: Floats, faces: Integers) -> tuple[Integers, Integers
                 continue
             before, there = seen[key]
             convex = normal[before] @ (nodes[third] - nodes[one]) < 0
-            if convex and normal[before] @ normal[face] < SHARP:
+            if convex and normal[before] @ normal[face] < SHARP_COSINE:
                 edges.append(key)
                 opposite.append((there, third))
     return (

@@ -25,12 +25,9 @@ from qdem_fem.track.loads.rolling import find_rolling_forces
 from qdem_fem.track.loads.roughness import Roughness
 from trackbed.run_files import write_whole
 
-RATE = 10_000.0
-"""Samples a second of the paper's record (section 4) [Hz]."""
-SEATS = ("rp1", "rp2")
-"""Columns of the right and the left rail seat, by the names of the paper's Fig. 5."""
-MOST_SAMPLES = 10_000_000
-"""Samples of a record: 17 minutes at 10 kHz."""
+RATE = 10_000.0  # samples a second of the paper's record (section 4) [Hz]
+SEATS = ("rp1", "rp2")  # columns of the right and the left rail seat, named as in Fig. 5
+MOST_SAMPLES = 10_000_000  # of a record [-]: 17 minutes at 10 kHz
 
 
 @dataclass(frozen=True)
@@ -42,16 +39,11 @@ class Train:
     """
 
     cars: int = 5
-    car_length: float = 20.0
-    """From one car to the next [m]."""
-    bogie_distance: float = 13.8
-    """Between the middles of the bogies of a car [m]."""
-    axle_distance: float = 2.1
-    """Between the axles of a bogie [m]."""
-    axle_load: float = 100e3
-    """Of both wheels [N]."""
-    speed: float = 32.0
-    """[m/s]."""
+    car_length: float = 20.0  # from one car to the next [m]
+    bogie_distance: float = 13.8  # between the middles of the bogies of a car [m]
+    axle_distance: float = 2.1  # between the axles of a bogie [m]
+    axle_load: float = 100e3  # of both wheels [N]
+    speed: float = 32.0  # [m/s]
     first_share: float = 0.5
     """Share of an axle load on the rail of seat 1; the paper's two rails differ [-]."""
 
@@ -97,14 +89,10 @@ class WheelFlat:
     short formula holds.
     """
 
-    axle: int
-    """Its number from 0, from the front."""
-    peak: float
-    """Of the added force of one wheel on the rail [N]."""
-    duration: float
-    """[s]."""
-    wheel_radius: float = 0.43
-    """[m]."""
+    axle: int  # its number from 0, from the front
+    peak: float  # of the added force of one wheel on the rail [N]
+    duration: float  # [s]
+    wheel_radius: float = 0.43  # [m]
     place: float = 0.0
     """Where on the rail one of the impacts begins, from the sleeper [m]; others follow at
     multiples of 2 pi times the radius."""
@@ -158,8 +146,7 @@ def find_flat_forces(
 class LoadRecord:
     """Pressures sampled at an even rate."""
 
-    time: Floats
-    """[s], (k,), growing evenly."""
+    time: Floats  # [s], (k,), growing evenly
     pressure: Floats
     """Pressure on seat 1 and 2 [Pa], (k, 2); negative where the rail lifts the sleeper."""
 
