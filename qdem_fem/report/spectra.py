@@ -19,6 +19,7 @@ from qdem_fem.files import Floats, UsageError
 
 ComplexArray = npt.NDArray[np.complex128]
 
+BANDWIDTH = 20.0  # of the Parzen window [Hz], as in Figs. 9 to 12 of the paper
 UNEVEN_INTERVAL = 1e-6  # greatest departure of a time interval from the mean one, relative [-]
 
 
@@ -67,7 +68,7 @@ def transform_record(time: Floats, values: Floats) -> tuple[Floats, ComplexArray
     return frequency, step * np.fft.rfft(values) * np.exp(-2j * pi * frequency * time[0])
 
 
-def smooth_spectrum(frequency: Floats, amplitude: Floats, bandwidth: float = 20.0) -> Floats:
+def smooth_spectrum(frequency: Floats, amplitude: Floats, bandwidth: float = BANDWIDTH) -> Floats:
     """An amplitude spectrum smoothed by a Parzen window, as in Figs. 9-12 of the paper.
 
     The power |X|^2 is averaged by W(f) = 3/4 u (sin(pi u f/2) / (pi u f/2))^4, u = 280/(151 b)
@@ -87,7 +88,7 @@ def smooth_spectrum(frequency: Floats, amplitude: Floats, bandwidth: float = 20.
 
 
 def find_mobility(
-    time: Floats, force: Floats, velocity: Floats, bandwidth: float = 20.0
+    time: Floats, force: Floats, velocity: Floats, bandwidth: float = BANDWIDTH
 ) -> tuple[Floats, Floats]:
     """Frequencies [Hz] and mobility |H| = |V| / |F| [m/(s N)] (Fig. 12 of the paper).
 

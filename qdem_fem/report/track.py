@@ -18,11 +18,10 @@ import numpy as np
 
 from qdem_fem.files import Floats, Series, read_table
 from qdem_fem.report import figures as pictures
-from qdem_fem.report.spectra import find_mobility, smooth_spectrum, transform_record
+from qdem_fem.report.spectra import BANDWIDTH, find_mobility, smooth_spectrum, transform_record
 
 GRAINS = ("B1", "B2", "B3", "B2a")
 SENSORS = ("S1", "S2", "S3")
-BANDWIDTH = 20.0  # of the Parzen window [Hz], as in Figs. 9 to 12
 HIGHEST = 1000.0  # frequency up to which the paper reads its spectra [Hz]
 FEWEST_SAMPLES = 5  # of a record with spectra [-]: rest before them, second differences leave four
 

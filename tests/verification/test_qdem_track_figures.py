@@ -11,9 +11,8 @@ from scipy.signal import periodogram
 
 from qdem_fem.files.output import Table
 from qdem_fem.files.series import Series
-from qdem_fem.report.spectra import find_mobility, smooth_spectrum, transform_record
+from qdem_fem.report.spectra import BANDWIDTH, find_mobility, smooth_spectrum, transform_record
 from qdem_fem.report.track import (
-    BANDWIDTH,
     FEWEST_SAMPLES,
     GRAINS,
     SENSORS,

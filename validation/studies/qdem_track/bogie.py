@@ -10,9 +10,8 @@ import numpy as np
 from qdem_fem.files.arrays import Floats
 from qdem_fem.files.errors import UsageError
 from qdem_fem.files.output import read_table
-from qdem_fem.report.spectra import smooth_spectrum, transform_record
+from qdem_fem.report.spectra import BANDWIDTH, smooth_spectrum, transform_record
 from qdem_fem.report.track import (
-    BANDWIDTH,
     GRAINS,
     HIGHEST,
     find_acceleration_spectrum,
