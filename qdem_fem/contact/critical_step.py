@@ -137,13 +137,10 @@ def find_critical_step(
     mode = mode[run.master]
     body, element = find_governing_element(run, mode)
     return CriticalStep(
-        value=float(step),
-        omega=float(np.sqrt(max(stiffness, 0.0))),
-        element=element,
-        body=body.name,
-        mode=mode / (abs(mode).max() or 1.0),
+        value=float(step), omega=float(np.sqrt(max(stiffness, 0.0))),
+        element=element, body=body.name, mode=mode / (abs(mode).max() or 1.0),
         remark=describe_short_step(run, stiffness, body, element),
-    )
+    )  # fmt: skip
 
 
 def describe_short_step(run: System, stiffness: float, governing: Body, element: int) -> str:

@@ -76,11 +76,10 @@ class GrainRecipe:
         ):  # fmt: skip
             if not sound:
                 raise MeshError(
-                    f"no grain has {what}",
-                    where="grain recipe",
+                    f"no grain has {what}", where="grain recipe",
                     remedy="use sphericity 0.4 to 0.97, roundness 0.3 to 1, scatters of 0 or more "
                     "within them, 6 to 40 corners",
-                )
+                )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -134,10 +133,9 @@ def draw_grain(generator: np.random.Generator, recipe: GrainRecipe) -> GrainForm
     got = f"roundness {min(reached):.2f} to {max(reached):.2f}" if reached else "less sphericity"
     raise MeshError(
         f"none of {HULLS.draws} random grains has sphericity {psi:.3f} and roundness "
-        f"{roundness:.3f} without a sliver; reached was {got}",
-        where="grain recipe",
+        f"{roundness:.3f} without a sliver; reached was {got}", where="grain recipe",
         remedy="ask for a roundness well within that range, more sphericity, or other corners",
-    )
+    )  # fmt: skip
 
 
 def make_flat_form(points: Floats) -> GrainForm:

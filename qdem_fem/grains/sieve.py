@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -9,9 +10,20 @@ from scipy.spatial.transform import Rotation
 
 from qdem_fem.files import Floats
 
-STARTS, KEPT, ROUNDS, TRIES = 3000, 16, 34, 12
-FIRST_TURN, SHRINK = 0.3, 0.75
-"""Random turns of the first round [rad], and their factor from round to round: 0.3 to 2e-5."""
+
+@dataclass(frozen=True)
+class SieveNumbers:
+    """Search over rotations."""
+
+    starts: int = 3000  # rotations that are tried first [-]
+    kept: int = 16  # best of them, which are refined [-]
+    rounds: int = 34  # of refinement [-]
+    tries: int = 12  # random turns in a round [-]
+    first_turn: float = 0.3  # size of turns in the first round [rad]
+    shrink: float = 0.75  # their factor from round to round [-]: 0.3 to 2e-5
+
+
+SIEVE = SieveNumbers()
 
 
 def find_sieve_size(nodes: Floats) -> float:
@@ -28,12 +40,12 @@ def find_sieve_size(nodes: Floats) -> float:
     pass a smaller hole: D is an upper bound of that.
 
     The definition is that of a grain's sieving size in Math. Probl. Eng. 2021, 6659285; here the
-    minimum over all rotations is searched from `STARTS` fixed ones, the best `KEPT` of them refined
+    minimum over all rotations is searched from fixed ones, the best of them refined (`SIEVE`)
     by shrinking random turns, the same for every grain.
     """
     x = nodes - nodes.mean(axis=0)
     starts, turns = _make_rotations()
-    frames = starts[np.argsort(_measure_hole(x, starts), kind="stable")[:KEPT]]
+    frames = starts[np.argsort(_measure_hole(x, starts), kind="stable")[: SIEVE.kept]]
     for turn in turns:
         tries = np.einsum("kil,tlj->ktij", frames, turn)
         tries[:, 0] = frames
@@ -47,11 +59,11 @@ def find_sieve_size(nodes: Floats) -> float:
 def _make_rotations() -> tuple[Floats, Floats]:
     """Frames to start from (s, 2, 3), and turns (rounds, tries, 3, 3) that get smaller."""
     generator = np.random.default_rng(0)
-    starts = Rotation.from_quat(generator.standard_normal((STARTS, 4))).as_matrix()[:, :2]
-    size = FIRST_TURN * SHRINK ** np.arange(ROUNDS)
-    vectors = size[:, None, None] * generator.standard_normal((ROUNDS, TRIES, 3))
+    starts = Rotation.from_quat(generator.standard_normal((SIEVE.starts, 4))).as_matrix()[:, :2]
+    size = SIEVE.first_turn * SIEVE.shrink ** np.arange(SIEVE.rounds)
+    vectors = size[:, None, None] * generator.standard_normal((SIEVE.rounds, SIEVE.tries, 3))
     turns = Rotation.from_rotvec(vectors.reshape(-1, 3)).as_matrix().transpose(0, 2, 1)
-    return starts, turns.reshape(ROUNDS, TRIES, 3, 3)
+    return starts, turns.reshape(SIEVE.rounds, SIEVE.tries, 3, 3)
 
 
 def _measure_hole(x: Floats, frames: Floats) -> Floats:

@@ -86,16 +86,13 @@ def relax(simulation: State, tolerance: float, max_steps: int) -> StaticAnswer:
     if not found.residual <= tolerance:
         raise NotConverged(
             f"the residual is {found.residual:.2e} after {found.steps} steps, {found.ended}; "
-            f"{tolerance:.0e} was asked",
-            where="relax",
+            f"{tolerance:.0e} was asked", where="relax",
             remedy="call relax again to go on, ask for less, or apply the load in parts",
-        )
+        )  # fmt: skip
     return StaticAnswer(
-        residual=found.residual,
-        error_estimate=found.error(2 * after.elastic),
-        steps=found.steps,
-        cpu_s=time.process_time() - started,
-    )
+        residual=found.residual, error_estimate=found.error(2 * after.elastic),
+        steps=found.steps, cpu_s=time.process_time() - started,
+    )  # fmt: skip
 
 
 @dataclass
