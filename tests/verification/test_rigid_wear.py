@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rigid_lcp import (
@@ -26,7 +26,6 @@ from rigid_lcp.motion import make_world
 from rigid_lcp.shapes import make_quaternion, multiply_quaternions
 from rigid_lcp.wear.abrasion import find_energy, find_slip_work, rub_grains, start_wear, swap_worn
 from rigid_lcp.wear.cuts import (
-    cut_shape,
     find_cut_depth,
     find_volume,
     make_unworn,
@@ -246,6 +245,7 @@ SOLIDS = ("stone", "needle", "sliver", "tetrahedron", "plate")
 )
 @settings(max_examples=10, deadline=None)
 @given(seed=st.integers(0, 10**6), share=st.floats(1e-9, 0.03))
+@example(seed=84489, share=1e-9)  # of the sliver: triangles 1 m long and 1e-8 m high
 def test_worn_shapes_lose_exactly_what_they_shall(form, seed, share):
     """Any shape, worn at any features, repeatedly: volume to round-off, inside the first.
 
@@ -274,28 +274,6 @@ def test_worn_shapes_lose_exactly_what_they_shall(form, seed, share):
     height = (grain.shape.vertices + place) @ shape.normals.T - level
     assert height.max() < 1e-9 * shape.reach
     assert len(grain.normal) <= len(shape.vertices) + len(shape.edges)
-
-
-@pytest.mark.parametrize("seed", [15, 66, 73, 87])
-def test_faces_of_cuts_hardly_deeper_than_the_tolerance_hold_their_corners(seed):
-    """Triangles 1 m long and 1e-8 m high: a plain cross product lies 1e-8 m beside its corners.
-
-    Faces of a closed polyhedron satisfy sum A n = 0 (Gauss).  Each loop keeps to its plane within
-    `FLATNESS` of the size, 1e-9, on either side of the first triangle's plane.
-    """
-    rng, shape = np.random.default_rng(seed), SLIVER
-    for _ in range(6):
-        ends = shape.edges[rng.integers(len(shape.edges)), 2:]
-        normal = shape.normals[ends].sum(axis=0)
-        volume = 10 ** rng.uniform(-10, -7) * shape.volume
-        shape = (cut_shape(shape, normal / np.linalg.norm(normal), volume) or [shape])[0]
-    total = np.zeros(3)
-    for loop, normal, distance in zip(shape.faces, shape.normals, shape.distances, strict=True):
-        corner = shape.vertices[loop]
-        assert corner @ normal == pytest.approx(distance, abs=2e-9 * shape.reach)
-        total += np.cross(corner, np.roll(corner, -1, axis=0)).sum(axis=0) / 2
-    assert np.abs(total).max() < 2e-9 * shape.reach**2
-    assert len(shape.vertices) - len(shape.edges) + len(shape.faces) == 2  # Euler
 
 
 @pytest.mark.parametrize("shape", [SQUARE, CUBE])
