@@ -86,7 +86,6 @@ def is_proved_insoluble(problem: FrictionProblem) -> bool:
 
 FROM_PATH = (
     Stage("sharp path", lambda t: not t.sharp, along.follow_sharp_path),
-    Stage("sweeps first", lambda t: t.sweeps_a_factorisation > 20.0, by.sweep_from_path),
     Stage("smoothed path", lambda t: True, along.smooth_further),
     Stage("turns", lambda t: True, lambda t: by.take_turns(t, t.best.r)),
 )  # fmt: skip

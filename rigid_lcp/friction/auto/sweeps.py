@@ -113,13 +113,6 @@ def turn_once(trial: Trial) -> bool:
     return True
 
 
-def sweep_from_path(trial: Trial) -> bool:
-    """Sweeps of one turn from the end of the convex path."""
-    assert trial.path_end is not None
-    sweep_turn(trial, trial.path_end)
-    return trial.best.solved
-
-
 def sweep_turn(trial: Trial, start: Floats) -> FrictionSolution:
     """Sweeps of one turn from ``start``, and where they end."""
     found = trial.run_sweeps(start, trial.tolerance, TURNS.sweeps, last=True)

@@ -226,13 +226,8 @@ class Trial:
     @property
     def dear(self) -> bool:
         """Whether a factorisation costs as much as many sweeps."""
-        return self.sweeps_a_factorisation > LIMITS.dear
-
-    @property
-    def sweeps_a_factorisation(self) -> float:
-        """How many sweeps cost as much as a factorisation."""
-        update = LIMITS.update_flops * self.problem.dim**2
-        return self.factors.flops / (update * self.problem.contacts)
+        sweep = LIMITS.update_flops * self.problem.dim**2 * self.problem.contacts
+        return self.factors.flops > LIMITS.dear * sweep
 
     @property
     def effort(self) -> float:
