@@ -22,8 +22,10 @@ from rigid_lcp.contact.near_pairs import (
     ZERO,
     bound_shapes,
     find_near_pairs,
+    order_by_pair,
     place_shapes,
 )
+from rigid_lcp.contact.parting_faces import choose_face
 from rigid_lcp.errors import SceneError
 from rigid_lcp.shapes import Disc, HalfSpace, Polygon
 
@@ -85,13 +87,15 @@ def pack_shapes_2d(
 
 
 def detect_2d(
-    shapes: Shapes2D, position: Floats, angle: Floats, margin: Floats | float
-) -> Contacts:
+    shapes: Shapes2D, position: Floats, angle: Floats, margin: Floats | float,
+    drift: Floats | None = None,
+) -> Contacts:  # fmt: skip
     """All point contacts with ``gap <= margin[a] + margin[b]``.
 
-    ``position`` (n, 2) [m], ``angle`` (n,) [rad]; ``margin`` [m] one number or (n,).  The order
-    of the contacts depends on the numbers of the bodies only.  Friction and restitution are zero:
-    they belong to the scene.
+    ``position`` (n, 2) [m], ``angle`` (n,) [rad]; ``margin`` [m] one number or (n,); ``drift``
+    (n, 3): how bodies will move on [m, rad], which chooses among faces that part a pair
+    (`rigid_lcp.contact.parting_faces`).  The order of the contacts depends on the numbers of the
+    bodies only.  Friction and restitution are zero: they belong to the scene.
     """
     margins = np.full(len(shapes.kind), margin, dtype=float)
     position = np.ascontiguousarray(position)
@@ -100,8 +104,11 @@ def detect_2d(
     boxes = bound_shapes(shapes.first, vertices, shapes.radius, position, margins)
     pairs = find_near_pairs(shapes.kind, boxes, shapes.movable)
     bodies, numbers, key = find_pair_contacts(
-        pairs, shapes.kind, shapes.first, vertices, normals, shapes.radius, position, margins
-    )
+        pairs, shapes.kind, shapes.first, vertices, normals, shapes.radius, position, margins,
+        np.zeros((len(position), 3)) if drift is None else drift,
+    )  # fmt: skip
+    order = order_by_pair(shapes.kind, bodies)
+    bodies, numbers, key = bodies[order], numbers[order], key[order]
     zero, edges = np.zeros((2, len(key))), np.zeros((2, len(key), 2))
     return Contacts(
         bodies[:, 0], bodies[:, 1], numbers[:, 0:2], numbers[:, 2:4], numbers[:, 4], key,
@@ -140,13 +147,14 @@ def _store_row(rows: Floats, row: int, side: int, vertex: int, face: int, gap: f
 @njit(cache=True)
 def find_face_contacts(
     face_own: Floats, face_normals: Floats, face: int, own: Floats, normals: Floats,
-    margin: float, tie: float, found: Floats,
+    margin: float, tie: float, chosen: bool, found: Floats,
 ) -> int:  # fmt: skip
     """Contacts of a polygon with ``face`` of another, at most two: returns how many.
 
     The candidates are the ends of the opposite face above ``face``, and the ends of ``face`` below
     the opposite one; those farthest apart along the face are kept.  Row of ``found``: 0 where the
-    vertex is the other polygon's (1 where it is an end of ``face``), vertex, face, gap.
+    vertex is the other polygon's (1 where it is an end of ``face``), vertex, face, gap.  Where
+    there is none, and the bodies overlap or the face was ``chosen``, the nearest vertex is one.
     """
     n, corner = face_normals[face], face_own[face]
     ends = (face, (face + 1) % len(face_own))
@@ -189,7 +197,7 @@ def find_face_contacts(
                 high = k
         found[0], found[1] = candidate[low], candidate[high]
         return 1 if low == high else 2
-    if lowest < 0.0:  # corner over corner: the deepest vertex, wherever it is
+    if lowest < 0.0 or (chosen and lowest <= margin):  # corner over corner, wherever it is
         _store_row(found, none, none, deepest, face, lowest)
         return 1
     return 0
@@ -198,11 +206,12 @@ def find_face_contacts(
 @njit(cache=True)
 def find_pair_contacts(
     pairs: Ints, kind: Ints, first: Ints, vertices: Floats, normals: Floats, radius: Floats,
-    position: Floats, margins: Floats,
+    position: Floats, margins: Floats, drift: Floats,
 ) -> tuple[Ints, Floats, Ints]:  # fmt: skip
     """Contacts of the pairs: bodies (nc, 2), numbers (nc, 7), keys (nc,).
 
-    A row of numbers: point (2), normal (2), gap, radii of curvature of a and b.
+    A row of numbers: point (2), normal (2), gap, radii of curvature of a and b.  Pairs that several
+    faces part wait until the others' contacts are known (`rigid_lcp.contact.parting_faces`).
     """
     room = 0
     for i, j in pairs:
@@ -211,7 +220,12 @@ def find_pair_contacts(
     key = np.empty(room, np.int64)
     found = np.empty((2, 4))
     c = none = int(ZERO)
-    for i, j in pairs:
+    late = np.zeros(len(pairs), np.bool_)
+    for turn in range(2 * len(pairs)):
+        p = turn % len(pairs)
+        if late[p] != (turn >= len(pairs)):
+            continue
+        i, j = pairs[p]
         margin = margins[i] + margins[j]
         if kind[j] == HALF_SPACE:
             n, offset = normals[first[j]], radius[j]
@@ -241,12 +255,27 @@ def find_pair_contacts(
             if gap_j > margin:
                 continue
             tie = LENGTH_TIE * min(radius[i], radius[j])
+            upper, lower, face, gap, chosen = i, j, face_j, gap_j, False
             if gap_i >= gap_j - tie:
-                upper, lower = j, i
-                count = find_face_contacts(vi, ni, face_i, vj, nj, margin, tie, found)
+                upper, lower, face, gap = j, i, face_i, gap_i
+            if gap >= -max(margin, tie):
+                oi, oj = (ni * vi).sum(axis=1), (nj * vj).sum(axis=1)
+                two, sign = np.array([i, j]), 1.0 if lower == j else -1.0
+                widest = sign * (nj if lower == j else ni)[face]
+                side, better = choose_face(
+                    ni, oi, vi, nj, oj, vj, position[two], drift[two], widest, gap, tie,
+                    max(margin, tie), bodies, numbers, c if late[p] else -1, i, j,
+                )  # fmt: skip
+                if side >= 0 and not late[p]:
+                    late[p] = True
+                    continue
+                if side >= 0:
+                    face, chosen = better, True
+                    upper, lower = (i, j) if side == 1 else (j, i)
+            if lower == j:
+                count = find_face_contacts(vj, nj, face, vi, ni, margin, tie, chosen, found)
             else:
-                upper, lower = i, j
-                count = find_face_contacts(vj, nj, face_j, vi, ni, margin, tie, found)
+                count = find_face_contacts(vi, ni, face, vj, nj, margin, tie, chosen, found)
             for k in range(count):
                 a, b = (upper, lower) if found[k, 0] == 0.0 else (lower, upper)
                 vertex, face = int(found[k, 1]), int(found[k, 2])

@@ -22,7 +22,7 @@ from rigid_lcp.contact.manifold import (
     is_within_face,
     keep_outer,
 )
-from rigid_lcp.contact.near_pairs import HALF_SPACE, ZERO, bound_shapes, find_near_pairs
+from rigid_lcp.contact.near_pairs import HALF_SPACE, ZERO, bound_shapes, find_near_pairs, order_by_pair
 from rigid_lcp.contact.placed_solids import MOST_EDGES, POLYHEDRON, SPHERE, Shapes3D, place_solids
 from rigid_lcp.contact.separation import Solids, dot
 from rigid_lcp.contact.solids import CORNER_EDGE, CORNERS, EDGE_CORNER, find_solid_contacts
@@ -113,13 +113,15 @@ def _fill(
 
 
 def detect_3d(
-    shapes: Shapes3D, position: Floats, quaternion: Floats, margin: Floats | float
-) -> Contacts:
+    shapes: Shapes3D, position: Floats, quaternion: Floats, margin: Floats | float,
+    drift: Floats | None = None,
+) -> Contacts:  # fmt: skip
     """All point contacts with ``gap <= margin[a] + margin[b]``.
 
-    ``position`` (n, 3) [m], ``quaternion`` (n, 4), unit; ``margin`` [m] one number or (n,).  The
-    order of the contacts depends on the numbers of the bodies only.  Friction and restitution are
-    zero: they belong to the scene.
+    ``position`` (n, 3) [m], ``quaternion`` (n, 4), unit; ``margin`` [m] one number or (n,);
+    ``drift`` (n, 6): how bodies will move on [m, rad], which chooses among faces that part a pair
+    (`rigid_lcp.contact.parting_faces`).  The order of the contacts depends on the numbers of the
+    bodies only.  Friction and restitution are zero: they belong to the scene.
     """
     margins = np.full(len(shapes.kind), margin, dtype=float)
     position = np.ascontiguousarray(position, dtype=float)
@@ -127,8 +129,11 @@ def detect_3d(
     boxes = bound_shapes(solids.first_vertex, solids.vertex, shapes.reach, position, margins)
     pairs = find_near_pairs(shapes.kind, boxes, shapes.movable)
     bodies, numbers, key = find_pair_contacts(
-        pairs, shapes.kind, solids, shapes.reach, position, margins, boxes
-    )
+        pairs, shapes.kind, solids, shapes.reach, position, margins, boxes,
+        np.zeros((len(position), 6)) if drift is None else drift,
+    )  # fmt: skip
+    order = order_by_pair(shapes.kind, bodies)
+    bodies, numbers, key = bodies[order], numbers[order], key[order]
     zero = np.zeros(len(key))
     return Contacts(
         bodies[:, 0], bodies[:, 1], numbers[:, 0:3], numbers[:, 3:6], numbers[:, 6], key,
@@ -176,18 +181,24 @@ def pack_key(a: int, b: int, feature_a: int, feature_b: int) -> int:
 @njit(cache=True)
 def find_pair_contacts(
     pairs: Ints, kind: Ints, solids: Solids, reach: Floats, position: Floats, margins: Floats,
-    boxes: Floats,
+    boxes: Floats, drift: Floats,
 ) -> tuple[Ints, Floats, Ints]:  # fmt: skip
     """Contacts of the pairs: bodies (nc, 2), numbers (nc, 9), keys (nc,).
 
-    A row of numbers: point (3), normal (3), gap, radii of curvature of a and b.
+    A row of numbers: point (3), normal (3), gap, radii of curvature of a and b.  Pairs that several
+    faces part wait until the others' contacts are known (`rigid_lcp.contact.parting_faces`).
     """
     room = MOST_KEPT * len(pairs)
     bodies, numbers = np.empty((room, 2), np.int64), np.empty((room, 9))
     key = np.empty(room, np.int64)
     found = np.empty((ROOM, CANDIDATE_COLUMNS))
     c = none = int(ZERO)
-    for i, j in pairs:
+    late = np.zeros(len(pairs), np.bool_)
+    for turn in range(2 * len(pairs)):
+        p = turn % len(pairs)
+        if late[p] != (turn >= len(pairs)):
+            continue
+        i, j = pairs[p]
         margin = margins[i] + margins[j]
         if kind[i] == SPHERE or kind[j] == SPHERE:
             sphere, other = (i, j) if kind[i] == SPHERE else (j, i)
@@ -207,7 +218,14 @@ def find_pair_contacts(
             count = find_corners_on_plane(solids, i, j, margin, reach[i], found)
         else:
             size = min(reach[i], reach[j])
-            count = find_solid_contacts(solids, i, j, boxes[i], boxes[j], margin, size, found)
+            two = np.array([i, j])
+            count = find_solid_contacts(
+                solids, i, j, boxes[i], boxes[j], margin, size, position[two], drift[two], bodies,
+                numbers, c if late[p] else -1, found,
+            )  # fmt: skip
+            if count < 0:
+                late[p] = True
+                continue
         for k in range(count):
             form, first, second = int(found[k, 0]), int(found[k, 1]), int(found[k, 2])
             a, b, sign = i, j, 1.0

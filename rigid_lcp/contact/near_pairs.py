@@ -98,3 +98,11 @@ def find_near_pairs(kind: Ints, boxes: Floats, movable: Bools) -> Ints:
         if not store:
             pairs = np.empty((count, 2), dtype=np.int64)
     return pairs[np.argsort(pairs[:, 0] * len(kind) + pairs[:, 1], kind="mergesort")]
+
+
+def order_by_pair(kind: Ints, bodies: Ints) -> Ints:
+    """Rows of contacts between ``bodies`` (nc, 2) in the order of `find_near_pairs`."""
+    a, b = bodies[:, 0], bodies[:, 1]
+    wall = kind[b] == HALF_SPACE
+    first, second = np.where(wall, a, np.minimum(a, b)), np.where(wall, b, np.maximum(a, b))
+    return np.argsort(first * len(kind) + second, kind="stable")

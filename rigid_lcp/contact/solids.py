@@ -19,7 +19,9 @@ from numba import njit
 from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.contact.arrays import LENGTH_TIE
 from rigid_lcp.contact.manifold import (
+    CORNER_FACE,
     EDGES,
+    FACE_CORNER,
     SAME_CONTACT,
     add_candidate,
     find_face_candidates,
@@ -27,6 +29,7 @@ from rigid_lcp.contact.manifold import (
     keep_outer,
 )
 from rigid_lcp.contact.near_pairs import ZERO
+from rigid_lcp.contact.parting_faces import choose_face
 from rigid_lcp.contact.separation import (
     NEARLY_OPPOSITE,
     Solids,
@@ -140,14 +143,47 @@ def find_corner_candidates(
 
 
 @njit(cache=True)
+def list_faces(solids: Solids, body: int) -> tuple[Floats, Floats, Floats]:
+    """Normals (f, 3) and offsets (f,) [m] of a body's faces, and its corners (v, 3) [m]."""
+    start, stop = solids.first_face[body], solids.first_face[body + 1]
+    corners = solids.vertex[solids.first_vertex[body] : solids.first_vertex[body + 1]]
+    return solids.normal[start:stop], solids.offset[start:stop], corners
+
+
+@njit(cache=True)
+def add_nearest_corner(
+    solids: Solids, face: int, own: int, other: int, own_is_b: bool, margin: float, found: Floats
+) -> int:
+    """The corner of ``other`` nearest to the plane of a face of ``own``, wherever it projects."""
+    normal, first = solids.normal[face], solids.first_vertex[other]
+    best, least = first, np.inf
+    for v in range(first, solids.first_vertex[other + 1]):
+        gap = dot(normal, solids.vertex[v]) - solids.offset[face]
+        if gap < least:
+            best, least = v, gap
+    if least > margin:
+        return 0
+    corner, there = best - first, face - solids.first_face[own]
+    kind, first_name, second = int(CORNER_FACE), corner, there
+    if not own_is_b:
+        kind, first_name, second = int(FACE_CORNER), there, corner
+    return add_candidate(
+        found, int(ZERO), kind, first_name, second, least, normal, 1.0 if own_is_b else -1.0,
+        solids.vertex[best], 0.0,
+    )  # fmt: skip
+
+
+@njit(cache=True)
 def find_solid_contacts(
     solids: Solids, a: int, b: int, box_a: Floats, box_b: Floats, margin: float, size: float,
-    found: Floats,
+    centres: Floats, drifts: Floats, bodies: Ints, numbers: Floats, known: int, found: Floats,
 ) -> int:  # fmt: skip
     """Point contacts of two polyhedra with a gap up to ``margin`` [m]; returns how many.
 
     ``box_a``, ``box_b``: bounding boxes, swollen or not; ``size``: the smaller reach of the
-    two [m].  Rows of ``found`` as `CANDIDATE_COLUMNS` says.
+    two [m].  Rows of ``found`` as `CANDIDATE_COLUMNS` says.  The others as for
+    `rigid_lcp.contact.parting_faces.choose_face`: where several faces part the two, the result is
+    -1 unless the ``known`` contacts of other pairs are given.
     """
     face_a, gap_a = separate_faces(solids, a, b, margin)
     if gap_a > margin:
@@ -179,6 +215,25 @@ def find_solid_contacts(
         and dot(crossing[3:6], towards) < np.cos(NEARLY_OPPOSITE)
     )
     count = int(ZERO)
+    tie = LENGTH_TIE * size
+    depth = max(margin, tie)
+    if max(faces, gap_edges) >= -depth:
+        widest = crossing[3:6] if crosses and gap_edges > faces + tie else towards
+        side, better = choose_face(
+            *list_faces(solids, a), *list_faces(solids, b), centres, drifts, widest,
+            max(faces, gap_edges), tie, depth, bodies, numbers, known, a, b,
+        )  # fmt: skip
+        if side >= 0 and known < 0:
+            return -1
+        if side >= 0:
+            own, other, near = (b, a, near_a) if side == 1 else (a, b, near_b)
+            better += solids.first_face[own]
+            count = find_face_candidates(
+                solids, better, own, other, side == 1, near, margin, size, found
+            )
+            if count == 0:
+                count = add_nearest_corner(solids, better, own, other, side == 1, margin, found)
+            return keep_outer(found, count, size)
     if not alone:
         near = near_a if own_is_b else near_b
         count = find_face_candidates(solids, face, own, other, own_is_b, near, margin, size, found)

@@ -61,7 +61,7 @@ def find_contacts_of_struck(
     bodies (n,) may get to by their velocities at its ``end``, and so on to what they strike."""
     reaching = np.where(struck, np.maximum(margin, h * world.speeds(end.rates)), margin)
     while True:
-        contacts = world.contacts(middle, reaching)
+        contacts = world.contacts(middle, reaching, 0.5 * h)
         further = _pass_on(world, contacts, reaching, struck)
         faster = further > reaching * (1.0 + LEAST_GAIN)
         if not faster.any():

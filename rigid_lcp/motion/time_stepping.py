@@ -114,7 +114,7 @@ def step_moreau(
     accelerations = world.accelerations(middle, pull, gyroscopic=False)
     free = replace_rates(middle, middle.rates + h * accelerations)
     margin = find_margin(world, motion, accelerations, h)
-    contacts = world.contacts(middle, margin)
+    contacts = world.contacts(middle, margin, 0.5 * h)
     if len(contacts) == 0:
         end = separate_bodies(world, motion, world.move_freely(free, 0.5 * h), pull, h)
         return Step(end, make_contact_forces(contacts, np.zeros((0, motion.dim)), None, h), 0.0)

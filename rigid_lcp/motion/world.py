@@ -136,8 +136,9 @@ class World:
     """Greatest distance of a body's points from its centre of mass [m], (n,); 0 if infinite."""
     length: float
     """Size of the smallest movable body [m]: the unit of all tolerances."""
-    detect: Callable[[Floats, Floats, Any], Contacts]
-    """Contacts of places and angles within a margin [m], one number or (n,)."""
+    detect: Callable[[Floats, Floats, Any, Floats], Contacts]
+    """Contacts of places and angles within a margin [m], one number or (n,), and of how bodies
+    will move on (n, 3) or (n, 6) [m, rad]."""
 
     @property
     def movable(self) -> Bools:
@@ -227,9 +228,13 @@ class World:
         result[moving, 3:] = np.linalg.solve(inertia, torque[..., None])[..., 0]
         return result
 
-    def contacts(self, motion: Motion, margin: Any) -> Contacts:
-        """Contacts of a state with friction and restitution of their surfaces."""
-        found = self.detect(motion.position, motion.angle, margin)
+    def contacts(self, motion: Motion, margin: Any, ahead: float = 0.0) -> Contacts:
+        """Contacts of a state with friction and restitution of their surfaces.
+
+        ``ahead`` [s]: how long bodies are expected to move on at their rates, which chooses among
+        faces that part a pair (`rigid_lcp.contact.parting_faces`).
+        """
+        found = self.detect(motion.position, motion.angle, margin, ahead * motion.rates)
         surface = {  # the smaller; a body without a value leaves it to the other
             name: np.nan_to_num(np.fmin(value[found.body_a], value[found.body_b]))
             for name, value in self.surfaces.items()
