@@ -151,6 +151,11 @@ class World:
         return 3 if self.scene.dim == 2 else 6
 
     @cached_property
+    def thickness(self) -> Floats:
+        """Least width of each body [m], (n,); inf for a half-space."""
+        return np.array([body.shape.width for body in self.scene.bodies])
+
+    @cached_property
     def least_inertia(self) -> Floats:
         """A moment of inertia of each body, in 3D the least on its tensor's diagonal, (n,)."""
         if self.scene.dim == 2:

@@ -32,6 +32,7 @@ from rigid_lcp.motion import (
     Scene,
     advance_runge_kutta,
     check_loads,
+    count_parts,
     explain_overflow,
     explain_step_limit,
     is_finite,
@@ -130,7 +131,8 @@ class Simulation:
         self._refuse_overlap()
 
     def advance(self, seconds: float) -> None:
-        """Go on for ``seconds`` [s], in equal steps not longer than ``step``.
+        """Go on for ``seconds`` [s], in equal steps not longer than ``step``, made in parts where
+        bodies would pass each other within one (`rigid_lcp.motion.passing_bodies`).
 
         Less than a billionth of a step is none: sums of times differ by so much.
 
@@ -153,7 +155,9 @@ class Simulation:
                 return
             count = max(ceil(seconds / self.step - SIMULATION.time_round_off), 1)
             for _ in range(count):
-                self._take_step(seconds / count)
+                parts = count_parts(self.world, self.motion, seconds / count)
+                for _ in range(parts):
+                    self._take_step(seconds / count / parts)
 
     def fragment(self, body: int, line: tuple[ArrayLike, ArrayLike]) -> int:
         """Break a polygon (polyhedron) that moves in two; returns the number of the second part.

@@ -24,6 +24,11 @@ class Disc:
         """Radius [m]."""
         return self.radius
 
+    @property
+    def width(self) -> float:
+        """Diameter [m]."""
+        return 2 * self.radius
+
     def mass_properties(self, density: float) -> tuple[float, float]:
         """Mass [kg] and moment of inertia [kg m^2] at ``density`` [kg/m^2]."""
         mass = density * (pi * self.radius**2)

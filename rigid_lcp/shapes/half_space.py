@@ -24,7 +24,7 @@ class HalfSpace:
     normal: Floats
     offset: float
 
-    reach = inf
+    reach = width = inf
 
     def __init__(self, normal: ArrayLike, offset: float = 0.0) -> None:
         direction = require_finite_shape(normal, "normal", "half-space")

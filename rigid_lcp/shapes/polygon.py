@@ -109,6 +109,12 @@ class Polygon:
         """Distance of the farthest vertex from the centroid [m]."""
         return float(np.linalg.norm(self.vertices, axis=1).max())
 
+    @cached_property
+    def width(self) -> float:
+        """Least of the distances from a face to its farthest corner [m]."""
+        height = self.vertices @ self.normals.T
+        return float((np.diagonal(height) - height.min(axis=0)).min())
+
     def mass_properties(self, density: float) -> tuple[float, float]:
         """Mass [kg] and moment of inertia about the centroid [kg m^2] at ``density`` [kg/m^2]."""
         area, _, second = _find_moments(self.vertices)

@@ -25,6 +25,11 @@ class Sphere:
         """Radius [m]."""
         return self.radius
 
+    @property
+    def width(self) -> float:
+        """Diameter [m]."""
+        return 2 * self.radius
+
     def mass_properties(self, density: float) -> tuple[float, Floats]:
         """Mass [kg] and inertia tensor (3, 3) [kg m^2] at ``density`` [kg/m^3]."""
         volume = 4.0 / 3.0 * np.pi * self.radius**3
