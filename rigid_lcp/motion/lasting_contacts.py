@@ -79,7 +79,9 @@ def redetect_contacts(
     now, before = rows[there], np.flatnonzero(there)
     if not there.all():
         within = TOUCHING.pressed_overlap * world.length
-        taken, lost = find_successors(found, lasting.contacts, there, within)
+        closing = -h * find_relative_velocity(found, motion)[:, 0]
+        bearing = (found.gap <= within) & (closing <= within)
+        taken, lost = find_successors(found, lasting.contacts, there, bearing)
         now, before = np.concatenate([now, taken]), np.concatenate([before, lost])
     contacts = found[now]
     slip = carry_slip(lasting, before, contacts)
@@ -90,14 +92,15 @@ def redetect_contacts(
 
 
 def find_successors(
-    found: Contacts, contacts: Contacts, there: Bools, within: float
+    found: Contacts, contacts: Contacts, there: Bools, bearing: Bools
 ) -> tuple[Ints, Ints]:
     """Rows of ``found`` that bear what ``contacts`` not ``there`` any more bore, and rows of those.
 
     Where a corner slides off a face, the corner of that face comes to bear on the other: new
-    contacts of the same two bodies, with gaps ``within`` [m].  Their forces go on as they were.
+    contacts of the same two bodies, of those ``bearing``: one that closes fast is a collision.
+    Their forces go on as they were.
     """
-    new = np.flatnonzero((found.gap <= within) & ~np.isin(found.key, contacts.key))
+    new = np.flatnonzero(bearing & ~np.isin(found.key, contacts.key))
     lost = np.flatnonzero(~there)
     pairs = [
         np.sort(np.column_stack([each.body_a, each.body_b])[rows], axis=1)
