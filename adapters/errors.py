@@ -47,7 +47,8 @@ class JumpRefused(NotCredible):
       settlements in the unit of the series;
     - ``law``: the law named, or ``auto``, also of jumps;
     - ``regime``: ``ratcheting`` (the rate hardly falls), ``collapse`` (it grows, or the series or
-      its prediction reaches ``--fail-at``) or ``uncertain`` (the laws differ too much);
+      its prediction reaches ``--fail-at``) or ``uncertain`` (the laws differ too much, or
+      the settlement falls);
     - ``parameters``: of ``auto`` ``exponent`` beta, without unit, and, from ``fit``,
       ``exponent_deviation``; of a law that is named its own: lengths in the unit of the series,
       rates in that per cycle, counted from a load change where there is one.  Only finite ones;

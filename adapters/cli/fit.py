@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 from adapters.cli.arguments import add_json, print_json
@@ -33,7 +34,8 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
         "--fail-at", type=float, metavar="S",
         help="settlement or strain of failure, in the series' unit, of either sign: a series or a "
         "prediction that reaches it is refused as collapse (exit code 6); failure_excluded in the "
-        "JSON: the band (of --probability) does not reach it",
+        "JSON: the band (of --probability, 90 %% at least) does not reach it, where the regime is "
+        "steady or shakedown and the prediction at most ten times ahead",
     )  # fmt: skip
     parser.add_argument(
         "--to-cycle", type=float, metavar="N", help="cycle to predict; default: the last one given"
@@ -63,7 +65,7 @@ def run_fit(arguments: argparse.Namespace) -> int:
     from adapters.errors import JumpRefused
     from adapters.files import UNKNOWN
     from adapters.laws import get_law
-    from adapters.laws.fit import AGREE, fit_auto, fit_series, read_series
+    from adapters.laws.fit import AGREE, UNCLAIMED, fit_auto, fit_series, read_series, refuse_fall
 
     auto = arguments.law == "auto"
     law = get_law("log" if auto else arguments.law)
@@ -90,6 +92,8 @@ def run_fit(arguments: argparse.Namespace) -> int:
             unexcluded = {} if arguments.fail_at is None else {"failure_excluded": False}
             print_json(refusal.to_json(series.unit) | unexcluded)
         raise
+    if fall := refuse_fall(series.cycle + series.counted_from, series.settlement):
+        print(f"warning: {fall.why}\n  -> {fall.remedy}", file=sys.stderr)
     fitted = found.to_json()
     if arguments.json:
         print_json(fitted)
@@ -98,7 +102,7 @@ def run_fit(arguments: argparse.Namespace) -> int:
     print(f"law {fitted['law']}, fitted to {len(series.cycle)} cycles")
     for name, value in fitted["parameters"].items():
         print(f"  {name} = {value:.6g}")
-    print(f"regime: {fitted['regime'] or 'unknown: too few cycles'}")
+    print(f"regime: {fitted['regime'] or UNCLAIMED}")
     if found.laws:
         agreeing = [name for name, said in found.laws.items() if said.agrees]
         print(f"laws that agree to {AGREE:.0%} of the increment: {', '.join(agreeing) or 'none'}")

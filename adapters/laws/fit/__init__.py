@@ -2,7 +2,8 @@
 
 from adapters.laws.fit.candidates import CANDIDATES, BoolArray, find_increments, thin_rows
 from adapters.laws.fit.outlook import AGREE
-from adapters.laws.fit.prediction import fit_auto, fit_series, read_series
+from adapters.laws.fit.prediction import UNCLAIMED, fit_auto, fit_series, read_series
+from adapters.laws.fit.refusal import refuse_fall
 from adapters.laws.fit.regime import (
     EXPONENTS,
     TAIL,
@@ -14,7 +15,8 @@ from adapters.laws.fit.regime import (
 from adapters.laws.fit.residual import FIRST_WINDOW, compare_coordinates, compare_displacements
 
 __all__ = [
-    "AGREE", "CANDIDATES", "EXPONENTS", "FIRST_WINDOW", "TAIL", "WHY_NOT", "WHY_NOT_PISTON",
-    "BoolArray", "Regime", "compare_coordinates", "compare_displacements", "find_increments",
-    "find_regime_of_weight", "fit_auto", "fit_series", "read_series", "thin_rows",
+    "AGREE", "CANDIDATES", "EXPONENTS", "FIRST_WINDOW", "TAIL", "UNCLAIMED", "WHY_NOT",
+    "WHY_NOT_PISTON", "BoolArray", "Regime", "compare_coordinates", "compare_displacements",
+    "find_increments", "find_regime_of_weight", "fit_auto", "fit_series", "read_series",
+    "refuse_fall", "thin_rows",
 ]  # fmt: skip

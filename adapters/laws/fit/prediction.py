@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from math import isfinite
 from typing import Any
@@ -13,12 +14,37 @@ from adapters.errors import JumpRefused, NotConverged, UsageError
 from adapters.files import Series, make_too_few_error, read_series
 from adapters.laws.fit.band import estimate_prediction_band
 from adapters.laws.fit.candidates import CANDIDATES, thin_rows
-from adapters.laws.fit.outlook import TO_TELL, LawSaid, compare_laws, find_outlook
-from adapters.laws.fit.refusal import Refusal, find_failure, find_refusals, predict_failure
-from adapters.laws.fit.regime import find_regimes
+from adapters.laws.fit.growth import find_fall
+from adapters.laws.fit.outlook import JUDGED, TO_TELL, LawSaid, compare_laws, find_outlook
+from adapters.laws.fit.refusal import (
+    Refusal,
+    find_failure,
+    find_refusals,
+    predict_failure,
+    refuse_fall,
+)
+from adapters.laws.fit.regime import SHAKEDOWN, WHY_NOT, Regime, find_regimes
 from adapters.laws.form import Law
 
 __all__ = ["Prediction", "Series", "fit_auto", "fit_series", "read_series"]
+
+
+@dataclass(frozen=True)
+class ClaimNumbers:
+    """Data without which nothing good is claimed: no steady regime, no failure excluded."""
+
+    rows: int = 8  # readings: twice the parameters of the longest law, to fit it and to doubt it
+    late: int = 3  # of them in the last decade: a rate and its change
+    reach: float = 10.0
+    """Cycle asked for over the last one [-]: so far ahead bands were judged on real tests."""
+
+
+CLAIM = ClaimNumbers()
+UNCLAIMED = (
+    f"not said: that takes {CLAIM.rows} cycles, {CLAIM.late} of them in the last decade, no fall, "
+    f"and a prediction at most {CLAIM.reach:g} times ahead"
+)
+"""In the place of a regime that is not claimed."""
 
 
 @dataclass(frozen=True)
@@ -35,11 +61,13 @@ class Prediction:
     `estimate_prediction_band`."""
     unit: str
     regime: str | None = None
-    """One of `fit.regime.REGIMES`; None where the series is too short to show one."""
+    """One of `fit.regime.REGIMES`; None where a good one is a claim without data (`CLAIM`)."""
     laws: dict[str, LawSaid] = field(default_factory=dict)
     """What each slow law says, by name; empty for a law that was named."""
     failure_excluded: bool | None = None
-    """True where no end of the band reaches the user's bound of failure; None without a bound."""
+    """True where no end of the band reaches the user's bound of failure, neither of that asked for
+    nor of that with 90 %, the regime is a good one, and there are data for the claim (`CLAIM`);
+    None without a bound."""
 
     def to_json(self) -> dict[str, Any]:
         """What ``trackbed fit --json`` prints.
@@ -76,10 +104,14 @@ def fit_series(
     with np.errstate(over="ignore", invalid="ignore"):  # judged below, in one place
         parameters = law.fit(cycle, settlement)
         prediction = float(settlement[-1] + law.increment(parameters, last, to_cycle))
-        band = (prediction, prediction)
+        band = widest = (prediction, prediction)
         if to_cycle > last:
             below, above = estimate_prediction_band(law, cycle, settlement, to_cycle, probability)
+            judged = (below, above)
+            if probability < JUDGED:
+                judged = estimate_prediction_band(law, cycle, settlement, to_cycle, JUDGED)
             band = (prediction - below, prediction + above)
+            widest = (prediction - judged[0], prediction + judged[1])
     named = dict(zip(law.parameter_names, map(float, parameters), strict=True))
     if refusal := find_failure(cycle + begin, settlement, fail_at):
         raise _make_refusal(refusal, law.name, named, {})
@@ -90,9 +122,11 @@ def fit_series(
         )
     if refusal := predict_failure(prediction, fail_at, to_cycle + begin):
         raise _make_refusal(refusal, law.name, named, {})
+    reach = to_cycle / last if last > 0 else 1.0
+    regime = find_regime(series, reach)
     return Prediction(
-        law.name, named, prediction, band, series.unit, find_regime(series),
-        failure_excluded=excludes_failure(band, fail_at),
+        law.name, named, prediction, band, series.unit, regime,
+        failure_excluded=excludes_failure(widest, fail_at, regime, reach),
     )  # fmt: skip
 
 
@@ -126,22 +160,40 @@ def fit_auto(
     refusal = find_failure(cycle + begin, settlement, fail_at)
     if refusal is None and isfinite(prediction):
         refusal = predict_failure(prediction, fail_at, to_cycle + begin)
-    refusal = refusal or find_refusals(found)[0]
+    refusal = refusal or refuse_fall(cycle + begin, settlement) or find_refusals(found)[0]
     said = compare_laws(found, refused=refusal is not None)
     if refusal:
         raise _make_refusal(refusal, "auto", parameters, said)
     alone = {name: one.prediction for name, one in said.items()}
     parameters |= {name: value for name, value in alone.items() if value is not None}
     band = (float(found.low[0]), float(found.high[0]))
+    widest = (*band, *(float(end[0]) for end in found.judged))
+    reach = to_cycle / cycle[-1]
+    regime = name_regime(found.regime[0], cycle, reach)
     return Prediction(
-        "auto", parameters, prediction, band, series.unit, found.regime[0].name, said,
-        failure_excluded=excludes_failure(band, fail_at),
+        "auto", parameters, prediction, band, series.unit, regime, said,
+        failure_excluded=excludes_failure(widest, fail_at, regime, reach),
     )  # fmt: skip
 
 
-def excludes_failure(band: tuple[float, float], fail_at: float | None) -> bool | None:
-    """Whether ``band`` ends below the bound of failure, of either sign; None without a bound."""
-    return None if fail_at is None else max(map(abs, band)) < fail_at
+def excludes_failure(
+    ends: Sequence[float], fail_at: float | None, regime: str | None, reach: float
+) -> bool | None:
+    """Whether ``ends`` of bands lie below the bound of failure, of either sign, in a good
+    ``regime`` and no farther ahead than `CLAIM`; None without a bound."""
+    if fail_at is None:
+        return None
+    good = regime is not None and regime not in WHY_NOT and reach <= CLAIM.reach * (1 + 1e-9)
+    return good and max(map(abs, ends)) < fail_at
+
+
+def name_regime(regime: Regime, cycle: FloatArray, reach: float) -> str | None:
+    """Name of a regime seen at cycles (k,); None for a good one where data lack for the claim: few
+    cycles, or ``reach`` times the last one asked for, of a total that has no end."""
+    late = int((cycle >= cycle[-1] / 10 * (1 - 1e-9)).sum())
+    enough = len(cycle) >= CLAIM.rows and late >= CLAIM.late
+    far = reach > CLAIM.reach * (1 + 1e-9) and regime.name != SHAKEDOWN
+    return None if regime.jump_allowed and (far or not enough) else regime.name
 
 
 def _make_refusal(
@@ -158,12 +210,15 @@ def _make_refusal(
     )
 
 
-def find_regime(series: Series) -> str | None:
-    """Regime of a series; None where it has fewer than four cycles after the start."""
+def find_regime(series: Series, reach: float = 1.0) -> str | None:
+    """Regime of a series, as `name_regime` lets it be said at ``reach``; None where it has
+    fewer than four cycles after the start, or falls."""
     rows = series.cycle > 0
-    if rows.sum() < CANDIDATES.rows_fewest:
+    if rows.sum() < CANDIDATES.rows_fewest or find_fall(series.settlement):
         return None
-    return find_regimes(*thin_rows(series.cycle[rows], series.settlement[rows, None]))[0].name
+    cycle = series.cycle[rows]
+    (regime,) = find_regimes(*thin_rows(cycle, series.settlement[rows, None]))
+    return name_regime(regime, cycle, reach)
 
 
 def _check_target(

@@ -8,6 +8,7 @@ import numpy as np
 
 from adapters.bed import FloatArray
 from adapters.errors import NotConverged
+from adapters.laws.fit.growth import find_fall
 from adapters.laws.fit.outlook import JUDGED, Outlook
 from adapters.laws.fit.regime import COLLAPSE, WHY_NOT
 
@@ -16,6 +17,8 @@ UNCERTAIN = "uncertain"
 WIDEST = 1.0
 """Half-width of a band over all that settled so far, above which it is no prediction: what is not
 known of the future is then more than what is known of the past."""
+MOST = 1e3
+"""Growth of a rate that is not given as a number: it had all but vanished before."""
 
 
 @dataclass(frozen=True)
@@ -52,10 +55,14 @@ def _find_refusal(outlook: Outlook, series: int) -> Refusal | None:
     regime, begin = outlook.regime[series], outlook.counted_from
     last, to_cycle = outlook.last_cycle + begin, outlook.to_cycle + begin
     if not regime.jump_allowed:
+        how = f"it goes as N^(beta - 1) with beta = {regime.exponent:.2f} ± {regime.deviation:.2f}"
+        if regime.growth > 1:
+            how = "it is greater than it once was" + (
+                f", {regime.growth:.2g} times its least" if regime.growth < MOST else ""
+            )
         return Refusal(
             regime.name,
-            f"up to cycle {last:.10g} {WHY_NOT[regime.name]}: it goes as N^(beta - 1) with "
-            f"beta = {regime.exponent:.2f} ± {regime.deviation:.2f}"
+            f"up to cycle {last:.10g} {WHY_NOT[regime.name]}: {how}"
             + (f", N counted from cycle {begin:.10g}" if begin else "")
             + ", and no law says when that ends",
             "compute or measure more cycles, or name a law yourself: --law log, linear ...",
@@ -76,6 +83,21 @@ def _find_refusal(outlook: Outlook, series: int) -> Refusal | None:
             "measure more cycles, predict less far, or name a law yourself: --law log, power ...",
         )
     return None
+
+
+def refuse_fall(cycle: FloatArray, settlement: FloatArray) -> Refusal | None:
+    """Why nothing is said of a series that falls, (k,) at the user's cycles (k,): no law has one
+    course before and behind a tamping, or a gauge that was set back."""
+    if (fall := find_fall(settlement)) is None:
+        return None
+    row, size = fall
+    before, behind = cycle[row - 1], cycle[row]
+    return Refusal(
+        UNCERTAIN,
+        f"the settlement falls by {size:.3g} between cycles {before:.10g} and {behind:.10g}, as "
+        "where the track was tamped or the gauge set back: no law goes through that",
+        f"take what came behind it: --load-change {behind:.10g}",
+    )
 
 
 def find_failure(cycle: FloatArray, settled: FloatArray, fail_at: float | None) -> Refusal | None:

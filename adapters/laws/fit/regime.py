@@ -6,13 +6,14 @@ a constant rate; beta = q + 1 is the exponent of the tail u = c + a (N^beta - 1)
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import sqrt
 from typing import Any
 
 import numpy as np
 
 from adapters.bed import FloatArray
+from adapters.laws.fit.growth import measure_growth
 
 EXPONENTS = np.linspace(-4.0, 6.0, 201)
 """Exponents beta that are weighed."""
@@ -57,6 +58,7 @@ class Regime:
     exponent: float  # mean of beta; the rate falls as N^(beta - 1)
     deviation: float  # standard deviation of beta
     bounded: float  # probability of beta < 0: that the total has an end
+    growth: float = 1.0  # rate at the end over the least before; 1 where it has not surely grown
 
     @property
     def jump_allowed(self) -> bool:
@@ -132,12 +134,18 @@ def find_regimes(cycle: FloatArray, displacement: FloatArray) -> list[Regime]:
     """Regime of each of n series (k, n) at ascending cycles > 0, (k,), k >= 3.
 
     The tail says what the bed does, not what it will do: real ballast at 30 to 40 Hz ratchets for
-    some hundred cycles and then shakes down.
+    some hundred cycles and then shakes down.  A rate that has grown (`measure_growth`) is collapse
+    whatever one exponent of the whole tail says: it is a mean over the fall and the growth.
     """
     weight = weigh_exponents(cycle, displacement)
     tail = displacement[select_tail(cycle)]
     still = np.ptp(tail, axis=0) <= TAIL.round_off * np.abs(tail).max(axis=0)
-    return [find_regime_of_weight(*each) for each in zip(weight.T, still, strict=True)]
+    found = [find_regime_of_weight(*each) for each in zip(weight.T, still, strict=True)]
+    growth = map(float, measure_growth(cycle, displacement))
+    return [
+        replace(one, name=COLLAPSE, growth=ratio) if ratio > 1 else one
+        for one, ratio in zip(found, growth, strict=True)
+    ]
 
 
 def find_regime_of_weight(weight: FloatArray, still: bool) -> Regime:
