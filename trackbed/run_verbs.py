@@ -55,8 +55,11 @@ def find_kind(path: Path) -> Kind | None:
     """The kind of the run in a folder; None where there is no manifest to tell it by."""
     manifest = read_object(path / MANIFEST) or {}
     scene = manifest.get("scene")
-    if not isinstance(scene, dict):
-        return None
+    return find_scene_kind(scene) if isinstance(scene, dict) else None
+
+
+def find_scene_kind(scene: dict[str, Any]) -> Kind | None:
+    """The kind of a scene, by a table that only it has; None for none of them."""
     return next((kind for kind in KINDS if kind.table in scene), None)
 
 

@@ -44,6 +44,11 @@ SI = {
 TIMES = ("s", "ms", "us", "µs", "min", "h")
 BRACKETED = re.compile(r"(.*?),?\s*[\[(]\s*([^\])]*?)\s*[\])]\s*")
 """A name with a unit in brackets, known or not."""
+FACTOR = re.compile(
+    r"[x\u00d7*\u00b7/]\s*1[0e]|10\s*(\^|\*\*)|\b1e[+-]?\d|(?<![a-z])(thousand|million|tausend|mio)",
+    re.IGNORECASE,
+)
+"""Signs in a column's name that its numbers are to be multiplied."""
 MARKS = "' \u2019\u00a0\u2009\u202f"
 """Apostrophes and blanks, which mark thousands and nothing else."""
 GROUPS = re.compile(rf"([+-]?\d{{1,3}}(?:[{MARKS}]\d{{3}})+)(?=[.,]|$)(.*)")
@@ -82,6 +87,11 @@ class Table:
         unit = self.units[place] if self.units else ""
         return title.lower(), unit if unit.lower() in {one.lower() for one in units} else ""
 
+    def find_unit(self, place: int) -> str:
+        """What stands in brackets behind a column's name, else in the row of units; or nothing."""
+        bracketed = BRACKETED.fullmatch(self.header[place])
+        return bracketed[2] if bracketed else self.units[place] if self.units else ""
+
     def read_numbers(self, places: Sequence[int], names: Sequence[str]) -> Floats:
         """Columns as numbers, shape (columns, k); ``names`` for errors.
 
@@ -105,7 +115,8 @@ class Table:
         raise UsageError(
             f"'{columns[place][row].strip()}' is not {kind}",
             where=self.where(row, names[place]),
-            remedy="below the header a row is a reading: leave out what is none",
+            remedy="below the header a row is a reading: leave out what is none"
+            + (", and write no marks for thousands" if "," in columns[place][row] else ""),
         )
 
     def _unify_signs(self, columns: list[list[str]], names: Sequence[str]) -> list[list[str]]:
@@ -117,8 +128,10 @@ class Table:
         if "," not in every:
             return columns
         both = next((c for cells in columns for c in cells if "," in c and "." in c), "")
-        if not both and not self.decimal_comma:
-            return columns
+        if not self.decimal_comma:  # commas that separate no cells stand in quotes, beside points
+            both = both or ("." if "." in every else "")
+            if not both:
+                return columns
         comma = self.decimal_comma and both.rfind(",") >= both.rfind(".")
         sign, mark = (",", ".") if comma else (".", ",")
         for name, cells in zip(names, columns, strict=True):
@@ -152,7 +165,10 @@ def read_table(path: Path, wanted: Sequence[Collection[str]] = ()) -> Table:
         skipped, separator = _find_header(text, wanted)
         lines, rows = _split_rows(text, separator, skipped)
     except OSError as error:
-        raise UsageError(f"can not read the series ({error.strerror})", where=str(path)) from error
+        raise UsageError(
+            f"can not read the series ({error.strerror})", where=str(path),
+            remedy="give a table, a run folder or dumps that are there and may be read",
+        ) from error  # fmt: skip
     except (ValueError, csv.Error) as error:
         raise UsageError(
             f"this is no text table ({error})",
@@ -175,15 +191,12 @@ def read_columns(
     places, factors = [], []
     for name, units in zip(names, quantities, strict=True):
         place = find_column(table, (name.strip().lower(),), units)
-        title = table.header[place]
-        unit = table.units[place] if table.units else ""
-        if bracketed := BRACKETED.fullmatch(title):
-            unit = bracketed[2]
-        elif title.lower() != name.strip().lower():
+        unit = table.find_unit(place)
+        if not unit and table.header[place].lower() != name.strip().lower():
             unit = table.split_title(place, units)[1]
         if unit and unit not in units:
             raise UsageError(
-                f"the column {title} is in {unit}, which is not known here",
+                f"the column {table.header[place]} is in {unit}, which is not known here",
                 where=f"{path}:{table.header_line}",
                 remedy=f"the units are {', '.join(units)}; without one numbers are in SI units",
             )
@@ -197,7 +210,7 @@ def read_columns(
 def find_column(table: Table, names: Sequence[str], units: Collection[str]) -> int:
     """Place of the column that has one of the ``names``, in lower case, the first ones first.
 
-    Raises `UsageError` when there is none, or two.
+    Raises `UsageError` when there is none, or two, or its numbers are to be multiplied.
     """
     titles = [table.split_title(place, units)[0] for place in range(len(table.header))]
     for name in names:
@@ -206,12 +219,18 @@ def find_column(table: Table, names: Sequence[str], units: Collection[str]) -> i
             for place, title in enumerate(table.header)
             if name in _list_names(title, titles[place])
         ]
+        where = f"{table.path}:{table.header_line}"
         if len(found) > 1:
             raise UsageError(
-                f"there are two columns {name}", where=f"{table.path}:{table.header_line}",
-                remedy="name each column once",
-            )  # fmt: skip
+                f"there are two columns {name}", where=where, remedy="name each column once"
+            )
         if found:
+            title, unit = table.header[found[0]], table.find_unit(found[0])
+            if FACTOR.search(title) or (unit not in SI and re.search(r"\d|^[kM]$", unit)):
+                raise UsageError(
+                    f"the numbers of the column {title} have a factor, which is not read",
+                    where=where, remedy="write them out, and name the column without it",
+                )  # fmt: skip
             return found[0]
     near = [one for title in titles for one in get_close_matches(title, names, n=1)]
     if len(names) == 1:

@@ -7,6 +7,10 @@ import sys
 from pathlib import Path
 
 from adapters.cli.arguments import add_json, print_json
+from adapters.errors import UsageError
+
+FARTHEST = 1e12
+"""Load cycles that are asked for at most: a hundred thousand years of the busiest line."""
 
 
 def register(verb: str, parser: argparse.ArgumentParser) -> None:
@@ -67,11 +71,30 @@ def run_fit(arguments: argparse.Namespace) -> int:
     from adapters.laws import get_law
     from adapters.laws.fit import AGREE, UNCLAIMED, fit_auto, fit_series, read_series, refuse_fall
 
+    for flag in ("to_cycle", "from_cycle", "load_change"):
+        value = getattr(arguments, flag)
+        if value is not None and not 0 <= value <= FARTHEST:
+            raise UsageError(
+                f"{value:g} is no number of load cycles",
+                where=f"--{flag.replace('_', '-')}",
+                remedy=f"give one from 0 to {FARTHEST:g}, which no track lives to see",
+            )
     auto = arguments.law == "auto"
     law = get_law("log" if auto else arguments.law)
     series = read_series(
         arguments.paths, arguments.steps_per_cycle, arguments.columns, arguments.unit
     )
+    if arguments.steps_per_cycle is not None and series.columns:
+        raise UsageError(
+            "a table counts cycles, not time steps", where="--steps-per-cycle",
+            remedy="leave it out; it is for dumps",
+        )  # fmt: skip
+    if (first := series.sinks_from) is not None:
+        raise UsageError(
+            f"the readings sink from {first:g} towards zero, as heights do and no settlement",
+            where=series.where,
+            remedy="give the first height less each; of a heave, give negative readings",
+        )
     to_cycle = arguments.to_cycle
     if to_cycle is None:
         to_cycle = series.cycle.max(initial=0.0)
@@ -99,7 +122,8 @@ def run_fit(arguments: argparse.Namespace) -> int:
         print_json(fitted)
         return 0
     unit = "(unit as given)" if series.unit == UNKNOWN else series.unit
-    print(f"law {fitted['law']}, fitted to {len(series.cycle)} cycles")
+    read = f" of {series.columns}" if series.columns else ""
+    print(f"law {fitted['law']}, fitted to {len(series.cycle)} cycles{read}")
     for name, value in fitted["parameters"].items():
         print(f"  {name} = {value:.6g}")
     print(f"regime: {fitted['regime'] or UNCLAIMED}")

@@ -13,6 +13,7 @@ import numpy as np
 from adapters.bed import FloatArray
 from adapters.errors import UsageError
 from adapters.files.settlement_table import SUFFIXES, Series, read_table_series
+from trackbed.run_verbs import find_kind
 
 
 def make_too_few_error(
@@ -52,6 +53,11 @@ def read_series(
     """
     if not paths:
         raise UsageError("no series was named", remedy="give a CSV file, a run folder or dumps")
+    if scenes := [path for path in paths if path.suffix == ".toml"]:
+        raise UsageError(
+            "this is a scene, not a series", where=str(scenes[0]),
+            remedy=f"run it, then fit its run folder: trackbed run {scenes[0]}",
+        )  # fmt: skip
     tables = [path for path in paths if path.is_dir() or _is_table(path)]
     if tables and len(paths) > 1:
         raise UsageError(
@@ -62,13 +68,34 @@ def read_series(
     if tables:
         path = tables[0]
         if path.is_dir() and unit not in (None, "m"):
-            raise UsageError(f"a run's settlement is in m, not in {unit}", where=str(path))
+            raise UsageError(
+                f"a run's settlement is in m, not in {unit}",
+                where=str(path),
+                remedy="leave --unit out",
+            )
         table = path / "settlement.csv" if path.is_dir() else path
+        if path.is_dir() and (kind := find_kind(path)) and kind.states:
+            raise UsageError(
+                f"this is a {kind.verb} run, which has no settlement under load cycles",
+                where=str(path), remedy=f"its files are open: {kind.files}",
+            )  # fmt: skip
+        if path.is_dir() and not table.exists():
+            raise UsageError(
+                "can not read the series (No such file or directory)",
+                where=str(table),
+                remedy="this folder is no run, or no cycle of it is computed; of other folders "
+                "give the files: a table, or dumps",
+            )
         return replace(read_table_series(table, columns, unit), where=str(table))
     if columns:
-        raise UsageError("dumps have no columns of cycles and settlement", where=str(paths[0]))
+        raise UsageError(
+            "dumps have no columns of cycles and settlement", where=str(paths[0]),
+            remedy=f"leave --columns out; tables are named {', '.join(SUFFIXES)}",
+        )  # fmt: skip
     if unit not in (None, "m"):
-        raise UsageError(f"dumps are in m, not in {unit}", where=str(paths[0]))
+        raise UsageError(
+            f"dumps are in m, not in {unit}", where=str(paths[0]), remedy="leave --unit out"
+        )
     return replace(read_dump_series(paths, steps_per_cycle), where=str(paths[0]))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from adapters.bed import FloatArray
 from adapters.errors import UsageError
-from trackbed.series_file import BRACKETED, Table, find_column, read_table
+from trackbed.series_file import Table, find_column, read_table
 
 UNKNOWN = "unknown"
 """Unit of numbers that come without one: they may be metres, millimetres or a strain."""
@@ -34,12 +35,23 @@ class Series:
     where: str = ""
     """File or folder it was read from, for errors."""
     left_out: int = 0
-    """Rows that `since` and `after` left out."""
+    """Rows that `keep_from` and `restart_after` left out."""
+    columns: str = ""
+    """Columns of a table that were taken, and the line that names them, to tell."""
+
+    @property
+    def sinks_from(self) -> float | None:
+        """First reading of what is a height: it sinks towards zero, at least by four fifths of all
+        it moves, and has not got there; None for a settlement, which begins at zero and grows."""
+        first, moved = float(self.settlement[0]), np.diff(self.settlement)
+        down, lowest = -float(moved.sum()), float(self.settlement.min())
+        falls = down > 0.8 * float(np.abs(moved).sum())
+        return first if len(moved) > 2 and falls and lowest > 0 else None
 
     def keep_from(self, cycle: float) -> Series:
         """The rows from the user's ``cycle`` on, to leave out a bedding-in that no law describes.
 
-        Behind `after`, not before it: that takes what settled before the change from earlier rows.
+        Behind `restart_after`, not before it, which takes what settled before from earlier rows.
         """
         return self._keep(self.cycle + self.counted_from >= cycle)
 
@@ -64,6 +76,10 @@ SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".xlsx")
 UNITS = {"m": "m", "cm": "cm", "mm": "mm", "um": "um", "µm": "um", "μm": "um", "%": "%", "-": "1"}
 """Units a header may give, as in ``settlement_mm`` or ``Settlement [mm]``, and their names."""
 CYCLE_NAMES = ("cycle", "cycles", "n")
+NO_UNITS = ("", "-", "1", "cycle", "cycles", "n", "no", "no.", "#", "count")
+"""What stands behind the name of a column of cycles without being a unit."""
+HEIGHT = re.compile(r"height|level|elevation|höhe|hoehe")
+"""Names of columns that are no settlement."""
 SETTLEMENT_NAMES = {"settlement": "m", "strain": "1", "axial strain": "1"}
 """Columns that are found without being named, and their unit where neither header nor user gives
 one; of other columns, and of a table without a header, it is then not known."""
@@ -100,19 +116,29 @@ def read_table_series(path: Path, names: Sequence[str] = (), unit: str | None = 
         try:
             places = [find_column(table, one, UNITS) for one in wanted]
             kinds = [table.split_title(n, UNITS)[0] == "kind" for n in range(len(table.header))]
+            _check_counts(table, places[0], wanted[0] if names else ())
             if any(kinds):
                 table = _select_computed(table, find_column(table, ("kind",), UNITS))
         except UsageError as error:
-            remedy = REMEDY if "column" in error.what else error.remedy
+            remedy = REMEDY if "no column" in error.what else error.remedy
             raise UsageError(error.what, where=error.where, remedy=remedy) from None
         title = table.header[places[1]]
         unit = _find_unit(table, places[1], unit)
     if not table.rows:
-        raise UsageError("there is no computed cycle in the table", where=str(path))
+        raise UsageError(
+            "there is no computed cycle in the table",
+            where=str(path),
+            remedy="a reading is a row of cycle and settlement below the header; of a run's table "
+            "only rows of the kind computed are",
+        )
     cycle, settlement = table.read_numbers(places, ("cycle", title))
     if cycle.min() < 0:
         row = int(np.argmax(cycle < 0))
-        raise UsageError(f"cycle {cycle[row]:g} is negative", where=table.where(row, "cycle"))
+        raise UsageError(
+            f"cycle {cycle[row]:g} is negative",
+            where=table.where(row, "cycle"),
+            remedy="count cycles from the start of the loading, which is cycle 0",
+        )
     order = np.argsort(cycle, kind="stable")
     cycle, settlement = cycle[order], settlement[order]
     again = np.flatnonzero(np.diff(cycle) == 0)
@@ -123,7 +149,11 @@ def read_table_series(path: Path, names: Sequence[str] = (), unit: str | None = 
             where=table.where(second, "cycle"),
             remedy="keep one reading of a cycle; a file for each stage whose count starts again",
         )
-    return Series(cycle, settlement, unit or UNKNOWN)
+    source = ""
+    if table.header:
+        source = " and ".join(table.header[place] for place in places)
+        source += f", named in line {table.header_line}" + (" with units below" * bool(table.units))
+    return Series(cycle, settlement, unit or UNKNOWN, columns=source)
 
 
 def _name_unit(given: str | None) -> str | None:
@@ -150,13 +180,33 @@ def _find_unit(table: Table, place: int, given: str | None) -> str:
         )  # fmt: skip
     if given and SETTLEMENT_NAMES.get(name) == "1" and given not in ("1", "%"):
         raise UsageError(f"the column {title} has no length, {given}", where=where, remedy=STRAIN)
-    if given and not unit and (other := BRACKETED.fullmatch(title)):
+    if not unit and (other := table.find_unit(place)):
         raise UsageError(
-            f"the column {title} is in {other[2]}, which is not known, and not in {given}",
+            f"the column {title} is in {other}, which is not known"
+            + (f", and not in {given}" if given else ""),
             where=where,
-            remedy="convert it, or name the column without a unit",
+            remedy=f"convert it to {', '.join(dict.fromkeys(UNITS.values()))}, or name the column "
+            "without what is no unit",
+        )
+    if HEIGHT.search(name):
+        raise UsageError(
+            f"the column {title} is a height, which falls as the bed settles",
+            where=where,
+            remedy="give the first height less each: settlement grows; or the run folder",
         )
     return unit or given or SETTLEMENT_NAMES.get(name, UNKNOWN)
+
+
+def _check_counts(table: Table, place: int, named: Sequence[str]) -> None:
+    """Refuse cycles with a unit, unless the user ``named`` the column with it: tonnes, hours."""
+    title = table.header[place]
+    unit = table.find_unit(place) or table.split_title(place, UNITS)[1]
+    if unit.lower() not in NO_UNITS and title.lower() not in named:
+        raise UsageError(
+            f"the column {title} is in {unit}, and cycles are plain numbers",
+            where=f"{table.path}:{table.header_line}",
+            remedy=f"give cycles, or name what you count in full: --columns '{title}' ...",
+        )
 
 
 def _select_computed(table: Table, place: int) -> Table:

@@ -8,10 +8,12 @@ from typing import Annotated, Any, Literal
 import pytest
 from pydantic import Field
 
+from trackbed.command import main
 from trackbed.errors import SceneError, UsageError
 from trackbed.scene_files.lines import find_key_lines
 from trackbed.scene_files.reader import Guide, SceneText, read_scene, suggest_word
 from trackbed.scene_files.types import Name, Positive, Table, Text
+from trackbed.scenes import find_scene_verb, read_template
 
 GUIDE = Guide("karrech", "run.step=1")
 BODY = 'run = {}\n[[body]]\nname = "a"\n'
@@ -191,3 +193,20 @@ def test_lines_of_keys_of_awkward_toml() -> None:
 def test_nearest_word_is_suggested(word: str, said: str) -> None:
     """The nearest known word, or all of them."""
     assert suggest_word(word, ["way", "step"]) == said
+
+
+@pytest.mark.parametrize("name", ["karrech-coarse", "cantilever-vibration", "pile"])
+@pytest.mark.parametrize("verb", ["run", "qdem", "rigid"])
+def test_a_scene_names_its_verb(
+    tmp_path: Path, name: str, verb: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Given to another verb: exit code 3 and the command to give, no list of unknown keys."""
+    own = find_scene_verb(name)
+    if verb == own:
+        return
+    path = tmp_path / "scene.toml"
+    path.write_text(read_template(name))
+    assert main([verb, str(path), "--dry-run"]) == 3
+    said = capsys.readouterr().err
+    assert f"this is a scene of the verb {own}, not of {verb}\n  -> trackbed {own} {path}" in said
+    assert "unknown key" not in said

@@ -7,6 +7,7 @@ to its example; `read_scene` reads the text and `SceneText.check` the tables.
 from __future__ import annotations
 
 import re
+import shlex
 import tomllib
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
@@ -20,8 +21,10 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from trackbed.errors import SceneError, TrackbedError, UsageError
+from trackbed.run_verbs import KINDS, find_scene_kind
 from trackbed.scene_files.lines import find_key_lines
 from trackbed.scene_files.types import NAME_PATTERN
+from trackbed.scenes import find_scene_verb
 
 BOUNDS = {
     "greater_than": ("gt", "above"),
@@ -89,7 +92,19 @@ class SceneText:
         return places
 
     def check(self, model: type[BaseModel]) -> None:
-        """Check every table by itself: fills ``tables`` and ``problems``; nothing is raised."""
+        """Check every table by itself: fills ``tables`` and ``problems``.
+
+        Raises `SceneError` for a scene of another verb, known by a table that ``model`` has not.
+        """
+        given = find_scene_kind(self.data)
+        if given and not any(
+            kind.table in model.model_fields for kind in KINDS if kind.table in self.data
+        ):
+            own = find_scene_verb(self.guide.example)
+            raise SceneError(
+                f"this is a scene of the verb {given.verb}, not of {own}", where=str(self.path),
+                remedy=f"trackbed {given.verb} {shlex.quote(str(self.path))}",
+            )  # fmt: skip
         for name, definition in model.model_fields.items():
             value, inner = self.data.get(name), find_model(definition.annotation)
             entries = {name: value}

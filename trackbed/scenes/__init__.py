@@ -6,7 +6,7 @@ import tomllib
 from importlib.resources import files
 from pathlib import Path
 
-from trackbed.run_verbs import KINDS
+from trackbed.run_verbs import find_scene_kind
 
 __all__ = ["find_scene_file", "find_scene_verb", "list_scenes", "read_template"]
 
@@ -31,5 +31,5 @@ def find_scene_file(name: str) -> Path:
 
 def find_scene_verb(name: str) -> str:
     """The verb of ``trackbed`` that runs the scene ``name``, known by a table only it has."""
-    tables = tomllib.loads(read_template(name))
-    return next((kind.verb for kind in KINDS if kind.table in tables), "run")
+    kind = find_scene_kind(tomllib.loads(read_template(name)))
+    return kind.verb if kind else "run"

@@ -225,9 +225,15 @@ def _check_target(
     series: Series, last: float, to_cycle: float, probability: float, fail_at: float | None
 ) -> None:
     if not 0 < probability < 1:
-        raise UsageError(f"a probability lies between 0 and 1, not at {probability:g}")
+        raise UsageError(
+            f"a probability lies between 0 and 1, not at {probability:g}",
+            remedy="ask for a band with --probability 0.9, say: none holds the truth for certain",
+        )
     if fail_at is not None and not (fail_at > 0 and isfinite(fail_at)):
-        raise UsageError(f"the settlement of failure is a positive number, not {fail_at:g}")
+        raise UsageError(
+            f"the settlement of failure is a positive number, not {fail_at:g}",
+            remedy=f"give --fail-at in the unit of the series, {series.unit}",
+        )
     if not (isfinite(to_cycle) and to_cycle >= last):
         raise UsageError(
             f"cycle {to_cycle + series.counted_from:.10g} does not lie behind the last one of the "
