@@ -2,19 +2,39 @@
 
 from __future__ import annotations
 
+import bz2
 import gzip
-from collections.abc import Iterable, Iterator
+import lzma
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from adapters.bed import FloatArray
+from adapters.bed import FloatArray, IntArray
 from adapters.errors import DumpError
 from trackbed.run_files import replace_file
 
 Kind = Literal["atoms", "entries"]
+EXTENSIONS = (".dump", ".lammpstrj", ".liggghts")
+"""Endings of file names that are taken for text dumps; with one of `PACKED` behind them, too."""
+PACKED: dict[str, Callable[..., Any]] = {".gz": gzip.open, ".bz2": bz2.open, ".xz": lzma.open}
+"""Endings of packed files, and what opens them."""
+OTHER_FORMATS = {
+    b"\x1f\x8b": "gzip data: give the file a name that ends in .gz",
+    b"BZh": "bzip2 data: give the file a name that ends in .bz2",
+    b"\xfd7zXZ": "xz data: give the file a name that ends in .xz",
+    b"\x28\xb5\x2f\xfd": "zstd data: unpack it first (zstd -d FILE)",
+    b"PK\x03\x04": "a zip or npz archive: give the text dump, or a table named .xlsx",
+    b"\xd0\xcf\x11\xe0": "an old spreadsheet: save it as .xlsx or .csv",
+    b"\x89PNG": "a PNG image: give the text dump",
+}
+"""How other files begin, and what to do with them."""
+PLACES = (("xu", "yu", "zu"), ("x", "y", "z"), ("xsu", "ysu", "zsu"), ("xs", "ys", "zs"))
+"""Columns of places; u: not folded back into the box, s: in edges of the box."""
+TILTS = {2: "ff ff ff", 3: "xy xz yz ff ff ff", 4: "abc origin ff ff ff"}
+"""What a header says of bounds of so many columns; ff: sides that nothing passes."""
 
 
 @dataclass(frozen=True)
@@ -50,16 +70,74 @@ class Frame:
         index = [self.columns.index(name) for name in names]
         return np.ascontiguousarray(self.values[:, index])
 
+    def find_centres(self) -> FloatArray:
+        """Places as they are without periods [m], (n, 3), from whichever of `PLACES` is there.
+
+        Image flags ix, iy, iz count edges of the box.  Raises `DumpError` where there are no
+        places, or no box to scale them with.
+        """
+        names = next((names for names in PLACES if set(names) <= set(self.columns)), None)
+        if names is None:
+            raise DumpError(
+                f"there are no places x y z, only {' '.join(self.columns)}",
+                where=f"time step {self.time_step}",
+                remedy="give a dump of grains with x y z, xu yu zu or xs ys zs",
+            )
+        place, folded = self.block(*names), "u" not in names[0]
+        scaled = "s" in names[0]
+        images = np.zeros_like(place)
+        for axis, flag in enumerate(("ix", "iy", "iz")):
+            if folded and flag in self.columns:
+                images[:, axis] = self.column(flag)
+        if not (scaled or images.any()):
+            return place
+        if not len(self.bounds):
+            raise DumpError(
+                f"there is no box for the places {' '.join(names)}",
+                where=f"time step {self.time_step}", remedy="give the dump with BOX BOUNDS",
+            )  # fmt: skip
+        origin, edges = find_cell(self.bounds)
+        return origin + (place + images) @ edges if scaled else place + images @ edges
+
+
+class Header(NamedTuple):
+    """What is above the rows of a frame."""
+
+    label: str
+    rows: int
+    columns: tuple[str, ...]
+    bounds: FloatArray
+    boundary: str
+
+
+def list_grains(identifiers: IntArray) -> str:
+    """At most ten identifiers as text, and how many there are."""
+    text = ", ".join(map(str, identifiers[:10].tolist()))
+    return text if len(identifiers) <= 10 else f"{text}, ... ({len(identifiers)} in all)"
+
+
+def find_cell(bounds: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Origin (3,) and edges, a row each (3, 3), of a box as dumps have it [m]: low and high, with
+    tilts xy, xz, yz behind the bounds of the whole, or each edge with the origin behind."""
+    if bounds.shape[1] == 4:
+        return bounds[:, 3], bounds[:, :3]
+    xy, xz, yz = bounds[:, 2] if bounds.shape[1] == 3 else np.zeros(3)
+    tilts_x, tilts_y = (0.0, xy, xz, xy + xz), (0.0, yz)
+    low = bounds[:, 0] - [min(tilts_x), min(tilts_y), 0.0]
+    high = bounds[:, 1] - [max(tilts_x), max(tilts_y), 0.0]
+    tilt = [[0.0, 0.0, 0.0], [xy, 0.0, 0.0], [xz, yz, 0.0]]
+    return low, np.diag(high - low) + tilt
+
 
 def write_dump(path: str | Path, frames: Iterable[Frame]) -> None:
-    """Write frames as a text dump (``.gz`` by suffix), atomically; `read_frames` reads it back.
+    """Write frames as a text dump (`PACKED` by suffix), atomically; `read_frames` reads it back.
 
     Nothing is lost.  LIGGGHTS takes the file in
     ``read_dump FILE STEP x y z vx vy vz radius replace yes box no`` when it has the columns
     ``id`` and ``type`` too; without them it stops, and says nothing.
     """
     path = Path(path)
-    open_bytes = gzip.open if path.suffix == ".gz" else open
+    open_bytes = PACKED.get(path.suffix, open)
     with replace_file(path) as temporary, open_bytes(temporary, "wb") as stream:
         for frame in frames:
             stream.writelines(format_frame(frame))

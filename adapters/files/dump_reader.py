@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import gzip
 import re
 import zlib
+from collections import deque
 from collections.abc import Iterator
-from gzip import GzipFile
-from io import FileIO
+from io import BufferedIOBase, FileIO
+from lzma import LZMAError
 from pathlib import Path
-from typing import NamedTuple, NoReturn
+from typing import NoReturn
 
 import numpy as np
 
 from adapters.bed import FloatArray, IntArray
 from adapters.errors import DumpError, UsageError
-from adapters.files.dump import Frame, Kind
+from adapters.files.dump import OTHER_FORMATS, PACKED, Frame, Header, Kind, list_grains
 
 TEXT_BLOCK = 1 << 20
 """Bytes read at once; also the longest line that is taken for text."""
@@ -29,26 +29,21 @@ _NUMBER = re.compile(rb"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 _NOT_FINITE = re.compile(rb"[+-]?(nan(\(\w*\))?|inf(inity)?)", re.IGNORECASE)
 WRITE_TEXT = "write text with 'dump ID all custom N FILE id x y z ...' or 'dump ID all local ...'"
 DAMAGED = "the header is damaged: run again, or cut this frame out"
-_OTHER_FORMATS = {
-    b"\x1f\x8b": "gzip data: give the file a name that ends in .gz",
-    b"PK\x03\x04": "a zip or npz archive: give the text dump",
-    b"\x89PNG": "a PNG image: give the text dump",
-}
 
 
-def read_frames(path: str | Path) -> Iterator[Frame]:
-    """Frames of a text dump (``.gz`` too), in order; memory for one frame and a block of text.
+def read_frames(path: str | Path, whole: bool = True) -> Iterator[Frame]:
+    """Frames of a text dump (`PACKED` too), in order; memory for one frame and a block of text.
 
-    Every number is the float64 nearest to its decimal text.  A grain that was in a frame must be in
-    all later ones.  Raises `DumpError` at the first fault, after the whole frames before it;
-    `UsageError` when the file cannot be opened.
+    Every number is the float64 nearest to its decimal text.  A frame that repeats the one before is
+    left out, as of a run that went on in the same file.  Where the ``whole`` series counts, a grain
+    that was in a frame must be in all later ones.  Raises `DumpError` at the first fault, after the
+    whole frames before it; `UsageError` when the file cannot be opened.
     Not for ``.bin``, VTK or image dumps, nor for text columns such as ``element``.
     """
     path = Path(path)
     try:
-        stream = (
-            gzip.open(path) if path.suffix == ".gz" else path.open("rb", buffering=0)  # noqa: SIM115
-        )
+        packed = PACKED.get(path.suffix)
+        stream = packed(path) if packed else path.open("rb", buffering=0)
     except OSError as error:
         raise UsageError(
             f"the dump cannot be opened ({error.strerror})",
@@ -58,23 +53,21 @@ def read_frames(path: str | Path) -> Iterator[Frame]:
     with stream:
         reader = Reader(path, stream)
         while (frame := reader.read_frame()) is not None:
-            yield frame
+            if not reader.repeated:
+                yield frame
+            if not whole:
+                reader.known = reader.header_before = None
 
 
-class Header(NamedTuple):
-    """What is above the rows of a frame."""
-
-    label: str
-    rows: int
-    columns: tuple[str, ...]
-    bounds: FloatArray
-    boundary: str
+def read_last_frame(path: str | Path) -> Frame:
+    """The last frame of a text dump, whatever grains left before it; raises as `read_frames`."""
+    return deque(read_frames(path, whole=False), maxlen=1).pop()
 
 
 class Reader:
     """A dump on its way: a block of its text, and what the frames so far allow of the next."""
 
-    def __init__(self, path: Path, stream: FileIO | GzipFile) -> None:
+    def __init__(self, path: Path, stream: FileIO | BufferedIOBase) -> None:
         self.path, self.stream = path, stream
         self.block = bytearray(TEXT_BLOCK)
         self.text = np.frombuffer(self.block, np.uint8)
@@ -82,10 +75,11 @@ class Reader:
         self.line = 0  # lines used so far
         self.cut = False  # compressed data stopped before their end mark
         self.step: int | None = None
+        self.step_line = self.mark = 0  # line of the step; checksum of the rows before
         self.step_before: int | None = None
         self.header_before: Header | None = None
         self.known: IntArray | None = None  # identifiers of the grains of the frame before
-        self.complete = 0
+        self.complete, self.repeated = 0, False  # frames read; the last one is that before
 
     # --- text and faults --------------------------------------------------------------------
     def read_more(self) -> bool:
@@ -100,7 +94,7 @@ class Reader:
             count = self.stream.readinto(memoryview(self.block)[unused:])
         except EOFError:
             self.cut, count = True, 0
-        except (OSError, zlib.error) as error:
+        except (OSError, zlib.error, LZMAError) as error:
             what = f"the file cannot be read further ({error})"
             self.refuse(what, "copy or write the file again", line=self.line + 1)
         self.end += count
@@ -159,9 +153,10 @@ class Reader:
             )
         start = head.lstrip()[:5]
         if start != b"ITEM:"[: len(start)]:
-            known = [text for mark, text in _OTHER_FORMATS.items() if head.startswith(mark)]
+            known = [text for mark, text in OTHER_FORMATS.items() if head.startswith(mark)]
             text = "it begins with " + repr(head[:16])[1:]
-            remedy = known[0] if known else WRITE_TEXT
+            table = "; a table is named .csv, .tsv, .txt, .dat or .xlsx, and not packed"
+            remedy = known[0] if known else WRITE_TEXT + table
             self.refuse(f"this is no text dump: {text}", remedy, line=1)
 
     def read_whole(self, item: str) -> int:
@@ -215,18 +210,13 @@ class Reader:
         self.refuse(what, "the frame is damaged: run again, or cut it out")
 
     def read_step(self) -> None:
-        """Read the time step, which must grow from frame to frame."""
+        """Read the time step."""
         if self.step is not None:
             self.refuse(
                 "the next frame begins inside the header of this one",
                 "the engine was stopped here: cut this frame out",
             )
-        self.step = self.read_whole("TIMESTEP")
-        if self.step_before is not None and self.step <= self.step_before:
-            self.refuse(
-                f"time steps must increase, but {self.step} follows {self.step_before}",
-                "a run was appended to an older dump: give each run a file of its own",
-            )
+        self.step, self.step_line = self.read_whole("TIMESTEP"), self.line
 
     def read_bounds(self) -> FloatArray:
         """Three rows of box bounds, two to four numbers each."""
@@ -246,6 +236,9 @@ class Reader:
         if header.rows < 0 or not header.columns:
             what = f"the header announces {header.rows} rows of {len(header.columns)} columns"
             self.refuse(what, DAMAGED)
+        if twice := {name for name in header.columns if header.columns.count(name) > 1}:
+            what = f"columns are there twice: {' '.join(sorted(twice))}"
+            self.refuse(what, "name each once in the engine's dump command")
         before = self.header_before
         if before is not None and (before.label, before.columns) != (header.label, header.columns):
             missing = [name for name in before.columns if name not in header.columns]
@@ -270,6 +263,13 @@ class Reader:
         if header.label == "ATOMS":
             values = self.check_grains(header, values)
         assert self.step is not None
+        mark, before = zlib.crc32(np.ascontiguousarray(values).data), self.step_before
+        self.repeated = before == self.step and mark == self.mark
+        if before is not None and before >= self.step and not self.repeated:
+            what = f"time steps must increase, but {self.step} follows {before}"
+            remedy = "a run was appended to an older dump: give each run a file of its own"
+            self.refuse(what, remedy, line=self.step_line)
+        self.mark = mark
         self.complete += 1
         self.header_before, self.step_before = header, self.step
         kind: Kind = "atoms" if header.label == "ATOMS" else "entries"
@@ -392,9 +392,3 @@ class Reader:
             )
         self.known = identifier
         return values
-
-
-def list_grains(identifiers: IntArray) -> str:
-    """At most ten identifiers as text, and how many there are."""
-    text = ", ".join(map(str, identifiers[:10].tolist()))
-    return text if len(identifiers) <= 10 else f"{text}, ... ({len(identifiers)} in all)"

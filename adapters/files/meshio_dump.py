@@ -10,7 +10,6 @@ Names that end in one of `EXTENSIONS` are known by it; for others, such as ``dum
 from __future__ import annotations
 
 import re
-from collections import deque
 from collections.abc import Iterator
 from itertools import groupby
 from os import PathLike
@@ -20,15 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adapters.errors import DumpError, UsageError
-from adapters.files.dump import Frame, write_dump
-from adapters.files.dump_reader import read_frames
+from adapters.files.dump import EXTENSIONS, PACKED, TILTS, Frame, write_dump
+from adapters.files.dump_reader import read_frames, read_last_frame
 
 FORMAT = "lammps-dump"
 """Name of the format in meshio."""
-EXTENSIONS = (".dump", ".lammpstrj", ".liggghts")
-"""Endings of file names that are taken for text dumps; with ``.gz`` behind them, too."""
 STEP, BOX = "time_step", "box"
-"""Keys of ``Mesh.field_data``: the step count, (1,), and the box, low and high [m], (3, 2)."""
+"""Keys of ``Mesh.field_data``: the step count, (1,), and the box as in `Frame.bounds` [m]."""
 WHOLE = ("id", "type", "mol")
 """Columns of whole numbers."""
 _COMPONENT = re.compile(r"(\[\d+\]|[xyz])$")
@@ -38,9 +35,10 @@ _REFERENCE = re.compile(r"[cfdi]2?_")
 
 
 def read_dump_meshes(path: str | PathLike[str]) -> Iterator[meshio.Mesh]:
-    """Every frame of a text dump (``.gz`` too) as a mesh, in order.
+    """Every frame of a text dump (`PACKED` too) as a mesh, in order.
 
-    ``points`` are the columns x, y, z [m], ``cells`` one vertex a grain, in ascending ``id``.
+    ``points`` are the columns x, y, z [m], or others of `PLACES` unfolded, ``cells`` one vertex a
+    grain, in ascending ``id``.
     ``point_data`` holds the other columns by name: vx, vy, vz as ``v``, shape (n, 3), and
     f_force[1], f_force[2], f_force[3] as ``f_force``; ``field_data`` the `STEP` and the `BOX`.
     Raises `DumpError` and `UsageError` as `adapters.files.read_frames`, and for a dump without
@@ -52,7 +50,7 @@ def read_dump_meshes(path: str | PathLike[str]) -> Iterator[meshio.Mesh]:
 
 def read_dump_mesh(path: str | PathLike[str]) -> meshio.Mesh:
     """The last frame of a text dump, as `read_dump_meshes`: a mesh is one instant."""
-    return _make_mesh(deque(read_frames(str(path)), maxlen=1).pop(), str(path))
+    return _make_mesh(read_last_frame(str(path)), str(path))
 
 
 def write_dump_mesh(path: str | PathLike[str], mesh: meshio.Mesh) -> None:
@@ -72,22 +70,24 @@ def write_dump_mesh(path: str | PathLike[str], mesh: meshio.Mesh) -> None:
         columns |= _split_columns("_".join(name.split()), np.asarray(values))
     step = int(np.ravel(mesh.field_data.get(STEP, 0))[0])
     bounds = np.asarray(mesh.field_data.get(BOX, np.empty((0, 2))), float)
-    frame = Frame(step, tuple(columns), np.column_stack([*columns.values()]), bounds)
+    values, tilt = np.column_stack([*columns.values()]), TILTS[bounds.shape[1]]
+    frame = Frame(step, tuple(columns), values, bounds, boundary=tilt)
     write_dump(str(path), [frame])
 
 
 def _make_mesh(frame: Frame, path: str) -> meshio.Mesh:
-    if frame.kind != "atoms" or not {"x", "y", "z"} <= set(frame.columns):
+    if frame.kind != "atoms":
         raise DumpError(
             f"there are no places x y z, only {' '.join(frame.columns)}",
             where=f"{path}, time step {frame.time_step}",
-            remedy="give a dump of grains with x y z; contacts are not a mesh by themselves",
+            remedy="give a dump of grains; contacts are not a mesh by themselves",
         )
-    points = frame.block("x", "y", "z")
+    axes = {"x", "y", "z"} <= set(frame.columns)
+    points = frame.block("x", "y", "z") if axes else frame.find_centres()
     data = dict(gather_point_data(frame))
     cells = [("vertex", np.arange(len(points))[:, None])]
     field: dict[str, NDArray[np.generic]] = {STEP: np.array([frame.time_step])}
-    if frame.bounds.shape == (3, 2):
+    if len(frame.bounds):
         field[BOX] = frame.bounds
     return meshio.Mesh(points, cells, point_data=data, field_data=field)
 
@@ -119,7 +119,7 @@ def _split_columns(name: str, values: NDArray[np.generic]) -> dict[str, NDArray[
 
 meshio.register_format(
     FORMAT,
-    [ending + packed for ending in EXTENSIONS for packed in ("", ".gz")],
+    [ending + packed for ending in EXTENSIONS for packed in ("", *PACKED)],
     read_dump_mesh,
     {FORMAT: write_dump_mesh},
 )

@@ -129,7 +129,9 @@ def read_dump_series(paths: Sequence[Path], steps_per_cycle: float | None = None
                     remedy="name the files so that their numbers ascend with time",
                 )
             steps.append(frame.time_step)
-            heights.append(float(frame.column("z").mean()))
+            plain = "z" in frame.columns and not {"iz", "zu"} & set(frame.columns)
+            height = frame.column("z") if plain else frame.find_centres()[:, 2]
+            heights.append(float(height.mean()))
     if steps_per_cycle is None:
         cycle = np.arange(len(steps), dtype=float)
     else:

@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-from collections import deque
 from pathlib import Path
 
 import numpy as np
 
 from adapters.bed import FloatArray, State, load_state, save_state
 from adapters.files.dump import Frame, write_dump
-from adapters.files.dump_reader import read_frames
+from adapters.files.dump_reader import read_last_frame
 
 
 def read_state_file(path: Path, density: float) -> State:
     """A state from ``path``: ``.npz`` as `adapters.bed.load_state`, else a dump's last frame.
 
-    A dump needs the columns id, x, y, z and radius.  Without its own columns, a mass is that of a
+    A dump needs the columns id, radius and places.  Without its own columns, a mass is that of a
     sphere of ``density`` [kg/m^3] and a velocity is zero; contacts and piston it has none.
     Raises `UsageError` and `DumpError`.
     """
     if path.suffix == ".npz":
         return load_state(path)
-    frame = deque(read_frames(path), maxlen=1).pop()
+    frame = read_last_frame(path)
     radius = frame.column("radius")
 
     def read_vectors(*columns: str) -> FloatArray:
@@ -30,7 +29,7 @@ def read_state_file(path: Path, density: float) -> State:
 
     return State(
         frame.column("id").astype(np.int64),
-        frame.block("x", "y", "z"),
+        frame.find_centres(),
         radius,
         frame.column("mass") if "mass" in frame.columns else density * 4 / 3 * np.pi * radius**3,
         read_vectors("vx", "vy", "vz"),
