@@ -48,7 +48,7 @@ def move_grains(positions):
         state.pos, state.vel, state.angVel = Vector3(*position), Vector3.Zero, Vector3.Zero
 
 
-loop_s = time.monotonic()
+loop_s = time.process_time()
 if window["start"] == "first":
     seat()
 elif window["start"] == "moved":
@@ -79,6 +79,6 @@ for _ in range(window["cycles"]):
     bed.renew_forces([load])
     dumps.frame()
 piston_record.last(record.tabulate_grains(dumps.count))
-loop_s = time.monotonic() - loop_s
+loop_s = time.process_time() - loop_s
 record.save_scene()
 print(f"LOOP {loop_s:.6f} s\nCOMPLETE step {O.iter}", flush=True)

@@ -75,7 +75,7 @@ class EngineRun:
     wall_s: float
     """Elapsed time [s]."""
     start_up_s: float
-    """Part of it before and after the time steps: reading, building neighbours, writing [s]."""
+    """CPU time before and after the time steps: reading, building neighbours, writing [s]."""
     decks: dict[str, str]
     """SHA-256 of every static deck used."""
 

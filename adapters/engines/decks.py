@@ -24,8 +24,8 @@ from adapters.engines.plan import PLAN, count_cycle_steps, plan_seating, plan_se
 from adapters.engines.process import ProcessEngine
 from adapters.scene import Scene
 
-LOOP_TIME = re.compile(r"^Loop time of (\S+) on", re.MULTILINE)
-"""How LIGGGHTS and LAMMPS say how many seconds the time steps took."""
+LOOP_TIME = re.compile(r"^Loop time of (\S+) on (\d+) procs", re.MULTILINE)
+"""How LIGGGHTS and LAMMPS say how many seconds the time steps took on how many processes."""
 GRAIN, WALL, MIRROR = 1, 2, 3
 """Atom types: grains; walls, piston face and piston mass; mirror planes."""
 PISTON_MARGIN = 1.0

@@ -16,6 +16,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import repeat
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -158,6 +159,8 @@ def explain_engine_failure(status: int, folder: Path) -> EngineFailed:
     return error
 
 
+CPU_USE = re.compile(r"^([\d.]+)% CPU use with", re.MULTILINE)
+"""How LAMMPS says what share of the elapsed time each of its processes computed."""
 COMPLETE = re.compile(r"^COMPLETE step \d+", re.MULTILINE)
 """The last line of every deck: no exit code proves that a run got so far."""
 
@@ -202,7 +205,8 @@ class ProcessEngine(ABC):
     """What the engine prints once when it starts; without it the failure came from outside (a
     launcher, a loader), twice it is two runs in one folder."""
     loop_time: re.Pattern[str]
-    """Its words for the seconds that the time steps took, one group."""
+    """Its words for the seconds that the time steps took and the processes they took them on, 1
+    where it says CPU time."""
     launch: str
     """How it is launched rightly."""
     ended_early: str | None = None
@@ -313,5 +317,15 @@ class ProcessEngine(ABC):
             failure.from_outside |= self.begun.search(text) is None
             raise failure
         self.complete(scene, folder)
-        loop_s = sum(float(seconds) for seconds in self.loop_time.findall(text))
-        return EngineRun(tuple(command), cpu_s, wall_s, max(wall_s - loop_s, 0.0), digests)
+        return EngineRun(tuple(command), cpu_s, wall_s, self.find_start_up(cpu_s, text), digests)
+
+    def find_start_up(self, cpu_s: float, text: str) -> float:
+        """CPU time [s] that was not spent in time steps, of ``cpu_s`` in all, by what was printed.
+
+        Their elapsed time counts by the share of a processor that LAMMPS prints behind it; LIGGGHTS
+        prints none, and on a machine that is shared less is left for the start-up then.
+        """
+        loops, shares = self.loop_time.findall(text), CPU_USE.findall(text)
+        used = map(float, shares) if len(shares) == len(loops) else repeat(100.0)
+        spent = [float(s) * int(n or 1) * u / 100 for (s, n), u in zip(loops, used, strict=False)]
+        return max(cpu_s - sum(spent), 0.0)

@@ -30,7 +30,7 @@ SCRIPTS = {"in.prepare": "prepare.py", "in.cycles": "cycles.py"}
 """Script of each deck."""
 PARAMETERS = "params.json"
 BEGUN = re.compile("Running script")
-LOOP_TIME = re.compile(r"^LOOP (\S+) s", re.MULTILINE)
+LOOP_TIME = re.compile(r"^LOOP (\S+) s()", re.MULTILINE)
 BANNER = re.compile(r"Yade version: ((\d{4})\S*)")
 
 
