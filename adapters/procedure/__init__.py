@@ -2,7 +2,13 @@
 
 from adapters.procedure import run
 from adapters.procedure.checks import BOUNDS
-from adapters.procedure.history import AVERAGED, History, list_jumped_spans, sum_cost
+from adapters.procedure.history import (
+    AVERAGED,
+    History,
+    find_speed_up,
+    list_jumped_spans,
+    sum_cost,
+)
 from adapters.procedure.progress import Progress
 from adapters.procedure.record import (
     CONTROL,
@@ -21,8 +27,8 @@ from adapters.procedure.status import describe_result, judge_progress, read_stat
 
 __all__ = [
     "AVERAGED", "BOUNDS", "CONTROL", "SEATING", "History", "Progress", "Record", "Track",
-    "describe_result", "estimate_band_of_run", "find_comparable_cycle",
-    "find_hung_cycles", "format_spans", "judge_progress", "list_checks", "list_decisions",
+    "describe_result", "estimate_band_of_run", "find_comparable_cycle", "find_hung_cycles",
+    "find_speed_up", "format_spans", "judge_progress", "list_checks", "list_decisions",
     "list_jumped_spans", "make_plain", "read_run_record", "read_status", "record_scene",
     "refuse_differences", "run", "sum_cost",
 ]  # fmt: skip

@@ -53,6 +53,19 @@ class History:
         """Which rows the engine computed, shape (r,)."""
         return np.array([kind != "jumped" for kind in self.kind], bool)
 
+    def gain(self, first: int, last: int) -> float:
+        """Settlement between two cycles [m], 0 for the preparation; nan unless both are there."""
+        if not {first, last} <= {0, *self.cycle.tolist()}:
+            return nan
+        start, end = (self.settlement[self.row(n)] if n else 0.0 for n in (first, last))
+        return float(end - start)
+
+    def gain_error(self, settlement: float, before: int, cycle: int) -> float:
+        """Error of a ``settlement`` [m] at ``cycle`` over what was gained since ``before``; its own
+        zero, the piston at rest by chance, is no measure.  nan where nothing was gained."""
+        gained = self.gain(before, cycle)
+        return (settlement - self.gain(0, cycle)) / abs(gained) if gained else nan
+
     def late_mean(self, name: str, cycle: int) -> float:
         """Mean of a column over the computed rows among the last `AVERAGED` cycles to ``cycle``."""
         late = (self.cycle > cycle - AVERAGED) & (self.cycle <= cycle) & self.engine_rows
@@ -64,6 +77,11 @@ class History:
 def sum_cost(cost: Mapping[str, float]) -> float:
     """CPU time of a stage [s]; ``start_up`` is a part of ``engine``."""
     return sum(seconds for purpose, seconds in cost.items() if purpose != "start_up")
+
+
+def find_speed_up(full_s: float, procedure_s: float) -> float:
+    """S = T_full / T_procedure, of CPU times; see `adapters.report.error`."""
+    return full_s / procedure_s if procedure_s > 0 else nan
 
 
 def make_history(outcomes: Sequence[Outcome], lost: Sequence[tuple[int, float]] = ()) -> History:

@@ -7,11 +7,7 @@ import time
 
 
 class Progress:
-    """Tells cycles computed and jumped, settlement, speed-up so far and time left.
-
-    Speed-up is cycles done over cycles computed: the cost in cycles, known while it runs; the
-    report gives the ratio of CPU times.
-    """
+    """Tells cycles computed and jumped, settlement and time left."""
 
     def __init__(self, quiet: bool = False) -> None:
         self.stream, self.quiet = sys.stderr, quiet
@@ -46,8 +42,6 @@ class Progress:
         text = f"cycle {done} of {total}: {computed} computed, {done - computed} jumped"
         if settlement is not None:
             text += f", settlement {1e6 * settlement:.1f} um"
-        if computed:
-            text += f", speed-up so far {done / computed:.2f}"
         started, at_start = self._first
         if computed_here > at_start:
             left = (now - started) / (computed_here - at_start) * to_compute

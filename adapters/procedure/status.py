@@ -8,7 +8,7 @@ from math import isfinite, nan
 from pathlib import Path
 
 from adapters.jumps import BAND_PROBABILITY
-from adapters.procedure.history import History, sum_cost
+from adapters.procedure.history import History, find_speed_up, list_jumped_spans, sum_cost
 from adapters.procedure.record import (
     Record,
     Track,
@@ -38,7 +38,7 @@ class Status:
     failed_jumps: int
     settlement_m: float | None
     speed_up_so_far: float | None
-    """Cycles done over cycles computed; the report gives the ratio of CPU times."""
+    """CPU time of the full run beside it over its own, as in the report; None without one."""
     cpu_s: float
     """CPU time of all finished stages, preparation included [s]."""
     band_m: tuple[float, float] | None
@@ -62,7 +62,10 @@ def judge_progress(record: Record) -> Status:
     state = "running" if is_written(run_folder, "lock") else "stopped"
     if state == "stopped" and _is_finished(record):
         state = "finished"
-    ratio = cycle / computed if computed else nan
+    at, ratio = find_comparable_cycle(record), nan
+    if record.control is not None and at:
+        full = record.control.history
+        ratio = find_speed_up(full.cpu_s[full.row(at)], history.cpu_s[history.row(at)])
     band = estimate_band_of_run(record.run)
     procedure = record.scene.procedure if record.scene.loading is not None else None
     verb = {"running": "status", "stopped": "resume", "finished": "report"}[state]
@@ -79,7 +82,7 @@ def judge_progress(record: Record) -> Status:
         jumps=len(record.run.jumps),
         failed_jumps=len(record.run.failed_jumps),
         settlement_m=float(history.settlement[-1]) if cycle else None,
-        speed_up_so_far=ratio if isfinite(ratio) else None,
+        speed_up_so_far=float(ratio) if isfinite(ratio) else None,
         cpu_s=sum(sum_cost(outcome.cost) for outcome in record.run.outcomes),
         band_m=None if band is None else (band.low, band.high),
         control_cycle=_find_last_cycle(record.control) if record.control is not None else None,
@@ -102,21 +105,24 @@ def describe_result(record: Record) -> list[str]:
         said.append(f"With probability {BAND_PROBABILITY:g} a full run settles {ends}.")
     at = find_comparable_cycle(record)
     if record.control is not None and at and record.run.jumps:
-        said.append(compare_with_full(history, record.control.history, at))
+        first = list_jumped_spans(record.run.outcomes)[0][0]
+        said.append(compare_with_full(history, record.control.history, at, first))
     return said
 
 
-def compare_with_full(own: History, full: History, cycle: int) -> str:
-    """The sentence on the full run beside a run with jumps, at the last cycle that both have."""
+def compare_with_full(own: History, full: History, cycle: int, first: int = 0) -> str:
+    """The sentence on the full run beside a run with jumps, at the last cycle that both have; the
+    error is that of what is gained since cycle ``first``, before the first jump."""
     mine, truth = own.row(cycle), full.row(cycle)
     settled, of_full = float(own.settlement[mine]), float(full.settlement[truth])
-    error = 100 * (settled - of_full) / abs(of_full) if of_full else nan
+    error = 100 * full.gain_error(settled, first, cycle)
     said = f"The full run beside it settled {_format_millimetres(of_full)}"
     if cycle != own.cycle[-1]:
         said += f" in {cycle} cycles, this one {_format_millimetres(settled)}"
     if isfinite(error):
         off = f"{abs(error):.0f} % {'short' if error < 0 else 'over'}"
         said += f": the jumps are {off if abs(error) >= 0.5 else 'within 0.5 %'}"
+        said += f" of the gain since cycle {first}" if first else ""
     spent, of_full_s = float(own.cpu_s[mine]), float(full.cpu_s[truth])
     if min(spent, of_full_s) > 0:
         ratio = max(of_full_s / spent, spent / of_full_s)

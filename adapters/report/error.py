@@ -17,22 +17,20 @@ from adapters.bed import FloatArray
 from adapters.files import Outcome
 from adapters.laws import Law
 from adapters.laws.fit import compare_coordinates, compare_displacements
-from adapters.procedure import History
+from adapters.procedure import History, find_speed_up
 
 COORDINATION_BAR = 0.03
 """Greatest relative change of the coordination number, by a relaxation or against a control."""
 HEIGHT_BAR = 0.05
-"""Greatest change of the mean height by a relaxation over the jump's own settlement."""
+"""Greatest change of the mean height by a relaxation over the jump's own settlement..."""
+HEIGHT_LEAST = 0.01
+"""...or over this share of the gain since the first jump, where that is more [-]: a jump that
+settles nothing has no settlement to measure by."""
 
 
 def find_relative_error(value: float, reference: float) -> float:
     """(value - reference) / |reference|; nan when the reference is zero or unknown."""
     return (value - reference) / abs(reference) if reference else nan
-
-
-def find_speed_up(full_s: float, procedure_s: float) -> float:
-    """S = T_full / T_procedure."""
-    return full_s / procedure_s if procedure_s > 0 else nan
 
 
 @dataclass(frozen=True)
@@ -48,6 +46,7 @@ class Comparison:
     settlement: float
     """[m]"""
     settlement_error: float
+    """Over what the full run gained since the state before the first jump."""
     coordination_number: float = nan
     """Mean of the last `AVERAGED` cycles, as the elastic deflection."""
     coordination_number_error: float = nan
@@ -66,14 +65,15 @@ class Comparison:
 
 def compare_runs(
     name: str, own: History, own_cycle: int, full: History, full_cycle: int, preparation_s: float,
-    beds: tuple[FloatArray | None, FloatArray, FloatArray] | None = None,
+    beds: tuple[FloatArray | None, FloatArray, FloatArray] | None = None, before: int = 0,
 ) -> Comparison:  # fmt: skip
     """``own`` at its cycle ``own_cycle`` taken for the bed of ``full`` at ``full_cycle``.
 
     The two cycles differ for "jump and move nothing", which is the full run cut short.
     ``preparation_s``: CPU time of the preparation, the same for both [s].  E_r needs ``beds``,
     centres [m], (n, 3): before the first jump (the last state that both runs share; None without a
-    jump), of the full run at its cycle, and of what is compared with it.
+    jump), of the full run at its cycle, and of what is compared with it.  ``before``: the cycle of
+    the first of them.
     """
     mine, truth = own.row(own_cycle), full.row(full_cycle)
     coordination, deflection = (
@@ -92,7 +92,7 @@ def compare_runs(
         name=name,
         computed=own.count_computed(own_cycle),
         settlement=float(own.settlement[mine]),
-        settlement_error=find_relative_error(own.settlement[mine], full.settlement[truth]),
+        settlement_error=full.gain_error(float(own.settlement[mine]), before, full_cycle),
         coordination_number=coordination[0],
         coordination_number_error=find_relative_error(*coordination),
         elastic_deflection=deflection[0],
@@ -142,7 +142,7 @@ class JumpFigures:
     coordination_change: float
     """Relative change of the coordination number, walls counted, before the jump to relaxed."""
     height_change: float
-    """|relaxed - estimated mean height| over the jump's own settlement."""
+    """|relaxed - estimated mean height| over the jump's own settlement, `HEIGHT_LEAST` at least."""
 
 
 def measure_jump(stage: str, jump: Outcome, own: History, full: History | None) -> JumpFigures:
@@ -156,27 +156,19 @@ def measure_jump(stage: str, jump: Outcome, own: History, full: History | None) 
         coordination = find_relative_error(
             record["relaxed"]["coordination_number"], record["before"]["coordination_number"]
         )
-        height = abs(change) / abs(estimated) if estimated else nan
+        jumped = own.kind.index("jumped") if "jumped" in own.kind else 0
+        gained = own.gain(int(own.cycle[jumped - 1]) if jumped else 0, int(own.cycle[-1]))
+        scale = np.fmax(abs(estimated), HEIGHT_LEAST * abs(gained))
+        height = abs(change) / scale if scale else nan
     healed = jump.last_cycle
     for cycle, kind in zip(own.cycle, own.kind, strict=True):
         if kind == "healing" and cycle == healed + 1:
             healed = int(cycle)
-    truth = _measure_settlement(full, jump.first_cycle, jump.last_cycle)
-    healing = _measure_settlement(own, jump.last_cycle, healed) - _measure_settlement(
-        full, jump.last_cycle, healed
-    )
+    truth = healing = nan
+    if full is not None:
+        truth = full.gain(jump.first_cycle, jump.last_cycle)
+        healing = own.gain(jump.last_cycle, healed) - full.gain(jump.last_cycle, healed)
     return JumpFigures(
         stage, jump.first_cycle, jump.last_cycle, estimated, truth, estimated - truth, change,
         healing, coordination, height,
     )  # fmt: skip
-
-
-def _measure_settlement(history: History | None, first: int, last: int) -> float:
-    """Settlement between two cycles [m]; nan unless the table has both."""
-    if history is None or not {first, last} <= {0, *history.cycle.tolist()}:
-        return nan
-    start, end = (
-        0.0 if cycle == 0 else float(history.settlement[history.row(cycle)])
-        for cycle in (first, last)
-    )
-    return end - start

@@ -51,7 +51,8 @@ def describe_jumps(record: Record, numbers: Numbers) -> str:
             "much). The full run is no twin of this one after the first jump: where the beds have "
             "parted, its increment is another bed's. Bars: coordination number, walls counted, "
             f"within {100 * COORDINATION_BAR:.0f} % of the state before; mean height within "
-            f"{100 * HEIGHT_BAR:.0f} % of the jump's own settlement.",
+            f"{100 * HEIGHT_BAR:.0f} % of the jump's own settlement, "
+            "taken for a hundredth of the gain since the first jump at least.",
             HEADER,
             rows,
         ),

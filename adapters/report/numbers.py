@@ -25,7 +25,6 @@ from adapters.report.error import (
     JumpFigures,
     compare_runs,
     extrapolate_curve,
-    find_relative_error,
     measure_jump,
 )
 from adapters.report.verdict import FITTED, FULL, NOTHING, PROCEDURE, list_failures, split_cost
@@ -48,8 +47,8 @@ class Numbers:
     """At ``cycle`` [m]."""
     band: Band | None
     """Settlement of a run with a tolerance and how far it can be off."""
-    speed_up_of_cycles: float
-    """Cycles done over cycles computed: what the speed-up is without a control to measure it."""
+    speed_up_most: float
+    """Cycles done over cycles computed: a bound on the speed-up, which is one of CPU times."""
     compared_at: int
     """Cycle at which run and control are compared; 0 without a control."""
     error_rows: tuple[Comparison, ...]
@@ -112,7 +111,7 @@ def gather_numbers(record: Record) -> Numbers:
         cycles_computed=computed,
         settlement=float(history.settlement[-1]) if cycle else nan,
         band=estimate_band_of_run(run),
-        speed_up_of_cycles=cycle / computed if computed else nan,
+        speed_up_most=cycle / computed if computed else nan,
         compared_at=compared_at,
         error_rows=rows,
         jumps=jumps,
@@ -144,13 +143,14 @@ def tabulate_errors(record: Record, cycle: int) -> tuple[Comparison, ...]:
     spans = [span for span in list_jumped_spans(run.outcomes) if span[1] <= cycle]
     preparation_s = 0.0 if run.preparation is None else sum_cost(run.preparation.cost)
     truth = control.position(cycle)
-    before_jump = run.position(spans[0][0]) if spans else None
+    before = spans[0][0] if spans else cycle
+    before_jump = run.position(before) if spans else None
     beds = (before_jump, truth, run.position(cycle))
-    rows = [compare_runs(PROCEDURE, run.history, cycle, full, cycle, preparation_s, beds)]
+    rows = [compare_runs(PROCEDURE, run.history, cycle, full, cycle, preparation_s, beds, before)]
     if spans:
         early = run.history.count_computed(cycle)
         beds = (before_jump, truth, control.position(early))
-        still = compare_runs(NOTHING, full, early, full, cycle, preparation_s, beds)
+        still = compare_runs(NOTHING, full, early, full, cycle, preparation_s, beds, before)
         rows.append(still)
         settled = extrapolate_curve(full, get_law(procedure.law), procedure.k_i, early, cycle)
         if isfinite(settled):
@@ -159,14 +159,14 @@ def tabulate_errors(record: Record, cycle: int) -> tuple[Comparison, ...]:
                     FITTED,
                     early,
                     settled,
-                    find_relative_error(settled, full.settlement[full.row(cycle)]),
+                    full.gain_error(settled, before, cycle),
                     cpu_s=still.cpu_s,
                     speed_up=still.speed_up,
                     speed_up_with_preparation=still.speed_up_with_preparation,
                 )
             )
     beds = (before_jump, truth, truth)
-    rows.append(compare_runs(FULL, full, cycle, full, cycle, preparation_s, beds))
+    rows.append(compare_runs(FULL, full, cycle, full, cycle, preparation_s, beds, before))
     return tuple(rows)
 
 

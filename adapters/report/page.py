@@ -106,8 +106,8 @@ def _describe_claim(record: Record, numbers: Numbers) -> Iterator[str]:
             why = "the full run beside it is not past the first jump yet"
         claim = (
             f"{begun}, computing {numbers.cycles_computed} of them. The error is unknown: "
-            f"{why}. Counted in cycles, the speed-up is at most "
-            f"{format_number(numbers.speed_up_of_cycles, '.2f')}."
+            f"{why}. The speed-up is at most {format_number(numbers.speed_up_most, '.2f')}, cycles "
+            "done over cycles computed."
         )
     else:
         at = ""
@@ -115,8 +115,8 @@ def _describe_claim(record: Record, numbers: Numbers) -> Iterator[str]:
             at = f" At cycle {numbers.compared_at} it is {format_um(row.settlement)} µm."
         claim = (
             f"{begun}.{at} The full run, every cycle computed, gives "
-            f"{format_um(full.settlement)} µm, so the error is "
-            f"{format_share(row.settlement_error)}, at a speed-up of "
+            f"{format_um(full.settlement)} µm, so the error of what is gained since the first jump "
+            f"is {format_share(row.settlement_error)}, at a speed-up of "
             f"{format_number(row.speed_up, '.2f')} ({format_number(row.cpu_s, '.1f')} s of CPU "
             f"time instead of {format_number(full.cpu_s, '.1f')} s from the start of loading; "
             f"{format_number(row.speed_up_with_preparation, '.2f')} with preparation)."
@@ -174,7 +174,8 @@ def _describe_error(numbers: Numbers) -> str:
         "Error against speed-up",
         definition,
         make_table(
-            "Errors are signed and relative to the full run at the same cycle. Coordination number "
+            "Errors are signed and relative to the full run at the same cycle; of the settlement, "
+            "to its gain since the state before the first jump. Coordination number "
             f"(contacts with grains) and deflection are means over the last {AVERAGED} computed "
             f"cycles. “{NOTHING}” is the full run after as many cycles as this run "
             f"computed: the null hypothesis. “{FITTED}” extrapolates the full run's curve "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from math import isnan, log, nan
 from pathlib import Path
@@ -170,6 +171,33 @@ def test_comparison_in_closed_form() -> None:
     assert row_.speed_up == pytest.approx(400 / 323)
     assert row_.speed_up_with_preparation == pytest.approx(1400 / 1323)
     assert isnan(row_.jump_displacement_error)
+
+
+@pytest.mark.parametrize("zero", [0.0, 1.16e-3, -5.12e-4, -settled(100)])
+def test_errors_know_no_zero(zero: float) -> None:
+    """Wherever the piston came to rest: 2 % too much of what is gained since cycle 50 is 2 %."""
+    own, full = (
+        replace(one, settlement=one.settlement + zero)
+        for one in (make_history(PROCEDURE), full_run())
+    )
+    own.settlement[-1] += 0.02 * (settled(100) - settled(50))
+    row_ = compare_runs("x", own, 100, full, 100, 0.0, before=50)
+    assert row_.settlement_error == pytest.approx(0.02)
+    assert isnan(compare_runs("x", own, 100, full, 100, 0.0, before=100).settlement_error)
+    said = compare_with_full(own, full, 100, 50)
+    assert "2 % over of the gain since cycle 50" in said
+
+
+def test_a_jump_that_settles_nothing_divides_by_no_zero() -> None:
+    """A relaxation by 1 um in a jump that settles 1e-17 m: over a hundredth of the run's gain."""
+    outcome = jump(50, 70, 1.0)
+    record = outcome.notes["relaxation"]
+    height = record["before"]["mean_height"]
+    record["estimated"]["mean_height"] = height - 1e-17
+    record["relaxed"]["mean_height"] = height - 1e-6
+    own = make_history(PROCEDURE)
+    figures = measure_jump("x", outcome, own, None)
+    assert figures.height_change == pytest.approx(1e-6 / (0.01 * own.gain(50, 100)))
 
 
 def test_averages_leave_jumped_rows_out() -> None:
