@@ -113,11 +113,10 @@ class Table:
             if not is_number(cell) or not isfinite(float(cell))
         )
         raise UsageError(
-            f"'{columns[place][row].strip()}' is not {kind}",
-            where=self.where(row, names[place]),
+            f"'{columns[place][row].strip()}' is not {kind}", where=self.where(row, names[place]),
             remedy="below the header a row is a reading: leave out what is none"
             + (", and write no marks for thousands" if "," in columns[place][row] else ""),
-        )
+        )  # fmt: skip
 
     def _unify_signs(self, columns: list[list[str]], names: Sequence[str]) -> list[list[str]]:
         """The cells with decimal points and without marks for thousands."""

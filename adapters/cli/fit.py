@@ -75,10 +75,9 @@ def run_fit(arguments: argparse.Namespace) -> int:
         value = getattr(arguments, flag)
         if value is not None and not 0 <= value <= FARTHEST:
             raise UsageError(
-                f"{value:g} is no number of load cycles",
-                where=f"--{flag.replace('_', '-')}",
+                f"{value:g} is no number of load cycles", where=f"--{flag.replace('_', '-')}",
                 remedy=f"give one from 0 to {FARTHEST:g}, which no track lives to see",
-            )
+            )  # fmt: skip
     auto = arguments.law == "auto"
     law = get_law("log" if auto else arguments.law)
     series = read_series(

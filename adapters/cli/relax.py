@@ -14,7 +14,7 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
     parser.add_argument("state", metavar="STATE", type=Path, help="a .npz of trackbed or a dump")
     parser.add_argument(
         "--out", metavar="STATE", type=Path, required=True,
-        help=".npz, or any other name for a dump",
+        help=".npz; or .dump, .lammpstrj, .liggghts for a dump, also with .gz, .bz2, .xz behind",
     )  # fmt: skip
     parser.add_argument(
         "--scene", type=Path, help="for walls and stiffness; default: that of the run STATE is in"
@@ -49,12 +49,15 @@ def run_relax(arguments: argparse.Namespace) -> int:
     import numpy as np
 
     from adapters.bed import make_no_contacts
-    from adapters.files import read_state_file, write_state_file
+    from adapters.files import check_state_name, read_state_file, write_state_file
     from adapters.relaxation import relax, relax_bare
     from adapters.scene import flatten_keys, load_scene
 
     if not arguments.out.parent.is_dir():
-        raise UsageError("the folder of --out does not exist", where=str(arguments.out))
+        raise UsageError(
+            "the folder of --out does not exist", where=str(arguments.out), remedy="make it first"
+        )
+    check_state_name(arguments.out)
     given = arguments.scene
     scene = load_scene(given) if given else load_scene(*find_scene_of_state(arguments.state))
     density = scene.material.grain.density
@@ -66,7 +69,10 @@ def run_relax(arguments: argparse.Namespace) -> int:
     else:
         before = read_state_file(arguments.before, density)
         if not np.array_equal(before.identifier, state.identifier):
-            raise UsageError("the grains are not those of STATE", where=str(arguments.before))
+            raise UsageError(
+                "the grains are not those of STATE", where=str(arguments.before),
+                remedy="give the state of the same bed before the jump",
+            )  # fmt: skip
         relaxation = relax(
             state.position,
             before,

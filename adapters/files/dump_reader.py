@@ -41,6 +41,11 @@ def read_frames(path: str | Path, whole: bool = True) -> Iterator[Frame]:
     Not for ``.bin``, VTK or image dumps, nor for text columns such as ``element``.
     """
     path = Path(path)
+    if path.suffix == ".toml":
+        raise UsageError(
+            "this is a scene, no series and no state", where=str(path),
+            remedy=f"run it, then give what came out: trackbed run {path}",
+        )  # fmt: skip
     try:
         packed = PACKED.get(path.suffix)
         stream = packed(path) if packed else path.open("rb", buffering=0)
@@ -48,7 +53,9 @@ def read_frames(path: str | Path, whole: bool = True) -> Iterator[Frame]:
         raise UsageError(
             f"the dump cannot be opened ({error.strerror})",
             where=str(path),
-            remedy="check the name, and that the engine's dump command came to its first step",
+            remedy="give a file in it"
+            if path.is_dir()
+            else "check the name, and that the engine's dump command came to its first step",
         ) from error
     with stream:
         reader = Reader(path, stream)

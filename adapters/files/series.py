@@ -53,11 +53,6 @@ def read_series(
     """
     if not paths:
         raise UsageError("no series was named", remedy="give a CSV file, a run folder or dumps")
-    if scenes := [path for path in paths if path.suffix == ".toml"]:
-        raise UsageError(
-            "this is a scene, not a series", where=str(scenes[0]),
-            remedy=f"run it, then fit its run folder: trackbed run {scenes[0]}",
-        )  # fmt: skip
     tables = [path for path in paths if path.is_dir() or _is_table(path)]
     if tables and len(paths) > 1:
         raise UsageError(
@@ -69,10 +64,9 @@ def read_series(
         path = tables[0]
         if path.is_dir() and unit not in (None, "m"):
             raise UsageError(
-                f"a run's settlement is in m, not in {unit}",
-                where=str(path),
+                f"a run's settlement is in m, not in {unit}", where=str(path),
                 remedy="leave --unit out",
-            )
+            )  # fmt: skip
         table = path / "settlement.csv" if path.is_dir() else path
         if path.is_dir() and (kind := find_kind(path)) and kind.states:
             raise UsageError(
@@ -81,11 +75,10 @@ def read_series(
             )  # fmt: skip
         if path.is_dir() and not table.exists():
             raise UsageError(
-                "can not read the series (No such file or directory)",
-                where=str(table),
+                "can not read the series (No such file or directory)", where=str(table),
                 remedy="this folder is no run, or no cycle of it is computed; of other folders "
                 "give the files: a table, or dumps",
-            )
+            )  # fmt: skip
         return replace(read_table_series(table, columns, unit), where=str(table))
     if columns:
         raise UsageError(

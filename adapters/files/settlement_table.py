@@ -126,19 +126,17 @@ def read_table_series(path: Path, names: Sequence[str] = (), unit: str | None = 
         unit = _find_unit(table, places[1], unit)
     if not table.rows:
         raise UsageError(
-            "there is no computed cycle in the table",
-            where=str(path),
+            "there is no computed cycle in the table", where=str(path),
             remedy="a reading is a row of cycle and settlement below the header; of a run's table "
             "only rows of the kind computed are",
-        )
+        )  # fmt: skip
     cycle, settlement = table.read_numbers(places, ("cycle", title))
     if cycle.min() < 0:
         row = int(np.argmax(cycle < 0))
         raise UsageError(
-            f"cycle {cycle[row]:g} is negative",
-            where=table.where(row, "cycle"),
+            f"cycle {cycle[row]:g} is negative", where=table.where(row, "cycle"),
             remedy="count cycles from the start of the loading, which is cycle 0",
-        )
+        )  # fmt: skip
     order = np.argsort(cycle, kind="stable")
     cycle, settlement = cycle[order], settlement[order]
     again = np.flatnonzero(np.diff(cycle) == 0)
@@ -183,17 +181,15 @@ def _find_unit(table: Table, place: int, given: str | None) -> str:
     if not unit and (other := table.find_unit(place)):
         raise UsageError(
             f"the column {title} is in {other}, which is not known"
-            + (f", and not in {given}" if given else ""),
-            where=where,
+            + (f", and not in {given}" if given else ""), where=where,
             remedy=f"convert it to {', '.join(dict.fromkeys(UNITS.values()))}, or name the column "
             "without what is no unit",
-        )
+        )  # fmt: skip
     if HEIGHT.search(name):
         raise UsageError(
-            f"the column {title} is a height, which falls as the bed settles",
-            where=where,
+            f"the column {title} is a height, which falls as the bed settles", where=where,
             remedy="give the first height less each: settlement grows; or the run folder",
-        )
+        )  # fmt: skip
     return unit or given or SETTLEMENT_NAMES.get(name, UNKNOWN)
 
 

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from adapters.bed import FloatArray, State, load_state, save_state
-from adapters.files.dump import Frame, write_dump
+from adapters.errors import DumpError, UsageError
+from adapters.files.dump import EXTENSIONS, PACKED, Frame, write_dump
 from adapters.files.dump_reader import read_last_frame
 
 
@@ -18,10 +19,13 @@ def read_state_file(path: Path, density: float) -> State:
     sphere of ``density`` [kg/m^3] and a velocity is zero; contacts and piston it has none.
     Raises `UsageError` and `DumpError`.
     """
-    if path.suffix == ".npz":
+    if path.suffix == ".npz" and path.is_file():
         return load_state(path)
     frame = read_last_frame(path)
-    radius = frame.column("radius")
+    try:
+        radius, place = frame.column("radius"), frame.find_centres()
+    except DumpError as error:
+        raise error.relocate(f"{path}, {error.where}") from None
 
     def read_vectors(*columns: str) -> FloatArray:
         there = set(columns) <= set(frame.columns)
@@ -29,7 +33,7 @@ def read_state_file(path: Path, density: float) -> State:
 
     return State(
         frame.column("id").astype(np.int64),
-        frame.find_centres(),
+        place,
         radius,
         frame.column("mass") if "mass" in frame.columns else density * 4 / 3 * np.pi * radius**3,
         read_vectors("vx", "vy", "vz"),
@@ -38,8 +42,22 @@ def read_state_file(path: Path, density: float) -> State:
     )
 
 
+def check_state_name(path: Path) -> None:
+    """Raise `UsageError` for the name of another kind of file."""
+    kept = path.with_suffix("") if path.suffix in PACKED else path
+    if not (kept.suffix in (*EXTENSIONS, ".npz", "") or kept.suffix[1:].isdecimal()):
+        raise UsageError(
+            f"a state is no {path.suffix} file", where=str(path),
+            remedy=f"name it .npz, or {', '.join(EXTENSIONS)} for a dump",
+        )  # fmt: skip
+
+
 def write_state_file(state: State, path: Path) -> None:
-    """Write a state to ``path``: ``.npz`` whole and without loss, else its grains as a dump."""
+    """Write a state to ``path``: ``.npz`` whole and without loss, else its grains as a dump.
+
+    Raises `UsageError` as `check_state_name`.
+    """
+    check_state_name(path)
     if path.suffix == ".npz":
         save_state(state, path)
         return

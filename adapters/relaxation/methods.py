@@ -102,7 +102,9 @@ def relax(
         error = RelaxationNotConverged(
             f"relaxation '{method}' stopped after {evaluations} evaluations with overlaps up to "
             f"{result.relaxed.max_penetration:.2g} m",
-            remedy="extrapolate over fewer cycles, or smooth and clip the displacements",
+            remedy="extrapolate over fewer cycles, or smooth and clip the displacements"
+            if np.isinf(overlap_cap)
+            else "look whether the scene is that of this bed: its walls, and grains of its size",
         )
         error.best = result
         raise error

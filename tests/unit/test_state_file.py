@@ -102,3 +102,48 @@ def test_relax_writes_a_state(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     (frame,) = read_frames(there)
     apart = np.linalg.norm(np.diff(frame.block("x", "y", "z"), axis=0))
     assert apart == pytest.approx(2 * radius, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (["here.dump", "--out", "a.vtu"], 2, "no .vtu file\n  -> name it .npz, or .dump"),
+        (["here.dump", "--out", "a.csv"], 2, "no .csv file"),
+        (["here.dump", "--out", "none/a.dump"], 2, "does not exist\n  -> make it"),
+        (["none.npz", "--out", "a.npz"], 2, "none.npz: the dump cannot be opened (No such file"),
+        ([".", "--out", "a.dump"], 2, "(Is a directory)\n  -> give a file in it"),
+        (["scene.toml", "--out", "a.dump"], 2, "this is a scene, no series and no state"),
+        (["points.dump", "--out", "a.dump"], 6, "points.dump, time step 0: there is no column rad"),
+        (["deep.dump", "--out", "a.dump"], 7, "look whether the scene is that of this bed"),
+    ],
+)
+def test_relax_has_remedies(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+    words: list[str], code: int, said: str,
+) -> None:  # fmt: skip
+    """By cause: other files, folders, scenes, columns that lack, a bed of another scene."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "karrech-coarse", "."]) == 0
+    grains = np.array([[1, 0.01, 0.01, 0.01, 3e-3], [2, 0.02, 0.01, 0.01, 3e-3]])
+    columns = ("id", "x", "y", "z", "radius")
+    write_dump("here.dump", [Frame(0, columns, grains)])
+    write_dump("points.dump", [Frame(0, columns[:4], grains[:, :4])])
+    grains[:, 4] = 0.05  # wider than the container
+    write_dump("deep.dump", [Frame(0, columns, grains)])
+    assert main(["relax", *words, "--scene", "scene.toml"]) == code
+    assert said in capsys.readouterr().err
+
+
+def test_export_has_remedies(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A folder that is not there, a file, the folder around the run: what to give instead."""
+    (tmp_path / "bed" / "run").mkdir(parents=True)
+    (tmp_path / "bed" / "run" / "manifest.json").write_text("{}")
+    (tmp_path / "scene.toml").write_text("")
+    for name, said in (
+        ("none", "which is not there"),
+        ("scene.toml", "not a file"),
+        ("bed", f"the run is in it: give {tmp_path / 'bed' / 'run'}"),
+        ("bed/run", "start it again"),
+    ):
+        assert main(["export", str(tmp_path / name), "--to", "csv"]) == 2
+        assert said in capsys.readouterr().err

@@ -20,6 +20,7 @@ class GrowthNumbers:
     held_out: float = 0.5  # decades at the end that slow laws fitted before it fall short of [-]
     deviations: float = 3.0  # of a reading by which they do, for certain [-]
     share: float = 0.06  # of the range by which they do at least: so far computed beds wander [-]
+    most: float = 1e3  # growth that is said at most, as after a standstill [-]
     rows: int = 3  # readings whose median is a level: one outlier moves none [-]
     fall: float = 0.1  # of the range that a level falls by: five deviations of readings of 2 % [-]
 
@@ -44,7 +45,7 @@ def measure_growth(cycle: FloatArray, displacement: FloatArray) -> FloatArray:
         return np.ones_like(moved)
     rows = edges[::-1]
     rate = moved * np.diff(displacement[rows], axis=0) / np.diff(cycle[rows])[:, None]
-    least = np.maximum(rate[:-1].min(axis=0), np.finfo(float).tiny)
+    least = np.maximum(rate[:-1].min(axis=0), np.abs(rate[-1]) / GROWTH.most)
     certain = moved != 0
     for law in map(get_law, ("log", "power")):
         if before > law.minimum_cycles:
@@ -55,8 +56,8 @@ def measure_growth(cycle: FloatArray, displacement: FloatArray) -> FloatArray:
             short = moved * (displacement[-1] - law.value(parameters, float(cycle[-1])))
             least_short = GROWTH.share * np.ptp(displacement, axis=0)
             certain &= short > np.fmax(GROWTH.deviations * noise, least_short)
-    with np.errstate(over="ignore"):  # after a standstill
-        return np.where(certain, np.maximum(rate[-1] / least, 1.0), 1.0)
+    growth = np.divide(rate[-1], least, np.ones_like(least), where=certain & (least > 0))
+    return np.maximum(growth, 1.0)
 
 
 def find_fall(settlement: FloatArray) -> tuple[int, float] | None:

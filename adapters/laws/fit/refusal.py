@@ -17,8 +17,6 @@ UNCERTAIN = "uncertain"
 WIDEST = 1.0
 """Half-width of a band over all that settled so far, above which it is no prediction: what is not
 known of the future is then more than what is known of the past."""
-MOST = 1e3
-"""Growth of a rate that is not given as a number: it had all but vanished before."""
 
 
 @dataclass(frozen=True)
@@ -57,9 +55,7 @@ def _find_refusal(outlook: Outlook, series: int) -> Refusal | None:
     if not regime.jump_allowed:
         how = f"it goes as N^(beta - 1) with beta = {regime.exponent:.2f} ± {regime.deviation:.2f}"
         if regime.growth > 1:
-            how = "it is greater than it once was" + (
-                f", {regime.growth:.2g} times its least" if regime.growth < MOST else ""
-            )
+            how = f"it is {regime.growth:.2g} times its least before"
         return Refusal(
             regime.name,
             f"up to cycle {last:.10g} {WHY_NOT[regime.name]}: {how}"
