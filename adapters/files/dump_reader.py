@@ -42,10 +42,8 @@ def read_frames(path: str | Path, whole: bool = True) -> Iterator[Frame]:
     """
     path = Path(path)
     if path.suffix == ".toml":
-        raise UsageError(
-            "this is a scene, no series and no state", where=str(path),
-            remedy=f"run it, then give what came out: trackbed run {path}",
-        )  # fmt: skip
+        do = f"run it, then give what came out: trackbed run {path}"
+        raise UsageError("this is a scene, no series and no state", where=str(path), remedy=do)
     try:
         packed = PACKED.get(path.suffix)
         stream = packed(path) if packed else path.open("rb", buffering=0)
@@ -53,9 +51,7 @@ def read_frames(path: str | Path, whole: bool = True) -> Iterator[Frame]:
         raise UsageError(
             f"the dump cannot be opened ({error.strerror})",
             where=str(path),
-            remedy="give a file in it"
-            if path.is_dir()
-            else "check the name, and that the engine's dump command came to its first step",
+            remedy="give a file: check its name, and that the engine's dump came to its first step",
         ) from error
     with stream:
         reader = Reader(path, stream)

@@ -70,7 +70,7 @@ def write_dump_mesh(path: str | PathLike[str], mesh: meshio.Mesh) -> None:
         columns |= _split_columns("_".join(name.split()), np.asarray(values))
     step = int(np.ravel(mesh.field_data.get(STEP, 0))[0])
     bounds = np.asarray(mesh.field_data.get(BOX, np.empty((0, 2))), float)
-    values, tilt = np.column_stack([*columns.values()]), TILTS[bounds.shape[1]]
+    values, tilt = np.column_stack([*columns.values()]), TILTS.get(bounds.shape[-1], "")
     frame = Frame(step, tuple(columns), values, bounds, boundary=tilt)
     write_dump(str(path), [frame])
 

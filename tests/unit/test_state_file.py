@@ -111,7 +111,7 @@ def test_relax_writes_a_state(tmp_path: Path, capsys: pytest.CaptureFixture[str]
         (["here.dump", "--out", "a.csv"], 2, "no .csv file"),
         (["here.dump", "--out", "none/a.dump"], 2, "does not exist\n  -> make it"),
         (["none.npz", "--out", "a.npz"], 2, "none.npz: the dump cannot be opened (No such file"),
-        ([".", "--out", "a.dump"], 2, "(Is a directory)\n  -> give a file in it"),
+        ([".", "--out", "a.dump"], 2, "(Is a directory)\n  -> give a file: "),
         (["scene.toml", "--out", "a.dump"], 2, "this is a scene, no series and no state"),
         (["points.dump", "--out", "a.dump"], 6, "points.dump, time step 0: there is no column rad"),
         (["deep.dump", "--out", "a.dump"], 7, "look whether the scene is that of this bed"),
