@@ -1,0 +1,66 @@
+"""Values that no ballast, track or body has: mostly numbers in another unit than SI."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import radians, tan
+from typing import Literal
+
+Quantity = Literal["friction", "density", "young", "grain", "body"]
+DEGREES = "an angle in degrees"
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Least and greatest value that passes without a word, and what another unit would make."""
+
+    what: str
+    unit: str
+    least: float
+    most: float
+    usual: tuple[float, float]
+    """Where a value lies once it is read in the unit that was meant."""
+    units: tuple[tuple[str, float], ...] = ()
+    """Units that are mistaken for it, each with its factor to SI, the likeliest first."""
+
+
+@dataclass(frozen=True)
+class PlausibleBounds:
+    """Between soft rubber and diamond, cork and gold, a grain of sand and a long bridge span."""
+
+    friction: Bounds = Bounds(
+        "friction", "", 0.0, 2.0, (0.05, 2.0), ((DEGREES, radians(1)), ("%", 0.01))
+    )
+    density: Bounds = Bounds(
+        "density", "kg/m^3", 500.0, 20_000.0, (1000.0, 9000.0),
+        (("g/cm^3", 1e3), ("kN/m^3", 1e3 / 9.81), ("t/mm^3", 1e12), ("g/m^3", 1e-3)),
+    )  # fmt: skip
+    young: Bounds = Bounds(
+        "Young's modulus", "Pa", 1e5, 2e12, (1e6, 1e12), (("GPa", 1e9), ("MPa", 1e6), ("kPa", 1e3))
+    )
+    grain: Bounds = Bounds("grain", "m", 0.0, 1.0, (1e-4, 1.0), (("mm", 1e-3), ("um", 1e-6)))
+    body: Bounds = Bounds("body", "m", 0.0, 100.0, (1e-3, 100.0), (("mm", 1e-3), ("um", 1e-6)))
+
+
+PLAUSIBLE = PlausibleBounds()
+
+
+def describe_implausible(quantity: Quantity, value: float, where: str) -> str | None:
+    """A sentence on a ``value`` [SI] that is hardly meant, or None where nothing is to be said.
+
+    It names the place ``where`` it stands (a key, a file, a body), the number, and the unit in
+    which the number would be a usual one.  Not a reason to refuse: zero is for the caller to judge.
+    """
+    bounds: Bounds = getattr(PLAUSIBLE, quantity)
+    if bounds.least <= value <= bounds.most:
+        return None
+    low, high = bounds.usual
+    meant = ""
+    for unit, factor in bounds.units:
+        read = tan(value * factor) if unit == DEGREES else value * factor
+        if low <= read <= high and (unit != DEGREES or value < 90):
+            meant = f"; as {unit} it would be {read:.4g} {bounds.unit}".rstrip()
+            break
+    side, bound = ("below", bounds.least) if value < bounds.least else ("above", bounds.most)
+    shown = f"{value:.6g} {bounds.unit}".rstrip()
+    return f"{where}: a {bounds.what} of {shown} is {side} {bound:g}{meant}; give SI units"
