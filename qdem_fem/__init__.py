@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from qdem_fem.contact.spheres import ContactPlane, SphereContact
     from qdem_fem.contact.surface import SurfaceContact
     from qdem_fem.element import Material
-    from qdem_fem.files import QdemError, Series, StepWarning, make_ramp
+    from qdem_fem.files import QdemError, SceneWarning, Series, StepWarning, make_ramp
     from qdem_fem.march import Energy, History, Simulation, StaticAnswer
 
 provide_cache_folders(__path__[0])
@@ -31,6 +31,7 @@ _HOMES = {
     "Material": "element",
     "PeriodicWidth": "contact.search",
     "QdemError": "files",
+    "SceneWarning": "files",
     "Series": "files",
     "Simulation": "march",
     "SphereContact": "contact.spheres",
@@ -41,8 +42,8 @@ _HOMES = {
 }
 __all__ = [
     "Body", "ContactPlane", "CriticalStep", "Energy", "History", "Material", "PeriodicWidth",
-    "QdemError", "Series", "Simulation", "SphereContact", "StaticAnswer", "StepWarning",
-    "SurfaceContact", "make_ramp",
+    "QdemError", "SceneWarning", "Series", "Simulation", "SphereContact", "StaticAnswer",
+    "StepWarning", "SurfaceContact", "make_ramp",
 ]  # fmt: skip
 
 

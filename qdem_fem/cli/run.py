@@ -8,6 +8,7 @@ import sys
 import time
 import warnings
 from collections.abc import Iterable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,23 +33,27 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
 
 def run_qdem(arguments: argparse.Namespace) -> int:
     """Run a scene, or tell what would run."""
+    from qdem_fem.files import SceneWarning
     from qdem_fem.scene import load_scene
 
     refuse_both(arguments)
-    prepared = load_scene(arguments.scene, arguments.overrides)
-    if arguments.dry_run:
-        _print(_preview_run(prepared), arguments.json)
-        return 0
-    path = place_run(arguments)
+    said: list[str] = []
     with warnings.catch_warnings():
-        warnings.showwarning = _show_warning
-        summary = _run(prepared, path, arguments)
+        warnings.filterwarnings("always", category=SceneWarning)
+        warnings.showwarning = partial(_show_warning, said)
+        prepared = load_scene(arguments.scene, arguments.overrides)
+        if arguments.dry_run:
+            summary = _preview_run(prepared) | {"warnings": said}
+        else:
+            summary = _run(prepared, place_run(arguments), arguments, said)
     _print(summary, arguments.json)
     return 0
 
 
-def _run(prepared: Prepared, path: Path, arguments: argparse.Namespace) -> dict[str, Any]:
-    """The whole run with its report; its summary."""
+def _run(
+    prepared: Prepared, path: Path, arguments: argparse.Namespace, said: list[str]
+) -> dict[str, Any]:
+    """The whole run with its report; its summary.  ``said``: warnings so far."""
     from qdem_fem.scene import (
         RunFolder,
         make_simulation,
@@ -77,7 +82,7 @@ def _run(prepared: Prepared, path: Path, arguments: argparse.Namespace) -> dict[
             done = run_static(prepared, run, bodies, folder)
         else:
             done = run_dynamic(prepared, run, bodies, folder, resume=goes_on, progress=Progress())
-        summary = summarise_run(prepared, done, folder)
+        summary = summarise_run(prepared, done, folder) | {"warnings": said}
         more: Iterable[tuple[Path, str]] = ()
         if "track" in prepared.text.data:  # other scenes do not pay for its import
             from qdem_fem.report import draw_track_pictures, list_track_facts
@@ -92,8 +97,9 @@ def _run(prepared: Prepared, path: Path, arguments: argparse.Namespace) -> dict[
     return summary | {"folder": str(path)}
 
 
-def _show_warning(message: Warning | str, *_args: Any, **_options: Any) -> None:
-    """A warning as a sentence, without the line of code it comes from."""
+def _show_warning(said: list[str], message: Warning | str, *_args: Any, **_options: Any) -> None:
+    """A warning as a sentence, without the line of code it comes from; kept in ``said``."""
+    said.append(str(message))
     print(f"warning: {message}", file=sys.stderr, flush=True)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from typing import Any
 
@@ -12,18 +13,20 @@ from qdem_fem.contact.spheres import find_pair_stiffness, find_tangential_stiffn
 from qdem_fem.contact.state import Contacts
 from qdem_fem.contact.surface import (
     DEPTH,
+    OVERLAP,
     Near,
     Surface,
     SurfaceContact,
     SurfaceTouch,
     Walls,
+    find_overlap,
     find_sharp_edges,
     make_near,
     place_points,
     renew_near,
 )
 from qdem_fem.contact.system import System
-from qdem_fem.files import Floats, Integers
+from qdem_fem.files import Floats, Integers, SceneWarning
 from qdem_fem.mesh import find_area_vectors
 
 TOUCH_ARRAYS = ("start", "position", "force", "account")
@@ -114,6 +117,26 @@ class SurfaceContacts(Contacts):
             weight[:] = -1.0
         for spring in (self.near.spring, self.near.edge_spring, walls.spring):
             spring[:] = 0.0
+
+    def refresh(self) -> None:
+        begins = self.stale and not self.run.steps_done
+        super().refresh()
+        if begins:
+            self.name_overlap()
+
+    def name_overlap(self) -> None:
+        """Warn of bodies that begin in each other, which what throws them apart does not say."""
+        surface, near, x = self.kernel.surface, self.near, self.kernel.position
+        depth, point, other = find_overlap(surface, near, x)
+        if depth > OVERLAP * self.depth:
+            names = self.run.bodies[surface.point_body[point]].name, self.run.bodies[other].name
+            warnings.warn(
+                f"{names[0]} begins {depth:.3g} m inside {names[1]}, and the contacts at the start "
+                f"hold {self.kernel.account[0]:.3g} J, which throw bodies apart; begin with bodies "
+                "that do not overlap",
+                SceneWarning,
+                stacklevel=2,
+            )
 
     def renew_lists(self, position: Floats) -> None:
         reach = self.depth + self.skin

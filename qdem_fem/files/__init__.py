@@ -13,6 +13,7 @@ from qdem_fem.files.errors import (
     MeshError,
     NotConverged,
     QdemError,
+    SceneWarning,
     StepWarning,
     Unstable,
     UsageError,
@@ -23,6 +24,6 @@ from qdem_fem.files.series import Driver, Series, Value, is_real, make_ramp
 __all__ = [
     "CheckpointError", "ConditionError", "ContactTooDeep", "Driver", "ElementInverted",
     "EnergyLost", "Floats", "Integers", "Interrupted", "LibraryMissing", "MaterialError",
-    "MeshError", "NotConverged", "QdemError", "Series", "StepWarning", "Table", "Unstable",
-    "UsageError", "Value", "is_real", "make_ramp", "read_table", "write_bodies_vtu",
+    "MeshError", "NotConverged", "QdemError", "SceneWarning", "Series", "StepWarning", "Table",
+    "Unstable", "UsageError", "Value", "is_real", "make_ramp", "read_table", "write_bodies_vtu",
 ]  # fmt: skip

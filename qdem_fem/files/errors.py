@@ -17,7 +17,7 @@ from trackbed.errors import (
 __all__ = [
     "CheckpointError", "ConditionError", "ContactTooDeep", "DiskFull", "ElementInverted",
     "EnergyLost", "Interrupted", "LibraryMissing", "MaterialError", "MeshError", "NotConverged",
-    "QdemError", "SceneError", "StepWarning", "Unstable", "UsageError",
+    "QdemError", "SceneError", "SceneWarning", "StepWarning", "Unstable", "UsageError",
 ]  # fmt: skip
 
 QdemError = TrackbedError
@@ -58,6 +58,10 @@ class EnergyLost(NotCredible):
 
 class CheckpointError(NotCredible):
     """A saved state is damaged or belongs to another simulation."""
+
+
+class SceneWarning(UserWarning):
+    """What was given can be computed, but is hardly meant, or its answer is hardly right."""
 
 
 class StepWarning(UserWarning):

@@ -39,6 +39,7 @@ def write_report(
     body = [
         f"<h1>{escape(title)}</h1>",
         _format_claim(summary),
+        *_format_warnings(summary),
         *(make_picture(path, caption, escape(caption)) for path, caption in pictures),
         *_format_bed(summary),
         *_format_probes(summary),
@@ -107,6 +108,11 @@ def _format_claim(summary: dict[str, Any]) -> str:
             f"{summary['step']:.4g} s, {mesh}."
         )
     return make_paragraph(escape(text), "claim")
+
+
+def _format_warnings(summary: dict[str, Any]) -> Iterator[str]:
+    if summary["warnings"]:
+        yield make_section("Warnings", make_list(map(escape, summary["warnings"])))
 
 
 def _format_probes(summary: dict[str, Any]) -> Iterator[str]:

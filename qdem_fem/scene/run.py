@@ -241,12 +241,18 @@ class _Record:
         """Raise `EnergyLost` where the account of energies so far does not close."""
         missing = self.account.relative
         if self.audit is not None and missing > self.audit:
+            overlap = self.account.first.get("contact", 0.0)
+            cause = "take a shorter step (simulation.safety), look in energy.csv what grows, "
+            if overlap > self.account.missing:
+                cause = (
+                    f"bodies begin in each other, with {overlap:.3g} J in the contacts: begin with "
+                    "bodies that do not overlap, "
+                )
             raise EnergyLost(
                 f"{missing:.2e} of the greatest energy is missing in the account; "
                 f"{self.audit:.2g} is allowed",
                 where=f"t = {self.run.time:.6g} s, step {self.run.steps_done}",
-                remedy="take a shorter step (simulation.safety), look in energy.csv what grows, or "
-                "allow more (output.audit)",
+                remedy=f"{cause}or allow more (output.audit)",
             )
 
     def write_fields(self) -> None:

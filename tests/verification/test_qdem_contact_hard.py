@@ -30,6 +30,7 @@ SHORT = [words for words in CASES if words != "spinning grain"]
 @BY_MODEL
 @pytest.mark.parametrize("words", SHORT)
 @pytest.mark.long
+@pytest.mark.filterwarnings("ignore::qdem_fem.files.SceneWarning")  # an overlap is meant
 def test_energies_close(words: str, model: str) -> None:
     """Within a thousandth of the greatest there was; and the bodies did touch."""
     lacks, stored, _ = audit_energy(*CASES[words](model))

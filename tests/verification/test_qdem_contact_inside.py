@@ -77,6 +77,7 @@ def test_images_across_a_width_are_looked_at(y: float, said: str | None) -> None
 
 
 @BY_MODEL
+@pytest.mark.filterwarnings("ignore::qdem_fem.files.SceneWarning")  # an overlap is meant
 def test_bodies_that_contact_parts_are_not(model: str) -> None:
     """1 mm deep, within a sphere's radius and the greatest depth; and apart."""
     for corner in ((0.002, 0.002, SIDE - 1e-3), (0.002, 0.002, SIDE + 0.01)):

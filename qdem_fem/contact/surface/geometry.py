@@ -84,6 +84,36 @@ def subtract(a: Any, b: Any) -> Any:  # pragma: no cover
 
 
 @exact
+def find_arms(x: Any, ring: Any) -> Any:  # pragma: no cover
+    """Way [m] from the middle of three nodes to each."""
+    third = 1.0 / 3.0
+    middle = blend(x, ring, (third, third, third))
+    return (
+        subtract(read_row(x, ring[0]), middle),
+        subtract(read_row(x, ring[1]), middle),
+        subtract(read_row(x, ring[2]), middle),
+    )
+
+
+@exact
+def divide_by_inertia(arms: Any, m: Any) -> Any:  # pragma: no cover
+    """``J^-1 m``, ``J = sum of r^2 1 - r r^T`` over three ``arms`` r: a spin of what turns as one.
+
+    With ``m`` the sum of ``r x v`` it is the spin of three nodes; and forces ``(J^-1 m) x r`` on
+    them have no sum and the moment ``m``.
+    """
+    a, b, c = arms
+    xx, yy, zz = (a[0] ** 2 + b[0] ** 2 + c[0] ** 2, a[1] ** 2 + b[1] ** 2 + c[1] ** 2,
+                  a[2] ** 2 + b[2] ** 2 + c[2] ** 2)  # fmt: skip
+    r = -(a[1] * a[2] + b[1] * b[2] + c[1] * c[2])
+    s = -(a[0] * a[2] + b[0] * b[2] + c[0] * c[2])
+    t = -(a[0] * a[1] + b[0] * b[1] + c[0] * c[1])
+    one, two, three = (yy + zz, t, s), (t, xx + zz, r), (s, r, xx + yy)
+    p, q, w = cross(two, three), cross(three, one), cross(one, two)
+    return scale(1.0 / dot(one, p), (dot(p, m), dot(q, m), dot(w, m)))
+
+
+@exact
 def compute_segments_apart(w: Any, u: Any, v: Any) -> float:  # pragma: no cover
     """Distance [m] of the segments ``w + s u`` and ``t v``, s and t from 0 to 1 (Ericson 2005)."""
     uu, uv, vv, uw, vw = dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w)

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numba import njit
 
-from qdem_fem.contact.surface.geometry import find_depth
+from qdem_fem.contact.surface.geometry import blend, find_depth
 from qdem_fem.files import ContactTooDeep, Floats
+from qdem_fem.kernel import read_row
 
 if TYPE_CHECKING:
     from qdem_fem.bodies import Body
@@ -50,6 +51,22 @@ def find_first_inside(
                     if g > depth:
                         return a, b, g
     return -1, -1, 0.0
+
+
+@njit(cache=True)
+def find_overlap(surface: Any, near: Any, x: Any) -> tuple[float, int, int]:  # pragma: no cover
+    """Depth [m] of the deepest of the points that touch, the point, and the body that it is in."""
+    deepest, point, other = 0.0, 0, 0
+    for at in range(near.point.size):
+        if near.weight[at] > 0.0:
+            q = near.point[at]
+            nodes = surface.point_node[q, 0], surface.point_node[q, 1], surface.point_node[q, 2]
+            p = blend(x, nodes, read_row(surface.point_share, q))
+            faces = near.face[near.first[at] : near.first[at + 1]]
+            g = find_depth(p, x, surface.face, faces)[0]
+            if g > deepest:
+                deepest, point, other = g, q, near.body[at]
+    return deepest, point, other
 
 
 def check_inside(

@@ -27,6 +27,8 @@ from qdem_fem.contact.surface.geometry import (
     blend_velocity,
     compute_face_normal,
     compute_segments_apart,
+    divide_by_inertia,
+    find_arms,
     find_depth,
     scale,
     subtract,
@@ -61,6 +63,40 @@ def apply_law(
     c.account[0] += 0.5 * push * max(g, 0.0) + 0.5 * k_t * dot(s, s)
     c.account[1] += loss
     return push * n[0] - k_t * s[0], push * n[1] - k_t * s[1], push * n[2] - k_t * s[2]
+
+
+@exact
+def push_pair(
+    c: Any, velocity: Any, step: float, spring: Any, at: int, own: Any, other: Any, ring: Any,
+    n: Any, g: float, k_n: float, k_t: float,
+) -> None:  # fmt: skip  # pragma: no cover
+    """Forces of a point that is inside by ``g`` along n, and of what it is in.
+
+    ``own``, ``other``: nodes and shares of the point and of the nearest one of the other surface,
+    d apart.  Both forces act at the point: the other surface follows it with the spin of its
+    ``ring`` of three nodes, and what ``d x F`` lacks is a couple on them.  So moment is kept with
+    friction, and two that turn as one have no slip.
+    """
+    x, place = c.position, c.surface.place
+    d = subtract(blend(x, own[0], own[1]), blend(x, other[0], other[1]))
+    arms, turning = find_arms(x, ring), (0.0, 0.0, 0.0)
+    for k in range(3):
+        at_node = place[ring[k]]
+        v = velocity[at_node], velocity[at_node + 1], velocity[at_node + 2]
+        turning = subtract(turning, cross(v, arms[k]))
+    slip = subtract(
+        blend_velocity(velocity, place, own[0], own[1]),
+        blend_velocity(velocity, place, other[0], other[1]),
+    )
+    slip = subtract(slip, cross(divide_by_inertia(arms, turning), d))
+    force = apply_law(c, spring, at, n, g, scale(step, slip), k_n, k_t, c.friction)
+    add_force(c.force, own[0], own[1], force, 1.0)
+    add_force(c.force, other[0], other[1], force, -1.0)
+    couple = divide_by_inertia(arms, cross(force, d))
+    for k in range(3):
+        f = cross(couple, arms[k])
+        for i in range(3):
+            c.force[ring[k], i] += f[i]
 
 
 @exact
@@ -119,22 +155,16 @@ def compute_points_forces(
             continue
         if g > 0.0 and near.weight[at] < 0.0:
             near.weight[at] = compute_point_weight(surface, x, q, n)
-        deepest = max(deepest, g if near.weight[at] > 0.0 else 0.0)
-        other = near.body[at]
-        half = 0.5 * max(near.weight[at], 0.0)
-        k_n = half * add_in_series(surface.modulus[surface.point_body[q]], surface.modulus[other])
-        k_t = half * add_in_series(surface.shear[surface.point_body[q]], surface.shear[other])
-        under = surface.face[f, 0], surface.face[f, 1], surface.face[f, 2]
-        way = scale(
-            step,
-            subtract(
-                blend_velocity(velocity, surface.place, nodes, share),
-                blend_velocity(velocity, surface.place, under, below),
-            ),
-        )
-        force = apply_law(c, near.spring, at, n, g, way, k_n, k_t, c.friction)
-        add_force(c.force, nodes, share, force, 1.0)
-        add_force(c.force, under, below, force, -1.0)
+        if near.weight[at] > 0.0:  # what has no area has no force, and no friction to remember
+            deepest = max(deepest, g)
+            own, other, half = surface.point_body[q], near.body[at], 0.5 * near.weight[at]
+            k_n = half * add_in_series(surface.modulus[own], surface.modulus[other])
+            k_t = half * add_in_series(surface.shear[own], surface.shear[other])
+            under = surface.face[f, 0], surface.face[f, 1], surface.face[f, 2]
+            push_pair(
+                c, velocity, step, near.spring, at, (nodes, share), (under, below), under, n, g,
+                k_n, k_t,
+            )  # fmt: skip
         if g <= 0.0:
             near.weight[at] = -1.0
     return deepest
@@ -182,13 +212,6 @@ def compute_edges_forces(
             continue
         one, two = (1.0 - s, s, 0.0), (1.0 - t, t, 0.0)
         nodes, under = (i, j, i), (k, m, k)
-        way = scale(
-            step,
-            subtract(
-                blend_velocity(velocity, surface.place, nodes, one),
-                blend_velocity(velocity, surface.place, under, two),
-            ),
-        )
         if near.edge_weight[at] < 0.0:  # the ends of an edge are its vertices': it fades to them
             flat = compute_edge_flatness(surface, x, a, n, -1.0) * compute_edge_flatness(
                 surface, x, b, n, 1.0
@@ -196,14 +219,21 @@ def compute_edges_forces(
             fade = 16.0 * s * (1.0 - s) * t * (1.0 - t) * (1.0 - flat**FLATNESS_POWER)
             near.edge_weight[at] = fade * min(surface.edge_area[a], surface.edge_area[b])
             # what slides onto an edge begins without a force
-            near.edge_start[at] = 0.0 if step == 0.0 or g + dot(way, n) <= 0.0 else g
-        body, other = surface.edge_body[a], surface.edge_body[b]
-        k_n = near.edge_weight[at] * add_in_series(surface.modulus[body], surface.modulus[other])
-        k_t = near.edge_weight[at] * add_in_series(surface.shear[body], surface.shear[other])
-        g_eff = g - near.edge_start[at] if g > 0.0 else 0.0
-        force = apply_law(c, near.edge_spring, at, n, g_eff, way, k_n, k_t, c.friction)
-        add_force(c.force, nodes, one, force, 1.0)
-        add_force(c.force, under, two, force, -1.0)
+            apart = subtract(
+                blend_velocity(velocity, surface.place, nodes, one),
+                blend_velocity(velocity, surface.place, under, two),
+            )
+            near.edge_start[at] = 0.0 if step == 0.0 or g + step * dot(apart, n) <= 0.0 else g
+        if near.edge_weight[at] > 0.0:
+            body, other = surface.edge_body[a], surface.edge_body[b]
+            weight = near.edge_weight[at]
+            k_n = weight * add_in_series(surface.modulus[body], surface.modulus[other])
+            k_t = weight * add_in_series(surface.shear[body], surface.shear[other])
+            g_eff = g - near.edge_start[at] if g > 0.0 else 0.0
+            push_pair(
+                c, velocity, step, near.edge_spring, at, (nodes, one), (under, two),
+                (k, m, surface.edge_opposite[b, 0]), n, g_eff, k_n, k_t,
+            )  # fmt: skip
         if g <= 0.0:
             near.edge_weight[at] = -1.0
 
@@ -224,14 +254,14 @@ def compute_walls_forces(c: Any, velocity: Any, step: float) -> float:  # pragma
                 continue
             if g > 0.0 and walls.weight[w, q] < 0.0:
                 walls.weight[w, q] = compute_point_weight(surface, x, q, n)
-            deepest = max(deepest, g if walls.weight[w, q] > 0.0 else 0.0)
-            weight = 2.0 * max(walls.weight[w, q], 0.0)
-            k_n = weight * surface.modulus[surface.point_body[q]]
-            k_t = weight * surface.shear[surface.point_body[q]]
-            way = scale(step, blend_velocity(velocity, surface.place, nodes, share))
-            force = apply_law(c, walls.spring[w], q, n, g, way, k_n, k_t, walls.friction[w])
-            add_force(c.force, nodes, share, force, 1.0)
-            total = subtract(total, force)
+            if walls.weight[w, q] > 0.0:
+                deepest = max(deepest, g)
+                k_n = 2.0 * walls.weight[w, q] * surface.modulus[surface.point_body[q]]
+                k_t = 2.0 * walls.weight[w, q] * surface.shear[surface.point_body[q]]
+                way = scale(step, blend_velocity(velocity, surface.place, nodes, share))
+                force = apply_law(c, walls.spring[w], q, n, g, way, k_n, k_t, walls.friction[w])
+                add_force(c.force, nodes, share, force, 1.0)
+                total = subtract(total, force)
             if g <= 0.0:
                 walls.weight[w, q] = -1.0
         write_row(walls.force, w, total)

@@ -14,9 +14,10 @@ faces bear already.  Sharp edges bear across one another in the same way, and fa
 All these areas are taken when a contact begins, and kept while it lasts; so ``W`` is a potential of
 the depth, and a force acts on the nodes of the face beneath as its gradient says, which keeps
 momentum and moment.  Friction is a spring with a slider, as of spheres, of
-``p_t = p / (2 (1 + nu))`` for the same area.
+``p_t = p / (2 (1 + nu))`` for the same area; it acts at the point, and at the depth below the face
+by a couple on the face's nodes.
 
-Not for bodies thinner than ``depth``, or faces that bend back on themselves within it.
+Not for bodies or faces narrower than ``depth``, or faces that bend back on themselves within it.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ from qdem_fem.files import Floats, Integers
 from qdem_fem.mesh import find_area_vectors
 
 DEPTH = 0.1  # greatest one, over the median edge of the surfaces [-]
+OVERLAP = 0.02  # at the start, over the greatest depth, that is named: a strain of 2e-3 [-]
 SHARP_COSINE = 0.9  # between two faces' normals: below, their edge may cross others [-]
 
 
