@@ -112,6 +112,7 @@ def _preview_run(prepared: Prepared) -> dict[str, Any]:
         list_mass_scaling_facts,
         make_plan,
         make_simulation,
+        warn_of_bending,
     )
 
     outlook: dict[str, Any] = {
@@ -126,6 +127,7 @@ def _preview_run(prepared: Prepared) -> dict[str, Any]:
         if bed := preview_bed(prepared):  # what follows it is known when it stands
             return outlook | {"bed": bed}
     run, bodies = make_simulation(prepared)
+    warn_of_bending(bodies)
     outlook |= {
         "bodies": list_body_facts(bodies),
         "critical_step": describe_critical_step(run),
@@ -186,6 +188,12 @@ def _print(content: dict[str, Any], as_json: bool) -> None:
     if "estimated_s" in content:
         print(f"estimated time {content['estimated_s']:.3g} s on this machine")
         print(f"{content['rows']} rows of probes, {content['vtu_files']} VTU files")
+    if found := content.get("discretisation"):
+        print(
+            f"errors of the mesh, estimated: {100 * found['displacement']:.2g} % of displacements "
+            f"missing, {100 * found['stress']:.2g} % of stresses wrong, "
+            f"{100 * found['frequency']:.2g} % of frequencies too much"
+        )
     for name, probe in content.get("probes", {}).items():
         print(f"{name} at the end (m): {' '.join(f'{value:.7g}' for value in probe['end'])}")
     for name, modes in content.get("modes", {}).items():

@@ -25,9 +25,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from qdem_fem.bodies import NOTHING, Assembly, Body, remove_held
+from qdem_fem.bodies import NOTHING, Assembly, Body, Discretisation, remove_held
 from qdem_fem.files import ConditionError, ElementInverted, Floats, NotConverged, is_real
-from qdem_fem.march.energies import find_energy
+from qdem_fem.march.energies import estimate_errors, find_energy
 from qdem_fem.march.rigid_motions import check_held
 from qdem_fem.march.state import State
 from qdem_fem.march.steps import find_inverted
@@ -53,11 +53,13 @@ class StaticAnswer:
     """How well the equilibrium is met, and what it cost."""
 
     residual: float  # |f_int + f_ext| on what is free, over |f_ext| or, if larger, the reactions
-    error_estimate: float
-    """Bound on the relative error of the displacement in the energy norm: all of the residual is
-    taken to pull the softest motion that the iteration met.  A residual alone says little of a
-    slender body; this says too much, usually by one to three orders of magnitude.  NaN where no
-    step was needed, so that no motion was met."""
+    solver_bound: float
+    """How far this is from the answer of the same mesh at most, in the energy norm and over it: all
+    of the residual is taken to pull the softest motion that the iteration met.  A residual alone
+    says little of a slender body; this says too much, usually by one to three orders of magnitude.
+    NaN where no step was needed, so that no motion was met.  It says nothing of the mesh."""
+    discretisation: Discretisation | None
+    """How far the mesh's answer is from the body's, estimated; None where nothing is strained."""
     steps: int  # evaluations of the forces, each the cost of a time step
     cpu_s: float  # processor time [s]
 
@@ -90,8 +92,9 @@ def relax(simulation: State, tolerance: float, max_steps: int) -> StaticAnswer:
             remedy="call relax again to go on, ask for less, or apply the load in parts",
         )  # fmt: skip
     return StaticAnswer(
-        residual=found.residual, error_estimate=found.error(2 * after.elastic),
-        steps=found.steps, cpu_s=time.process_time() - started,
+        residual=found.residual, solver_bound=found.bound(2 * after.elastic),
+        discretisation=estimate_errors(simulation), steps=found.steps,
+        cpu_s=time.process_time() - started,
     )  # fmt: skip
 
 
@@ -127,7 +130,7 @@ class _Found:
         )
         return float(lowest[0])
 
-    def error(self, twice_energy: float) -> float:
+    def bound(self, twice_energy: float) -> float:
         """``|e|_K <= |r|_(M^-1)/sqrt(lowest)``, over ``|u|_K``."""
         if self.energy == 0:
             return 0.0

@@ -1,9 +1,13 @@
-"""Energies of a simulation now."""
+"""Energies of a simulation now, and what its meshes make of its motion."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from qdem_fem.bodies import Discretisation, estimate_discretisation
+from qdem_fem.files import Floats
 from qdem_fem.march.leapfrog import find_half_work, find_velocity, find_viscous_half
 from qdem_fem.march.state import State
 
@@ -45,3 +49,14 @@ def find_energy(run: State) -> Energy:
             external += float(run.rigid.find_half_work(run.find_acting()).sum())
     touching = (0.0, 0.0) if run.contacts is None else run.contacts.energy()
     return Energy(kinetic, float(elastic), external, *touching, viscous)
+
+
+def estimate_errors(run: State, displacement: Floats | None = None) -> Discretisation | None:
+    """What the meshes make of a displacement (n, 3) [m] of all nodes, by default that of now."""
+    moved = run.assembly.field("displacement") if displacement is None else displacement
+    tied = run.master != np.arange(len(run.master))
+    for nodes in (one.nodes for one in run.conditions.held + run.conditions.rollers):
+        tied[nodes] = True
+    ends = run.first_node[1:-1]
+    parts = zip(run.bodies, np.split(moved, ends), np.split(tied, ends), strict=True)
+    return estimate_discretisation(((b, u, not own.any()) for b, u, own in parts), run.strain)

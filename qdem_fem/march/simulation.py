@@ -11,14 +11,14 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from qdem_fem.bodies import Body
+from qdem_fem.bodies import Body, Discretisation
 from qdem_fem.contact import choose_assembly
 from qdem_fem.element import Strain
 from qdem_fem.files import ConditionError, Floats, is_real
 from qdem_fem.march.checkpoint import read_checkpoint, write_checkpoint
 from qdem_fem.march.conditioned_bodies import ConditionedBodies
 from qdem_fem.march.dynamic_relaxation import StaticAnswer, relax
-from qdem_fem.march.energies import Energy, find_energy
+from qdem_fem.march.energies import Energy, estimate_errors, find_energy
 from qdem_fem.march.leapfrog import find_velocity, level_velocities
 from qdem_fem.march.options import (
     Contact,
@@ -157,6 +157,13 @@ class Simulation(ConditionedBodies):
     def energy(self) -> Energy:
         """Energies now [J], see `Energy`."""
         return find_energy(self)
+
+    def estimate_errors(self, displacement: Floats | None = None) -> Discretisation | None:
+        """Errors of the meshes in the answer or motion now, estimated: `Discretisation`.
+
+        ``displacement`` (n, 3) [m] of all bodies, one after the other: of another time.
+        """
+        return estimate_errors(self, displacement)
 
     def save(self, path: str | Path) -> None:
         """Write the state to a file (`qdem_fem.march.write_checkpoint`)."""

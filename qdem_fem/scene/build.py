@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from qdem_fem.files import ConditionError, QdemError, Series
+from qdem_fem.scene.doubts import warn_of_values
 from qdem_fem.tables import BodyTable, choose_contact
 from trackbed.scene_files import Problem, describe_error
 
@@ -45,6 +46,7 @@ def make_simulation(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
         )
         for body in scene.body
     }
+    warn_of_values(scene, bodies)
     options: dict[str, Any] = {name: getattr(table, name) for name in OPTIONS}
     run = Simulation(list(bodies.values()), contact=choose_contact(scene.contact), **options)
     problems = []

@@ -20,7 +20,7 @@ from trackbed.run_files import folder as run_folder
 ENERGIES = ("kinetic", "elastic", "external")
 CONTACT_ENERGIES = ("contact", "friction")
 VISCOUS_ENERGY = ("viscous",)
-CHECKPOINT, COST = "checkpoint.npz", "cost.json"
+CHECKPOINT, COST, PEAK = "checkpoint.npz", "cost.json", "peak.npz"
 
 
 @dataclass(frozen=True)
@@ -40,8 +40,8 @@ class RunFolder(run_folder.RunFolder):
     """The folder of one QDEM run; see `trackbed.run_files.folder.RunFolder`."""
 
     own: ClassVar[tuple[str, ...]] = (
-        "scene.toml", "manifest.json", RESULT, CHECKPOINT, COST, "probes.csv", "energy.csv",
-        "fields.pvd", "fields_*.vtu", "report.html", "picture-*.png", ".*.partial",
+        "scene.toml", "manifest.json", RESULT, CHECKPOINT, COST, PEAK, "probes.csv",
+        "energy.csv", "fields.pvd", "fields_*.vtu", "report.html", "picture-*.png", ".*.partial",
     )  # fmt: skip
     states = CHECKPOINT
     compared = ("scene", "files")
@@ -116,7 +116,9 @@ class Done:
     plan: Plan | None  # None for a static answer
     cost: dict[str, float]  # ``cpu_s`` and ``wall_s`` [s] of advancing, all sittings together
     static: dict[str, float] = field(default_factory=dict)
-    """``residual`` and ``error_estimate`` of a static answer [-], ``steps`` it took."""
+    """``residual`` and ``solver_bound`` of a static answer [-], ``steps`` it took."""
+    discretisation: Any = None
+    """`qdem_fem.bodies.Discretisation` of the answer, or where most elastic energy was."""
 
 
 def run_dynamic(
@@ -156,6 +158,7 @@ def run_dynamic(
                     f"stopped by {stop.name} at t = {run.time:.6g} s; the state is saved in "
                     f"{folder.checkpoint}\n  -> the same command with --resume goes on from there"
                 )
+    done.discretisation = run.estimate_errors(record.peak)
     return done
 
 
@@ -168,8 +171,9 @@ def run_static(prepared: Prepared, run: Any, bodies: dict[str, Any], folder: Run
     answer = run.relax(tolerance=prepared.scene.simulation.tolerance)
     cost = {"cpu_s": time.process_time() - cpu, "wall_s": time.perf_counter() - started}
     probes = {name: (bodies[body], nodes) for name, (body, nodes) in prepared.probes.items()}
-    names = ("residual", "error_estimate", "steps")
-    done = Done(run, bodies, None, cost, {name: float(getattr(answer, name)) for name in names})
+    names = ("residual", "solver_bound", "steps")
+    facts = {name: float(getattr(answer, name)) for name in names}
+    done = Done(run, bodies, None, cost, facts, answer.discretisation)
     _Record(done, None, folder.path, probes).begin()
     return done
 
@@ -190,6 +194,8 @@ class _Record:
         names = [f"{name}_{axis}" for name in probes for axis in "xyz"]
         self.rows = Table(path / "probes.csv", ["time", *names])
         self.energies = Table(path / "energy.csv", ["time", *list_energies(self.run)])
+        self.peak, self.peak_energy = np.zeros((0, 3)), -1.0
+        """Displacement [m] where most elastic energy was [J]."""
 
     def begin(self) -> None:
         """First rows and fields, at t = 0."""
@@ -208,6 +214,9 @@ class _Record:
         at_end = done == plan.total and done % plan.energy > 0
         self.energies.cut(now, done // plan.energy + 1 + at_end)
         self.account.add_rows(read_table(self.energies.path))
+        if (self.path / PEAK).exists():
+            with np.load(self.path / PEAK) as peak:
+                self.peak, self.peak_energy = peak["displacement"], float(peak["energy"])
         kept = {name for _, _, name in self.plan.list_field_files(self.run.steps_done)}
         for path in self.path.glob("fields_*.vtu"):
             if path.name not in kept:
@@ -235,6 +244,8 @@ class _Record:
         energy, names = self.run.energy(), list_energies(self.run)
         row = np.array([[when, *(float(getattr(energy, name)) for name in names)]])
         self.energies.append(row)
+        if energy.elastic > self.peak_energy:
+            self.peak_energy, self.peak = energy.elastic, self.run.assembly.field("displacement")
         self.account.add_rows(dict(zip(names, row[:, 1:].T, strict=True)))
 
     def check_audit(self) -> None:
@@ -267,6 +278,7 @@ class _Record:
         self.rows.sync()
         self.energies.sync()
         self.run.save(checkpoint)
+        np.savez(self.path / PEAK, displacement=self.peak, energy=self.peak_energy)
         write_whole(self.path / COST, json.dumps(self.done.cost) + "\n")
 
 

@@ -51,8 +51,15 @@ def summarise_run(prepared: Prepared, done: Done, folder: RunFolder) -> dict[str
             for label, modes in find_modes(prepared, rows).items()
         },
         "static": done.static,
+        "discretisation": describe_discretisation(done.discretisation),
         "left_out": prepared.scene.list_left_out(),
     }
+
+
+def describe_discretisation(found: Any) -> dict[str, float]:
+    """Errors of the meshes [-], as `qdem_fem.bodies.Discretisation` says; empty: no strain."""
+    names = ("displacement", "stress", "frequency")
+    return {} if found is None else {name: getattr(found, name) for name in names}
 
 
 def describe_critical_step(run: Any) -> dict[str, Any]:
@@ -82,21 +89,26 @@ def list_mass_scaling_facts(run: Any) -> dict[str, float]:
 def list_body_facts(bodies: dict[str, Any]) -> dict[str, Any]:
     """`describe_body` by name; of bodies that are named alike but for a number behind a dash, one
     entry: sums, and the smallest altitude."""
-    kinds: dict[str, dict[str, dict[str, Any]]] = {}
-    for name, body in bodies.items():
-        stem, _, number = name.rpartition("-")
-        kinds.setdefault(stem if number.isdecimal() else name, {})[name] = describe_body(body)
     found: dict[str, Any] = {}
-    for kind, by_name in kinds.items():
-        if len(by_name) == 1:
-            found |= by_name
+    for kind, alike in sort_by_kind(bodies).items():
+        facts = list(map(describe_body, alike))
+        if len(facts) == 1:
+            found[alike[0].name] = facts[0]
             continue
-        facts = list(by_name.values())
         least = min(facts, key=lambda one: float(one["smallest_altitude"]))
         own = ("smallest_altitude", "thinnest_element")
         total = {k: least[k] if k in own else sum(one[k] for one in facts) for k in facts[0]}
         found[f"{len(facts)} of {kind}"] = total
     return found
+
+
+def sort_by_kind(bodies: dict[str, Any]) -> dict[str, list[Any]]:
+    """Bodies that are named alike but for a number behind a dash, by what is before it."""
+    kinds: dict[str, list[Any]] = {}
+    for name, body in bodies.items():
+        stem, _, number = name.rpartition("-")
+        kinds.setdefault(stem if number.isdecimal() else name, []).append(body)
+    return kinds
 
 
 def describe_body(body: Any) -> dict[str, Any]:

@@ -377,3 +377,27 @@ def static_tip() -> float:
     moved = skfem.solve(*skfem.condense(stiffness, force, D=fixed))
     tip = int(np.argmin(np.linalg.norm(mesh.nodes - [0.4, 0.05, 0.05], axis=1)))
     return float(moved[3 * tip + 2])
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("body.0.material.young=30e3", "as MPa it would be 3e+10 Pa"),
+        ("body.0.material.density=2.71", "as g/cm^3 it would be 2710 kg/m^3"),
+        ("body.0.mesh.box.size=[2400.0,250.0,220.0]", "as mm it would be 2.4 m"),
+    ],
+)
+def test_doubts_reach_the_terminal_the_report_and_json(
+    scene: Path, override: str, words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What is hardly meant is said thrice, a dry run says it too, and neither is refused."""
+    folder = scene.parent / "out"
+    short = ["--set", "simulation.method=static", "--set", "simulation.tolerance=1e-2"]
+    assert command(scene, "--dry-run", "--json", "--set", override, *short) == 0
+    assert any(words in said for said in json.loads(capsys.readouterr().out)["warnings"])
+    options = ["--json", "--no-pictures", "--run-folder", str(folder), "--set", override]
+    assert command(scene, *options, *short) == 0
+    said = capsys.readouterr()
+    assert words in said.err
+    assert any(words in one for one in json.loads(said.out)["warnings"])
+    assert words in (folder / "report.html").read_text()

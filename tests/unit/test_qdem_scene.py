@@ -369,6 +369,7 @@ def loads_or_refuses(path: Path) -> bool:
 
 @pytest.mark.long
 @pytest.mark.parametrize("text", [CANTILEVER, VIBRATION, BASE])
+@pytest.mark.filterwarnings("ignore::qdem_fem.files.SceneWarning")
 def test_damaged_scenes_never_end_in_a_traceback(tmp_path: Path, text: str) -> None:
     """Random damage gives a scene or a `QdemError`: 200 each here, 5,500 once, by hand."""
     generator = random.Random(len(text))
