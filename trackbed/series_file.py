@@ -190,9 +190,10 @@ def read_columns(
     places, factors = [], []
     for name, units in zip(names, quantities, strict=True):
         place = find_column(table, (name.strip().lower(),), units)
-        unit = table.find_unit(place)
-        if not unit and table.header[place].lower() != name.strip().lower():
-            unit = table.split_title(place, units)[1]
+        unit, title = table.find_unit(place), table.header[place]
+        found = table.split_title(place, units)[1]
+        if not unit and (title.lower() != name.strip().lower() or found[1:]):
+            unit = found  # named in full, x_h may be a name and x_kN is none
         if unit and unit not in units:
             raise UsageError(
                 f"the column {table.header[place]} is in {unit}, which is not known here",

@@ -7,9 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from trackbed.choices import find_choices
+from trackbed.plausible import describe_implausible
 
 SEAT_AREA = 0.13 * 0.17
 """Of a rail seat [m^2]: a foot of 130 mm on a pad of 170 mm."""
+WRITTEN = "grains are written as NumPy's .npz, whatever the name: name it so"
 
 
 def register(verb: str, parser: argparse.ArgumentParser) -> None:
@@ -61,6 +63,7 @@ def make_grain_file(arguments: argparse.Namespace) -> int:
     """Make random ballast grains, of EN 13450 31.5/50 A or between two sieves, and save them."""
     import numpy as np
 
+    from qdem_fem.files import UsageError
     from qdem_fem.grains import BALLAST, Grading, GrainRecipe, make_grains, save_grains
 
     _refuse_no_folder(arguments.out)
@@ -68,6 +71,10 @@ def make_grain_file(arguments: argparse.Namespace) -> int:
     grading = BALLAST
     if arguments.sizes is not None:
         grading = Grading(np.array(arguments.sizes), np.array([0.0, 1.0]))
+        if said := describe_implausible("grain", max(arguments.sizes), "--sizes"):
+            raise UsageError(said)
+    if arguments.out.suffix != ".npz":
+        raise UsageError(f"{arguments.out} does not end with .npz", where="--out", remedy=WRITTEN)
     grains = make_grains(arguments.count, arguments.seed, recipe, grading, arguments.shape)
     save_grains(arguments.out, grains)
     print(f"{arguments.out}: {len(grains)} grains, {grains.tetrahedra.sum()} tetrahedra")

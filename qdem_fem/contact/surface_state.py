@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from typing import Any
 
@@ -26,7 +25,7 @@ from qdem_fem.contact.surface import (
     renew_near,
 )
 from qdem_fem.contact.system import System
-from qdem_fem.files import Floats, Integers, SceneWarning
+from qdem_fem.files import Floats, Integers, warn_user
 from qdem_fem.mesh import find_area_vectors
 
 TOUCH_ARRAYS = ("start", "position", "force", "account")
@@ -130,12 +129,10 @@ class SurfaceContacts(Contacts):
         depth, point, other = find_overlap(surface, near, x)
         if depth > OVERLAP * self.depth:
             names = self.run.bodies[surface.point_body[point]].name, self.run.bodies[other].name
-            warnings.warn(
+            warn_user(
                 f"{names[0]} begins {depth:.3g} m inside {names[1]}, and the contacts at the start "
                 f"hold {self.kernel.account[0]:.3g} J, which throw bodies apart; begin with bodies "
-                "that do not overlap",
-                SceneWarning,
-                stacklevel=2,
+                "that do not overlap"
             )
 
     def renew_lists(self, position: Floats) -> None:

@@ -17,6 +17,7 @@ from qdem_fem.files.errors import (
     StepWarning,
     Unstable,
     UsageError,
+    warn_user,
 )
 from qdem_fem.files.output import Table, read_table, write_bodies_vtu
 from qdem_fem.files.series import Driver, Series, Value, is_real, make_ramp
@@ -25,5 +26,6 @@ __all__ = [
     "CheckpointError", "ConditionError", "ContactTooDeep", "Driver", "ElementInverted",
     "EnergyLost", "Floats", "Integers", "Interrupted", "LibraryMissing", "MaterialError",
     "MeshError", "NotConverged", "QdemError", "SceneWarning", "Series", "StepWarning", "Table",
-    "Unstable", "UsageError", "Value", "is_real", "make_ramp", "read_table", "write_bodies_vtu",
+    "Unstable", "UsageError", "Value", "is_real", "make_ramp", "read_table", "warn_user",
+    "write_bodies_vtu",
 ]  # fmt: skip

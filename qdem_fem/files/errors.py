@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 from trackbed.errors import (
     DiskFull,
     Interrupted,
@@ -18,6 +20,7 @@ __all__ = [
     "CheckpointError", "ConditionError", "ContactTooDeep", "DiskFull", "ElementInverted",
     "EnergyLost", "Interrupted", "LibraryMissing", "MaterialError", "MeshError", "NotConverged",
     "QdemError", "SceneError", "SceneWarning", "StepWarning", "Unstable", "UsageError",
+    "warn_user",
 ]  # fmt: skip
 
 QdemError = TrackbedError
@@ -66,3 +69,8 @@ class SceneWarning(UserWarning):
 
 class StepWarning(UserWarning):
     """One element makes the time step much shorter than the others need."""
+
+
+def warn_user(text: str) -> None:
+    """Say a `SceneWarning`."""
+    warnings.warn(text, SceneWarning, stacklevel=3)

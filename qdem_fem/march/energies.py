@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from qdem_fem.bodies import Discretisation, estimate_discretisation
+from qdem_fem.bodies import Body, Discretisation, estimate_discretisation
 from qdem_fem.files import Floats
 from qdem_fem.march.leapfrog import find_half_work, find_velocity, find_viscous_half
 from qdem_fem.march.state import State
@@ -54,9 +54,14 @@ def find_energy(run: State) -> Energy:
 def estimate_errors(run: State, displacement: Floats | None = None) -> Discretisation | None:
     """What the meshes make of a displacement (n, 3) [m] of all nodes, by default that of now."""
     moved = run.assembly.field("displacement") if displacement is None else displacement
+    return estimate_discretisation(split_motion(run, moved), run.strain)
+
+
+def split_motion(run: State, moved: Floats) -> list[tuple[Body, Floats, bool]]:
+    """Each body, its part of a displacement (n, 3) [m], and whether nothing holds it."""
     tied = run.master != np.arange(len(run.master))
     for nodes in (one.nodes for one in run.conditions.held + run.conditions.rollers):
         tied[nodes] = True
     ends = run.first_node[1:-1]
     parts = zip(run.bodies, np.split(moved, ends), np.split(tied, ends), strict=True)
-    return estimate_discretisation(((b, u, not own.any()) for b, u, own in parts), run.strain)
+    return [(body, u, not bool(own.any())) for body, u, own in parts]

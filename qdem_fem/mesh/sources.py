@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from qdem_fem.files import MeshError
+from qdem_fem.files import MeshError, warn_user
 from trackbed.mesh_file import list_groups, read_mesh_file
 
 _ACCEPTED = (
@@ -131,4 +131,28 @@ def _read_meshio(mesh: Any, where: str) -> MeshParts:
             where=where,
             remedy="make the mesh again with meshio.Mesh, which checks this",
         ) from error
+    named = {name for name, entry in mesh.field_data.items() if np.shape(entry) == (2,)}
+    if lost := named - {*node_sets, *element_sets}:
+        warn_user(
+            f"{where}: the groups {', '.join(sorted(lost))} are named, and their reader gives no "
+            "cells of them: a cell in two groups keeps one in MSH 4; write MSH 2.2"
+        )
+    if "gmsh:physical" in mesh.cell_data:
+        tags = [t for t, b in zip(mesh.cell_data["gmsh:physical"], mesh.cells, strict=True)
+                if b.type == "tetra"]  # fmt: skip
+        elements, element_sets = _join_groups(elements, np.concatenate(tags), element_sets)
     return MeshParts(mesh.points, elements, node_sets, element_sets)
+
+
+def _join_groups(elements: Any, tags: Any, sets: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
+    """One element where MSH 2.2 writes one for each group that it is in.
+
+    Elements that repeat in the same group stay: they are a fault."""
+    rows = np.column_stack([np.sort(elements, axis=1), tags])
+    _, once = np.unique(rows, axis=0, return_index=True)
+    if len(once) < len(rows):
+        return elements, sets
+    _, first, same = np.unique(rows[:, :4], axis=0, return_index=True, return_inverse=True)
+    kept, place = np.unique(first, return_inverse=True)
+    number = place[same.reshape(-1)]
+    return elements[kept], {name: np.unique(number[own]) for name, own in sets.items()}

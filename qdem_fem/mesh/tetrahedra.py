@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from qdem_fem.files import Floats, Integers, MeshError
+from qdem_fem.files import Floats, Integers, MeshError, warn_user
 from qdem_fem.mesh.checks import (
     Problem,
     convert_elements,
@@ -21,6 +21,7 @@ from qdem_fem.mesh.checks import (
     name_some,
     raise_problems,
 )
+from qdem_fem.mesh.doubts import find_doubts
 from qdem_fem.mesh.sources import MeshParts, read_mesh_parts
 
 _GRADIENTS_AT_ONCE = 1 << 14
@@ -71,7 +72,8 @@ def read_mesh(source: Any, *, where: str = "") -> TetMesh:
 
     ``where`` names the mesh in errors, a path also names itself.  The arrays are copied.
     Left-handed elements are mended and listed in ``flipped``, nodes of no element are listed in
-    ``unused``; nodes at the same place are no error, as cracks are made of them.
+    ``unused``; nodes at the same place are no error, as cracks are made of them, but warned of, as
+    are parts that share no face and elements that overlap (`SceneWarning`).
 
     Raises `MeshError`, which names all problems found: shape or type, coordinates that are not
     finite, indices out of range, a node twice in an element, elements that repeat, elements
@@ -111,6 +113,8 @@ def read_mesh(source: Any, *, where: str = "") -> TetMesh:
     elements[flipped, 2:] = elements[flipped, :1:-1]
     if isinstance(source, TetMesh):
         flipped = np.union1d(flipped, source.flipped)
+    for text in find_doubts(nodes, elements, find_gradients(nodes, elements)[0]):
+        warn_user(f"{where}: {text}")
     used = np.zeros(len(nodes), bool)
     used[elements.reshape(-1)] = True
     return TetMesh(nodes, elements, flipped, np.flatnonzero(~used), node_sets, element_sets)

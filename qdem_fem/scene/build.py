@@ -35,7 +35,9 @@ def make_simulation(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
         from qdem_fem.track import TrackPrepared, enter_track
 
         assert isinstance(prepared, TrackPrepared)
-        return enter_track(prepared)
+        run, bodies = enter_track(prepared)
+        warn_of_values(prepared.scene, bodies)
+        return run, bodies
     scene, table = prepared.scene, prepared.scene.simulation
     bodies = {
         body.name: Body(

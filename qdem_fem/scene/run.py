@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import time
 from dataclasses import dataclass, field
@@ -12,6 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from qdem_fem.files import EnergyLost, Interrupted, Table, read_table, write_bodies_vtu
+from qdem_fem.scene.doubts import warn_of_strain
 from qdem_fem.scene.energy_account import EnergyAccount
 from qdem_fem.tables import Prepared
 from trackbed.run_files import RESULT, note_signals, read_object, write_pvd, write_whole
@@ -159,6 +161,7 @@ def run_dynamic(
                     f"{folder.checkpoint}\n  -> the same command with --resume goes on from there"
                 )
     done.discretisation = run.estimate_errors(record.peak)
+    warn_of_strain(run, record.peak)
     return done
 
 
@@ -174,7 +177,9 @@ def run_static(prepared: Prepared, run: Any, bodies: dict[str, Any], folder: Run
     names = ("residual", "solver_bound", "steps")
     facts = {name: float(getattr(answer, name)) for name in names}
     done = Done(run, bodies, None, cost, facts, answer.discretisation)
-    _Record(done, None, folder.path, probes).begin()
+    record = _Record(done, None, folder.path, probes)
+    record.begin()
+    warn_of_strain(run, record.peak)
     return done
 
 
@@ -278,7 +283,9 @@ class _Record:
         self.rows.sync()
         self.energies.sync()
         self.run.save(checkpoint)
-        np.savez(self.path / PEAK, displacement=self.peak, energy=self.peak_energy)
+        peak = io.BytesIO()
+        np.savez(peak, displacement=self.peak, energy=self.peak_energy)
+        write_whole(self.path / PEAK, peak.getvalue())
         write_whole(self.path / COST, json.dumps(self.done.cost) + "\n")
 
 

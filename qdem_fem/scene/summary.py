@@ -7,13 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from qdem_fem.files import Floats, Series, read_table
+from qdem_fem.files import Floats, Series, read_table, warn_user
 from qdem_fem.report import Mode, find_peak_frequencies
+from qdem_fem.scene.doubts import sort_by_kind
 from qdem_fem.scene.energy_account import list_energy_facts
 from qdem_fem.scene.run import Done, RunFolder
 from qdem_fem.tables import Prepared
 
 MOVING = 1e-3  # share of the greatest displacement below which a component does not move [-]
+PERIODS = 2  # that a record holds at least of a mode: with fewer a drift fits as well [-]
 FREE_SAMPLES = 50  # of free motion at least, for modes to be sought in it [-]
 
 
@@ -102,15 +104,6 @@ def list_body_facts(bodies: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-def sort_by_kind(bodies: dict[str, Any]) -> dict[str, list[Any]]:
-    """Bodies that are named alike but for a number behind a dash, by what is before it."""
-    kinds: dict[str, list[Any]] = {}
-    for name, body in bodies.items():
-        stem, _, number = name.rpartition("-")
-        kinds.setdefault(stem if number.isdecimal() else name, []).append(body)
-    return kinds
-
-
 def describe_body(body: Any) -> dict[str, Any]:
     """Figures of a body's mesh: counts, what was mended, smallest altitude [m], mass [kg]."""
     from qdem_fem.mesh import find_altitudes
@@ -159,7 +152,16 @@ def find_modes(prepared: Prepared, rows: dict[str, Floats]) -> dict[str, list[Mo
     for name in prepared.probes:
         columns = [f"{name}_{axis}" for axis in "xyz"]
         column = max(columns, key=lambda one: float(np.ptp(rows[one][free])))
-        modes = find_peak_frequencies(rows["time"][free], rows[column][free], count)
-        if modes:
+        time = rows["time"][free]
+        modes = find_peak_frequencies(time, rows[column][free], count)
+        span = float(time[-1] - time[0])
+        short = [mode for mode in modes if mode.frequency * span < PERIODS]
+        if short:
+            warn_user(
+                f"{column}: {span:.3g} s of free motion are too short for a frequency of "
+                f"{short[0].frequency:.3g} Hz, of which they hold {short[0].frequency * span:.2g} "
+                f"periods and need {PERIODS}; raise simulation.duration"
+            )
+        if modes := [mode for mode in modes if mode not in short]:
             found[column] = modes
     return found

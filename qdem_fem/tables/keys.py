@@ -46,6 +46,8 @@ class Mesh(Table):
 
     file: Text | None = None
     """Mesh file of any format of meshio; a relative path counts from the scene file."""
+    scale: Positive = 1.0
+    """Metres in one unit of the file: 0.001 where it is in millimetres."""
     box: BoxMesh | None = None
 
 

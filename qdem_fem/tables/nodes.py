@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,7 +36,8 @@ def make_body_mesh(table: Mesh, folder: Path, key: str) -> TetMesh:
     if (table.file is None) == (table.box is None):
         raise WrongKey(key, "give one of file, box")
     if table.box is None:
-        return read_mesh(folder / str(table.file))
+        mesh = read_mesh(folder / str(table.file))
+        return replace(mesh, nodes=table.scale * mesh.nodes)
     count = int(np.prod(table.box.cells))
     if count > CELLS_MOST:
         raise WrongKey(f"{key}.box.cells", f"{count} cells are too many; at most {CELLS_MOST}")

@@ -10,10 +10,15 @@ from qdem_fem.files import Series, make_ramp
 from qdem_fem.tables.keys import SeriesTable
 from qdem_fem.tables.types import WrongKey
 from trackbed.errors import LibraryMissing, UsageError
-from trackbed.series_file import SI, TIMES, read_columns
+from trackbed.series_file import TIMES, read_columns
 
 WAYS = {"ramp": ("ramp", "value"), "times": ("times", "values"), "csv": ("csv", "value")}
 """First key of each way to give a series, and the keys that it needs."""
+UNITS = {
+    "force": ("N", "kN", "MN"), "pressure": ("Pa", "kPa", "MPa", "GPa"),
+    "value": ("m", "cm", "mm", "um", "µm"),
+}  # fmt: skip
+"""Units that a column may have, by the key that it is given for."""
 
 
 def make_series(
@@ -75,7 +80,8 @@ def _read_csv(table: SeriesTable, key: str, folder: Path) -> Series:
         return WrongKey(f"{key}.csv", what, where)
 
     try:
-        (times, values), lines = read_columns(path, (table.time, table.value), (TIMES, tuple(SI)))
+        units = TIMES, UNITS[key.rpartition(".")[2]]
+        (times, values), lines = read_columns(path, (table.time, table.value), units)
     except (UsageError, LibraryMissing) as error:
         raise refuse(error.what, error.where) from error
     back = np.flatnonzero(np.diff(times) <= 0)

@@ -84,10 +84,14 @@ def test_preambles_are_skipped(tmp_path: Path) -> None:
 
 
 def test_a_name_that_ends_like_a_unit_is_a_name(tmp_path: Path) -> None:
-    """Who names the column in full says nothing of a unit."""
+    """Who names the column in full says nothing of a unit of one letter; kN is no name."""
     path = tmp_path / "a.csv"
     assert columns(path, "time,x_h\n0,1\n", ("time", "x_h"))[1] == [1.0]
     assert columns(path, "time,x_h\n0,1\n", ("time", "x"))[1] == [3600.0]
+    for name in ("Force_kN", "Force kN", "Force, kN", "Force in kN"):
+        text = f'time;"{name}"\n0;1,5\n'
+        path.write_text(text)
+        assert read_columns(path, ("time", name), (TIMES, ("N", "kN")))[0][1] == [1500.0]
 
 
 @pytest.mark.parametrize(

@@ -401,3 +401,17 @@ def test_doubts_reach_the_terminal_the_report_and_json(
     assert words in said.err
     assert any(words in one for one in json.loads(said.out)["warnings"])
     assert words in (folder / "report.html").read_text()
+
+
+def test_no_frequency_from_less_than_two_periods(
+    scene: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """3 ms of free motion of a bar that bends at 100 Hz, as Euler and Bernoulli have it."""
+    options = ["--json", "--no-pictures", "--run-folder", str(scene.parent / "out")]
+    for key in ("simulation.duration", "output.vtu_interval"):
+        options += ["--set", f"{key}=0.005"]
+    assert command(scene, *options) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert any("too short for a frequency of" in one for one in said["warnings"])
+    found = [mode["frequency"] for modes in said["modes"].values() for mode in modes]
+    assert all(frequency > 2 / 0.003 for frequency in found)

@@ -16,7 +16,7 @@ import skfem
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from qdem_fem.files.errors import LibraryMissing, MeshError
+from qdem_fem.files.errors import LibraryMissing, MeshError, SceneWarning
 from qdem_fem.mesh.checks import FLAT
 from qdem_fem.mesh.generation import jitter_nodes, make_box_mesh
 from qdem_fem.mesh.tetrahedra import TetMesh, find_gradients, read_mesh
@@ -107,9 +107,41 @@ def test_left_handed_elements_are_mended_and_named() -> None:
 def test_unused_nodes_are_listed_and_coincident_ones_allowed() -> None:
     """A crack: two elements over the same triangle, with nodes of their own."""
     nodes = np.concatenate([UNIT, UNIT[:3], [[0, 0, -1], [9, 9, 9]]])
-    mesh = read_mesh((nodes, [[0, 1, 2, 3], [4, 6, 5, 7]]))
+    said = "2 parts of 1, 1 elements .* at the place of another node: nodes 0, 1, 2"
+    with pytest.warns(SceneWarning, match=said):
+        mesh = read_mesh((nodes, [[0, 1, 2, 3], [4, 6, 5, 7]]))
     np.testing.assert_array_equal(mesh.unused, [8])
     assert len(mesh.flipped) == 0
+
+
+def test_elements_inside_others_are_named() -> None:
+    """Two boxes in each other share no node: their mass in common would count twice."""
+    one, other = make_box_mesh((1, 1, 1), (4, 4, 4)), make_box_mesh((1, 1, 1), (5, 5, 5))
+    nodes = np.concatenate([one.nodes, other.nodes + 0.33])
+    elements = np.concatenate([one.elements, other.elements + len(one.nodes)])
+    with pytest.warns(SceneWarning) as said:
+        read_mesh((nodes, elements))
+    assert "falls into 2 parts of 750, 384 elements" in str(said[0].message)
+    assert "overlaps and counts mass twice: inside other elements are" in str(said[1].message)
+
+
+def test_a_volume_in_two_groups_of_msh_2() -> None:
+    """MSH 2.2 writes an element for each group: it is one, in both; in one group it is a fault."""
+    elements = np.array([[0, 1, 2, 3], [1, 2, 3, 4], [0, 1, 2, 3]])
+    nodes = np.concatenate([UNIT, [[1.0, 1, 1]]])
+
+    def grouped(tags: list[int]) -> meshio.Mesh:
+        return meshio.Mesh(
+            nodes, [("tetra", elements)], cell_data={"gmsh:physical": [np.array(tags)]},
+            field_data={"all": np.array([1, 3]), "core": np.array([2, 3])},
+        )  # fmt: skip
+
+    mesh = read_mesh(grouped([1, 1, 2]))
+    assert len(mesh.elements) == 2
+    assert mesh.element_sets["all"].tolist() == [0, 1]
+    assert mesh.element_sets["core"].tolist() == [0]
+    with pytest.warns(SceneWarning, match="the groups core are named"):
+        assert "the same four nodes" in refused(grouped([1, 1, 1]))
 
 
 def test_sets_of_skfem() -> None:
@@ -253,6 +285,7 @@ def test_all_problems_are_named_at_once() -> None:
 
 
 @pytest.mark.long
+@pytest.mark.filterwarnings("ignore::qdem_fem.files.SceneWarning")
 @given(
     changes=st.lists(
         st.tuples(
@@ -303,7 +336,8 @@ def test_flat_begins_at_the_stated_ratio(factor: float, sound: bool) -> None:
     """The longest edge of the unit element is sqrt(2); with height h its volume is h / 6."""
     nodes = UNIT * [1, 1, factor * FLAT * 6 * np.sqrt(8)]
     if sound:
-        assert len(read_mesh((nodes, [[0, 1, 2, 3]])).flipped) == 0
+        with pytest.warns(SceneWarning, match="at the place of another node: node 0"):
+            assert len(read_mesh((nodes, [[0, 1, 2, 3]])).flipped) == 0
     else:
         refused((nodes, [[0, 1, 2, 3]]))
 

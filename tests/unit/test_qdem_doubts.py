@@ -1,0 +1,82 @@
+"""Answers that are computed and hardly right: each gets a warning with its number."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import qdem_fem as q
+from qdem_fem.bodies import Body
+from qdem_fem.mesh import make_box_mesh
+from qdem_fem.scene.doubts import warn_of_strain
+from qdem_fem.tables.keys import SeriesTable
+from qdem_fem.tables.series import make_series
+from qdem_fem.tables.types import WrongKey
+
+
+def bar() -> Body:
+    return Body(make_box_mesh((1.0, 0.1, 0.1), (8, 1, 1)), q.Material(30e9, 0.2, 2400.0))
+
+
+def turned(body: Body, angle: float, stretch: float) -> np.ndarray:
+    """Displacement [m] of a bar that is stretched, then turned about y by ``angle`` [rad]."""
+    c, s = np.cos(angle), np.sin(angle)
+    x = body.nodes * [1 + stretch, 1, 1]
+    return x @ np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]]) - body.nodes
+
+
+@pytest.mark.parametrize("held", [True, False])
+@pytest.mark.parametrize(("angle", "warned"), [(0.02, True), (0.0002, False)])
+def test_small_strain_that_takes_a_turn_for_strain(held: bool, angle: float, warned: bool) -> None:
+    """cos(t) - 1 of a turn by t: 2e-4 beside a strain of 1e-4, and 2e-8; held or free."""
+    body = bar()
+    run = q.Simulation([body], strain="small", threads=1)
+    if held:
+        run.fix(body, body.nodes[:, 0] == 0)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        warn_of_strain(run, turned(body, angle, 1e-4))
+    assert [str(one.message) for one in said if "takes a turn" in str(one.message)] == [
+        str(one.message) for one in said
+    ]
+    assert bool(said) == warned
+
+
+def test_strains_below_what_single_precision_holds() -> None:
+    """2e-6 times 30 GPa is 60 kPa: a free body with less shows rounding; double precision none."""
+    for precision, strain, warned in (
+        ("float32", 1e-6, True), ("float32", 1e-5, False), ("float64", 1e-6, False),
+    ):  # fmt: skip
+        body = bar()
+        run = q.Simulation([body], precision=precision, threads=1)  # type: ignore[arg-type]
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            warn_of_strain(run, turned(body, 0.3, strain))
+        assert bool(said) == warned
+        assert all("6e+04 Pa" in str(one.message) for one in said)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "title", "factor"),
+    [
+        ("force", "F [kN]", 1e3), ("force", "F_kN", 1e3), ("pressure", "F (MPa)", 1e6),
+        ("value", "F in mm", 1e-3), ("force", "F [kPa]", None), ("pressure", "F [kN]", None),
+        ("value", "F [N]", None), ("force", "F [lbf]", None), ("force", "F", 1.0),
+    ],
+)  # fmt: skip
+def test_a_load_column_has_the_unit_of_its_key(
+    tmp_path: Path, quantity: str, title: str, factor: float | None
+) -> None:
+    """Decimal commas and milliseconds as laboratories write them; a unit of another is refused."""
+    (tmp_path / "load.csv").write_text(f"Time [ms];{title}\n0;0\n1;2,5\n")
+    table = SeriesTable(csv="load.csv", time="Time [ms]", value=title)
+    if factor is None:
+        with pytest.raises(WrongKey, match="is not known here"):
+            make_series(table, f"load.0.{quantity}", tmp_path, vector=False)
+        return
+    series = make_series(table.model_copy(), f"x.0.{quantity}", tmp_path, vector=False)
+    assert series.times[1] == pytest.approx(1e-3)
+    assert series.values[1] == pytest.approx(2.5 * factor)
