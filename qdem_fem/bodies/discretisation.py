@@ -119,16 +119,10 @@ def _integrate_means(body: Body, moved: Floats, free: bool, strain: Strain) -> F
     held = measure(apart, lame[:, None], mu[:, None]).sum(axis=1)
     whole = measure(apart.sum(axis=1), lame, mu)
     if free:  # what shifts and turns as a whole is no part of a mode
-        rigid = np.concatenate(
-            [
-                np.tile(np.eye(3), (len(moved), 1, 1)),
-                make_cross_matrix(body.nodes - body.nodes.mean(axis=0)),
-            ],
-            axis=2,
-        ).reshape(-1, 6)
-        moved = moved - (rigid @ np.linalg.lstsq(rigid, moved.ravel(), rcond=None)[0]).reshape(
-            -1, 3
-        )
+        turn = make_cross_matrix(body.nodes - body.nodes.mean(axis=0)).reshape(-1, 3)
+        rigid = np.hstack([np.tile(np.eye(3), (len(moved), 1)), turn])
+        whole_motion = rigid @ np.linalg.lstsq(rigid, moved.ravel(), rcond=None)[0]
+        moved = moved - whole_motion.reshape(-1, 3)
     u = moved[body.elements]
     mass = body.material.density * volume / 20
     square = (u**2).sum(axis=(1, 2))

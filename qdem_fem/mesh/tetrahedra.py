@@ -113,8 +113,9 @@ def read_mesh(source: Any, *, where: str = "") -> TetMesh:
     elements[flipped, 2:] = elements[flipped, :1:-1]
     if isinstance(source, TetMesh):
         flipped = np.union1d(flipped, source.flipped)
-    for text in find_doubts(nodes, elements, find_gradients(nodes, elements)[0]):
-        warn_user(f"{where}: {text}")
+    else:  # what others made
+        for text in find_doubts(nodes, elements, find_gradients(nodes, elements)[0]):
+            warn_user(f"{where}: {text}")
     used = np.zeros(len(nodes), bool)
     used[elements.reshape(-1)] = True
     return TetMesh(nodes, elements, flipped, np.flatnonzero(~used), node_sets, element_sets)

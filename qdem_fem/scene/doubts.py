@@ -28,17 +28,15 @@ def warn_of_values(scene: Scene, bodies: dict[str, Any]) -> None:
         size = float(np.ptp(body.nodes, axis=0).max())
         mass = float(body.material.density @ body.gradients[1])
         values.append(("body", size, f"body {body.name!r} of {mass:.3g} kg (key mesh.scale)"))
-        for quantity in ("young", "density"):
+        given: tuple[Quantity, ...] = ("density",) if body.rigid else ("density", "young")
+        for quantity in given:
             found = np.unique(getattr(body.material, quantity))
             where = f"material.{quantity} of {body.name!r}"
             values += [(quantity, float(one), where) for one in found[[0, -1]]]
     if scene.contact is not None:
         values.append(("friction", scene.contact.friction, "contact.friction"))
-        values += [
-            ("friction", plane.friction, f"contact.plane.{number}.friction")
-            for number, plane in enumerate(scene.contact.plane)
-            if plane.friction is not None
-        ]
+        for number, plane in enumerate(scene.contact.plane):
+            values.append(("friction", plane.friction or 0.0, f"contact.plane.{number}.friction"))
     said = (describe_implausible(*value) for value in values)
     for text in dict.fromkeys(one for one in said if one):
         warn_user(text)
@@ -80,7 +78,7 @@ def warn_of_strain(run: Any, moved: Floats) -> None:
         if not MEASURES[run.strain].OBJECTIVE and wrong > TURNED**2 * whole:
             warn_user(
                 f"{body.name} turns, and strain = {run.strain!r} takes a turn for strain: of it "
-                f'{100 * np.sqrt(wrong / whole):.2g} % is wrong; take "finger"'
+                f'{100 * np.sqrt(wrong / whole):.0f} % is wrong; take "finger"'
             )
         greatest = float(np.sqrt((true**2).sum(axis=(1, 2)).max()))
         if run.precision == "float32" and free and greatest < SINGLE:

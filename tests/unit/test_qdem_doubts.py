@@ -5,12 +5,14 @@ from __future__ import annotations
 import warnings
 from pathlib import Path
 
+import meshio
 import numpy as np
 import pytest
 
 import qdem_fem as q
 from qdem_fem.bodies import Body
-from qdem_fem.mesh import make_box_mesh
+from qdem_fem.files import MeshError
+from qdem_fem.mesh import make_box_mesh, read_mesh
 from qdem_fem.scene.doubts import warn_of_strain
 from qdem_fem.tables.keys import SeriesTable
 from qdem_fem.tables.series import make_series
@@ -80,3 +82,34 @@ def test_a_load_column_has_the_unit_of_its_key(
     series = make_series(table.model_copy(), f"x.0.{quantity}", tmp_path, vector=False)
     assert series.times[1] == pytest.approx(1e-3)
     assert series.values[1] == pytest.approx(2.5 * factor)
+
+
+def test_elements_inside_others_are_named() -> None:
+    """Two boxes in each other share no node: their mass in common would count twice."""
+    one, other = make_box_mesh((1, 1, 1), (4, 4, 4)), make_box_mesh((1, 1, 1), (5, 5, 5))
+    nodes = np.concatenate([one.nodes, other.nodes + 0.33])
+    elements = np.concatenate([one.elements, other.elements + len(one.nodes)])
+    with pytest.warns(q.SceneWarning) as said:
+        read_mesh((nodes, elements))
+    assert "falls into 2 parts of 750, 384 elements" in str(said[0].message)
+    assert "overlaps and counts mass twice: inside other elements are" in str(said[1].message)
+
+
+def test_a_volume_in_two_groups_of_msh_2() -> None:
+    """MSH 2.2 writes an element for each group: it is one, in both; in one group it is a fault."""
+    elements = np.array([[0, 1, 2, 3], [1, 2, 3, 4], [0, 1, 2, 3]])
+    nodes = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]])
+
+    def grouped(tags: list[int]) -> meshio.Mesh:
+        return meshio.Mesh(
+            nodes, [("tetra", elements)], cell_data={"gmsh:physical": [np.array(tags)]},
+            field_data={"all": np.array([1, 3]), "core": np.array([2, 3])},
+        )  # fmt: skip
+
+    mesh = read_mesh(grouped([1, 1, 2]))
+    assert len(mesh.elements) == 2
+    assert mesh.element_sets["all"].tolist() == [0, 1]
+    assert mesh.element_sets["core"].tolist() == [0]
+    repeated = pytest.raises(MeshError, match="the same four nodes")
+    with pytest.warns(q.SceneWarning, match="the groups core are named"), repeated:
+        read_mesh(grouped([1, 1, 1]))

@@ -114,36 +114,6 @@ def test_unused_nodes_are_listed_and_coincident_ones_allowed() -> None:
     assert len(mesh.flipped) == 0
 
 
-def test_elements_inside_others_are_named() -> None:
-    """Two boxes in each other share no node: their mass in common would count twice."""
-    one, other = make_box_mesh((1, 1, 1), (4, 4, 4)), make_box_mesh((1, 1, 1), (5, 5, 5))
-    nodes = np.concatenate([one.nodes, other.nodes + 0.33])
-    elements = np.concatenate([one.elements, other.elements + len(one.nodes)])
-    with pytest.warns(SceneWarning) as said:
-        read_mesh((nodes, elements))
-    assert "falls into 2 parts of 750, 384 elements" in str(said[0].message)
-    assert "overlaps and counts mass twice: inside other elements are" in str(said[1].message)
-
-
-def test_a_volume_in_two_groups_of_msh_2() -> None:
-    """MSH 2.2 writes an element for each group: it is one, in both; in one group it is a fault."""
-    elements = np.array([[0, 1, 2, 3], [1, 2, 3, 4], [0, 1, 2, 3]])
-    nodes = np.concatenate([UNIT, [[1.0, 1, 1]]])
-
-    def grouped(tags: list[int]) -> meshio.Mesh:
-        return meshio.Mesh(
-            nodes, [("tetra", elements)], cell_data={"gmsh:physical": [np.array(tags)]},
-            field_data={"all": np.array([1, 3]), "core": np.array([2, 3])},
-        )  # fmt: skip
-
-    mesh = read_mesh(grouped([1, 1, 2]))
-    assert len(mesh.elements) == 2
-    assert mesh.element_sets["all"].tolist() == [0, 1]
-    assert mesh.element_sets["core"].tolist() == [0]
-    with pytest.warns(SceneWarning, match="the groups core are named"):
-        assert "the same four nodes" in refused(grouped([1, 1, 1]))
-
-
 def test_sets_of_skfem() -> None:
     source = (
         skfem.MeshTet.init_tensor(*[np.linspace(0, 1, 3)] * 3)
