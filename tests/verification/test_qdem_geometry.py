@@ -105,6 +105,7 @@ def test_surface_does_not_depend_on_the_order_of_elements(body: tuple[TetMesh, f
     np.testing.assert_array_equal(faces, find_surface_faces(elements + (1 << 40)) - (1 << 40))
 
 
+@pytest.mark.filterwarnings("ignore::qdem_fem.files.SceneWarning")  # its parts are meant
 def test_surface_that_overlaps_itself_is_refused() -> None:
     three = np.array([[0, 1, 2, 3], [0, 2, 1, 4], [5, 6, 7, 8], [0, 1, 2, 9]])
     with pytest.raises(MeshError, match=r"3 elements \(0, 1, 3\) share the face .*\[0, 1, 2\]"):

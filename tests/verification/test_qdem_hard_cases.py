@@ -268,6 +268,7 @@ def step_of(nodes: Floats, elements: Integers) -> float:
     return 0.8 * run.critical_step.value
 
 
+@pytest.mark.filterwarnings("ignore::qdem_fem.files.SceneWarning")  # its parts are meant
 def test_parts_apart_move_as_each_alone() -> None:
     """Not to the bit: in another order of elements the forces of a node are summed otherwise."""
     count, pair = 200, [make_delaunay(200, seed) for seed in (1, 2)]
@@ -280,6 +281,7 @@ def test_parts_apart_move_as_each_alone() -> None:
     assert np.abs(joined - alone).max() < 1e-11 * np.abs(alone).max()
 
 
+@pytest.mark.filterwarnings("ignore::qdem_fem.files.SceneWarning")  # its parts are meant
 def test_nodes_of_no_element() -> None:
     """Between the others: listed, at rest, and felt by nobody to the bit."""
     nodes, elements = make_delaunay(200, 3)
@@ -299,6 +301,7 @@ def test_nodes_of_no_element() -> None:
     assert step_of(more, place[bare]) == pytest.approx(step, rel=1e-6)
 
 
+@pytest.mark.filterwarnings("ignore::qdem_fem.files.SceneWarning")  # its parts are meant
 def test_left_handed_elements() -> None:
     """Half of the elements turned over by a swap of two nodes: mended and listed.
 
@@ -320,6 +323,7 @@ def test_left_handed_elements() -> None:
 
 
 @pytest.mark.parametrize("shared", [1, 2])
+@pytest.mark.filterwarnings("ignore::qdem_fem.files.SceneWarning")  # its parts are meant
 def test_hinges(shared: int) -> None:
     """Two elements that share a node or an edge only: a mesh like any other, free in flight."""
     one = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])

@@ -123,6 +123,7 @@ def stretched(body: q.Body, scale: float, dtype: str, seed: int = 5) -> np.ndarr
 
 @pytest.mark.parametrize("name", MESHES)
 @pytest.mark.parametrize(("law", "precision", "viscous"), KERNELS)
+@pytest.mark.filterwarnings("ignore::qdem_fem.files.SceneWarning")  # its parts are meant
 def test_forces_are_those_of_numpy(law: Strain, precision: str, viscous: bool, name: str) -> None:
     """f = sum -V0 P grad N (eq. 11) against `reference_forces.internal_forces`, to round-off.
 
@@ -207,6 +208,7 @@ def test_threads_do_not_change_a_bit(precision: Any) -> None:
     assert np.abs(states[0].displacement).max() > 0
 
 
+@pytest.mark.filterwarnings("ignore::qdem_fem.files.SceneWarning")  # its parts are meant
 def test_windows_of_forces_are_empty_between_steps() -> None:
     """What a step adds to the windows it takes out again, also where chunks overlap."""
     body, run = simulation("chunks", "finger", "float64", False)

@@ -245,6 +245,7 @@ def test_free_body_is_named(held: list[tuple[Any, str]], free: int) -> None:
         run.relax()
 
 
+@pytest.mark.filterwarnings("ignore::qdem_fem.files.SceneWarning")  # its parts are meant
 def test_loose_part_of_a_mesh_is_named() -> None:
     """A body in two parts, one of them held."""
     mesh = make_box_mesh((0.4, 0.1, 0.1), (2, 1, 1))
