@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from pathlib import Path
+from types import SimpleNamespace
 
 import meshio
 import numpy as np
@@ -11,9 +12,11 @@ import pytest
 
 import qdem_fem as q
 from qdem_fem.bodies import Body
-from qdem_fem.files import MeshError
+from qdem_fem.files import EnergyLost, MeshError
 from qdem_fem.mesh import make_box_mesh, read_mesh
 from qdem_fem.scene.doubts import warn_of_strain
+from qdem_fem.scene.energy_account import EnergyAccount
+from qdem_fem.scene.run import _Record
 from qdem_fem.tables.keys import SeriesTable
 from qdem_fem.tables.series import make_series
 from qdem_fem.tables.types import WrongKey
@@ -113,3 +116,17 @@ def test_a_volume_in_two_groups_of_msh_2() -> None:
     repeated = pytest.raises(MeshError, match="the same four nodes")
     with pytest.warns(q.SceneWarning, match="the groups core are named"), repeated:
         read_mesh(grouped([1, 1, 1]))
+
+
+@pytest.mark.parametrize(
+    ("overlap", "cause"), [(100.0, "bodies begin in each other, with 100 J"), (0.0, "shorter step")]
+)
+def test_a_gap_in_the_account_is_blamed_on_its_cause(overlap: float, cause: str) -> None:
+    """2 of 100 J are missing: after an overlap it is not the step that made them."""
+    account = EnergyAccount()
+    rows = {"kinetic": [0.0, 98.0], "elastic": [0.0, 0], "external": [0.0, 100 - overlap]}
+    rows["contact"] = [overlap, 0.0]
+    account.add_rows({name: np.array(values) for name, values in rows.items()})
+    record = SimpleNamespace(account=account, audit=1e-3, run=SimpleNamespace(time=0, steps_done=0))
+    with pytest.raises(EnergyLost, match=cause):
+        _Record.check_audit(record)  # type: ignore[arg-type]
