@@ -22,7 +22,13 @@ from rigid_lcp.contact.manifold import (
     is_within_face,
     keep_outer,
 )
-from rigid_lcp.contact.near_pairs import HALF_SPACE, ZERO, bound_shapes, find_near_pairs, order_by_pair
+from rigid_lcp.contact.near_pairs import (
+    HALF_SPACE,
+    ZERO,
+    bound_shapes,
+    find_near_pairs,
+    order_by_pair,
+)
 from rigid_lcp.contact.placed_solids import MOST_EDGES, POLYHEDRON, SPHERE, Shapes3D, place_solids
 from rigid_lcp.contact.separation import Solids, dot
 from rigid_lcp.contact.solids import CORNER_EDGE, CORNERS, EDGE_CORNER, find_solid_contacts
