@@ -69,7 +69,6 @@ def choose_command(arguments: argparse.Namespace) -> Callable[[argparse.Namespac
     if arguments.verb not in RUN_VERBS:
         return command
     refuse_links(arguments.run_folder)
-    refuse_links(arguments.run_folder / getattr(arguments, "variant", ""))
     kind = find_kind(arguments.run_folder)
     if kind is None or not kind.states:
         return command

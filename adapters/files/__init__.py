@@ -2,8 +2,9 @@
 
 from adapters.files.dump import Frame, Kind, write_dump
 from adapters.files.dump_reader import read_frames
+from adapters.files.full_disk import explain_full_disk
 from adapters.files.load_series import LoadSeries, read_load_series
-from adapters.files.run_folder import COLUMNS, Outcome, RunFolder, explain_full_disk, place_stage
+from adapters.files.run_folder import COLUMNS, Outcome, RunFolder, place_stage
 from adapters.files.series import make_too_few_error, read_series
 from adapters.files.settlement_table import UNKNOWN, Series
 from adapters.files.states import check_state_name, read_state_file, write_state_file

@@ -15,20 +15,19 @@ import re
 import shutil
 import time
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field, replace
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
-from adapters.errors import EngineFailed, NotCredible, UsageError
-from trackbed.errors import NO_ROOM, DiskFull
+from adapters.errors import UsageError
 from trackbed.run_files import (
-    append_line,
+    append_text,
     digest_file,
     lock_folder,
     read_object,
     refuse_format,
-    refuse_links,
     seal_file,
     sync_folder,
     write_whole,
@@ -64,8 +63,6 @@ class Outcome:
 
 NEEDED = ("*.npz", "end.restart")
 """Files of a stage that a run goes on from; the others may be removed to save space."""
-FREE_LEAST = 2**20
-"""Free space below which a disk counts as full when an engine has failed [bytes]."""
 MANIFEST = ("scene", "overrides", "control")
 """What a manifest must hold for its run to be resumed."""
 ASKED_ON = "asked to go on cycle by cycle"
@@ -76,6 +73,19 @@ STAGE = re.compile(r"preparation|jump_\d{6,}_\d+|window_\d{6,}")
 """Name of a stage's folder."""
 SEAL = "seal"
 """Key of an ``outcome.json`` with the SHA-256 of the others; older records have none."""
+
+
+@dataclass
+class Listing:
+    """What is in a folder whose lock we hold: nobody else makes or moves stages there, so it is
+    read once, and a further stage costs as much as the first."""
+
+    names: list[str]
+    """Of all stages, in order."""
+    finished: dict[str, Outcome]
+    """Those finished, in order, without failed jumps."""
+    table: tuple[int, ...] = ()
+    """Identity of the ``settlement.csv`` that has all their rows."""
 
 
 def place_stage(name: str) -> tuple[int, int, str]:
@@ -92,16 +102,30 @@ class RunFolder:
         self._known: dict[str, tuple[list[tuple[str, tuple[int, ...]]], bool, Outcome, str]] = {}
         """Of stages read before: identities of their files, whether their digests were looked at,
         outcome, and rows of the table."""
+        self._listing: Listing | None = None
 
-    def lock(self) -> AbstractContextManager[object]:
+    @contextmanager
+    def lock(self) -> Iterator[None]:
         """Hold the folder's only writer's lock; see `trackbed.run_files.lock_folder`."""
-        return lock_folder(self.path, "lock")
+        with lock_folder(self.path, "lock"):
+            self._listing = self._list_stages()
+            try:
+                yield
+            finally:
+                self._listing = None
+
+    def enter(self, variant: str) -> RunFolder:
+        """The folder of a ``variant`` inside, made if need be, for who holds the lock of this."""
+        inner = RunFolder(self.path / variant)
+        inner.path.mkdir(exist_ok=True)
+        inner._listing = inner._list_stages()
+        return inner
 
     def add_event(self, what: str, **details: object) -> None:
         """Append one line to ``events.jsonl``."""
         now = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
         line = json.dumps({"time": now, "event": what, **details})
-        append_line(self.path / "events.jsonl", line)
+        append_text(self.path / "events.jsonl", line + "\n")
 
     def keep_cycle_by_cycle(self, now: bool) -> bool:
         """Whether this run was asked to compute where it may not jump, ``now`` or ever before."""
@@ -145,6 +169,8 @@ class RunFolder:
             whole = False
         if not whole:
             self._known.pop(name, None)
+            if self._listing is not None:
+                self._listing.finished.pop(name, None)
             return None
         cells = ([row.get(column) for column in COLUMNS] for row in outcome.rows)
         rows = (",".join("" if cell is None else str(cell) for cell in row) for row in cells)
@@ -153,6 +179,8 @@ class RunFolder:
 
     def stage_names(self) -> list[str]:
         """Names of all stage folders in the order of the run."""
+        if self._listing is not None:
+            return list(self._listing.names)
         if not self.path.exists():
             return []
         with os.scandir(self.path) as entries:
@@ -164,13 +192,13 @@ class RunFolder:
 
     def outcomes(self) -> list[Outcome]:
         """Outcomes of all finished stages in order; failed jumps are left out."""
-        finished = (self.outcome(name, verify=False) for name in self._kept_stages())
-        return [outcome for outcome in finished if outcome is not None]
+        return list((self._listing or self._list_stages()).finished.values())
 
-    def _kept_stages(self) -> list[str]:
-        """Names of all stage folders in order, without those of failed jumps."""
+    def _list_stages(self) -> Listing:
         names = self.stage_names()
-        return [name for name in names if not (name.startswith("jump") and self.failure(name))]
+        kept = (name for name in names if not (name.startswith("jump") and self.failure(name)))
+        found = {name: self.outcome(name, verify=False) for name in kept}
+        return Listing(names, {name: one for name, one in found.items() if one is not None})
 
     def failure(self, name: str) -> str:
         """Why a jump was given up, or an empty text."""
@@ -192,6 +220,10 @@ class RunFolder:
         folder = self.path / name
         folder.mkdir(exist_ok=True)
         write_whole(folder / "failed.json", json.dumps({"why": why, **details}) + "\n")
+        if self._listing is not None:
+            self._listing.finished.pop(name, None)
+            if name not in self._listing.names:
+                self._listing.names.append(name)
         self.add_event("jump failed", stage=name, why=why)
         self.write_settlement()
 
@@ -200,10 +232,11 @@ class RunFolder:
 
         What is there already is unfinished, damaged, or comes after it: it is moved away.
         """
-        refuse_links(self.path)
-        for other in self.stage_names():
-            if place_stage(other) >= place_stage(name):
-                self.discard(self.path / other)
+        behind = takewhile(
+            lambda other: place_stage(other) >= place_stage(name), reversed(self.stage_names())
+        )
+        for other in reversed(list(behind)):
+            self.discard(self.path / other)
         partial = self.path / "partial"
         if partial.exists():
             for leftover in sorted(partial.iterdir()):
@@ -229,7 +262,7 @@ class RunFolder:
         folder.rename(place)
         sync_folder(self.path)
         self._known.pop(folder.name, None)
-        self.write_settlement()
+        self._add_rows(folder.name)
         return place
 
     def discard(self, folder: Path) -> None:
@@ -242,14 +275,32 @@ class RunFolder:
         while (home / f"{folder.name}.{number}").exists():
             number += 1
         folder.rename(home / f"{folder.name}.{number}")
+        if self._listing is not None and folder.parent == self.path:
+            self._listing.names.remove(folder.name)
+            self._listing.finished.pop(folder.name, None)
         self.add_event("discarded", stage=folder.name, to=f"discarded/{folder.name}.{number}")
 
     def write_settlement(self) -> None:
         """Write ``settlement.csv`` from the outcomes of all finished stages."""
-        names = self._kept_stages()
-        kept = [name for name in names if name in self._known or self.outcome(name, verify=False)]
-        rows = [self._known[name][3] for name in kept]
-        write_whole(self.path / "settlement.csv", ",".join(COLUMNS) + "\n" + "".join(rows))
+        listing = self._listing or self._list_stages()
+        rows = [self._known[name][3] for name in listing.finished]
+        path = self.path / "settlement.csv"
+        write_whole(path, ",".join(COLUMNS) + "\n" + "".join(rows))
+        listing.table = _identify(str(path))
+
+    def _add_rows(self, name: str) -> None:
+        """Put the rows of a stage that was just finished behind those in ``settlement.csv``; the
+        table is written again where it is not as we left it."""
+        path, listing = self.path / "settlement.csv", self._listing
+        found = self.outcome(name, verify=False)
+        if listing is not None and found is not None:  # `begin` has left none behind it
+            listing.names.append(name)
+            listing.finished[name] = found
+            if listing.table and path.exists() and _identify(str(path)) == listing.table:
+                append_text(path, self._known[name][3])
+                listing.table = _identify(str(path))
+                return
+        self.write_settlement()
 
     def manifest(self) -> dict[str, Any]:
         """The manifest; raises `UsageError` when this is no run folder."""
@@ -285,6 +336,9 @@ class RunFolder:
             shutil.rmtree(temporary, ignore_errors=True)
             shutil.copytree(other.path / name, temporary, copy_function=_link)
             temporary.rename(here)
+        if self._listing is not None:
+            self._listing = None
+            self._listing = self._list_stages()
         self.write_settlement()
 
 
@@ -318,34 +372,3 @@ def _link(source: str, target: str) -> None:
         os.link(source, target)
     except OSError:  # another file system, or one without hard links
         shutil.copy2(source, target)
-
-
-@contextmanager
-def explain_full_disk(path: Path) -> Iterator[None]:
-    """Turn the system's "no space left" into a sentence that says what is safe.
-
-    An engine does not always notice: what it left is cut short, and the disk tells why.
-    """
-    try:
-        yield
-    except OSError as error:
-        if error.errno not in NO_ROOM:
-            raise
-        raise _make_disk_error(path, str(error.strerror)) from error
-    except DiskFull as error:
-        raise _make_disk_error(path, f"{error.where} {error.what}") from error
-    except (EngineFailed, NotCredible) as error:
-        free = shutil.disk_usage(path).free
-        if free >= FREE_LEAST or (isinstance(error, EngineFailed) and error.from_outside):
-            raise
-        raise _make_disk_error(path, f"{free} bytes left") from error
-
-
-def _make_disk_error(path: Path, why: str) -> EngineFailed:
-    full = EngineFailed(
-        f"the disk is full ({why})",
-        where=str(path),
-        remedy="free some space, then: trackbed resume RUN; finished windows are whole",
-    )
-    full.from_outside = True
-    return full

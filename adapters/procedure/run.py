@@ -112,8 +112,7 @@ def run_variant(
     if variant.name == "procedure":
         here = folder
     else:
-        here = RunFolder(folder.path / variant.name)
-        here.path.mkdir(exist_ok=True)
+        here = folder.enter(variant.name)
         here.share_start(folder, count_shared_cycles(folder, scene, variant))
         progress.print_line(variant.name.replace("_", " "))
     run = Run(scene, here, engine, variant, progress, cycle_by_cycle)

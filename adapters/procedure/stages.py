@@ -98,6 +98,8 @@ class Run:
     """Where no jump is allowed: True computes every cycle, False refuses."""
     clock: Clock = field(default_factory=Clock)
     computed_here: int = 0
+    computed_before: int | None = None
+    """Cycles that earlier processes computed; None before they are counted."""
 
     @property
     def procedure(self) -> Procedure:
@@ -355,9 +357,11 @@ def _watch(run: Run, bed: Bed, folder: Path) -> Callable[[], None]:
     """A function that shows progress from what the engine has written so far."""
     procedure = run.procedure
     outcomes = run.folder.outcomes()
-    computed = sum(o.last_cycle - o.first_cycle for o in outcomes if o.stage == "window")
-    rows = [row for outcome in outcomes for row in outcome.rows]
-    settlement = rows[-1]["settlement"] if rows else None
+    if run.computed_before is None:
+        windows = (o for o in outcomes if o.stage == "window")
+        run.computed_before = sum(o.last_cycle - o.first_cycle for o in windows)
+    computed = run.computed_before + run.computed_here
+    settlement = next((o.rows[-1]["settlement"] for o in reversed(outcomes) if o.rows), None)
 
     def watch() -> None:
         here = run.engine.cycles_done(run.scene, bed.start, folder)

@@ -16,7 +16,7 @@ import pytest
 
 from trackbed.errors import DiskFull, UsageError
 from trackbed.run_files.folder import RunFolder, lock_folder, refuse_links
-from trackbed.run_files.whole import append_line, replace_file, seal_file, write_whole
+from trackbed.run_files.whole import append_text, replace_file, seal_file, write_whole
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("adapters.files.run_folder", "qdem_fem.scene.run", "rigid_lcp.scene.run_folder")
@@ -70,19 +70,27 @@ def test_second_writer_is_refused(room: str, tmp_path: Path) -> None:
         assert f"pid {os.getpid()} on " in (tmp_path / name).read_text()
 
 
-@pytest.mark.parametrize("name", [".lock", "state_1", "notes"])
+@pytest.mark.parametrize("name", [".lock", "state_1", "notes", "stage/deep/notes"])
 def test_links_are_refused(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A symbolic link in the folder is named; the file behind it is neither cut nor read."""
     (tmp_path / "mine").write_text("mine")
     folder = Folder(tmp_path / "run")
-    folder.path.mkdir()
+    (folder.path / name).parent.mkdir(parents=True, exist_ok=True)
     (folder.path / name).symlink_to(tmp_path / "mine")
     with pytest.raises(UsageError, match=rf"run: .*symbolic link \({name}\)"), folder.lock():
         pass
     assert (tmp_path / "mine").read_text() == "mine"
-    monkeypatch.setattr(Path, "iterdir", Mock(side_effect=PermissionError))
+    monkeypatch.setattr(os, "scandir", Mock(side_effect=PermissionError))
     with pytest.raises(UsageError, match="get leave to read it"):
         refuse_links(folder.path)
+
+
+def test_what_has_no_end_is_refused(tmp_path: Path) -> None:
+    """A pipe among the files of a run would be waited for; a device read until memory is full."""
+    (tmp_path / "stage").mkdir()
+    os.mkfifo(tmp_path / "stage" / "end.restart")
+    with pytest.raises(UsageError, match=r"pipe or device \(stage/end.restart\)"):
+        refuse_links(tmp_path)
 
 
 def test_a_lock_that_becomes_a_link_is_not_followed(
@@ -169,7 +177,7 @@ def test_no_file_is_written_through_a_link(tmp_path: Path) -> None:
     link = tmp_path / "link"
     link.symlink_to(tmp_path / "mine")
     with pytest.raises(OSError, match="symbolic"):
-        append_line(link, "more")
+        append_text(link, "more")
     (tmp_path / f".link.{os.getpid()}.partial").symlink_to(tmp_path / "mine")
     with pytest.raises(UsageError, match="symbolic link"):
         write_whole(link, "new")

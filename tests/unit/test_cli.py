@@ -334,7 +334,7 @@ def test_validate_record(
 
 def test_a_full_disk_has_one_exit_code(tmp_path: Path) -> None:
     """5 in all packages, and no other refusal to write has it."""
-    from adapters.files.run_folder import explain_full_disk
+    from adapters.files.full_disk import explain_full_disk
     from trackbed.run_files.whole import refuse_writing
 
     def code(number: int, shown: Callable[[Path], AbstractContextManager[None]]) -> int:

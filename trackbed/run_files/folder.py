@@ -1,7 +1,7 @@
 """The folder of one run: its only writer's lock, its manifest, what may be written over.
 
 A run folder may come from anyone, so nothing in it is followed out of it: a symbolic link is
-refused.  Files that are no run's are left alone.
+refused, and so is what has no end.  Files that are no run's are left alone.
 """
 
 from __future__ import annotations
@@ -26,22 +26,30 @@ FORMAT = 1
 
 
 def refuse_links(path: Path) -> None:
-    """Raise `UsageError` if the folder holds a symbolic link, which what writes there would follow,
-    or can not be read.  What is no folder holds none."""
-    links: list[str] = []
+    """Raise `UsageError` if there is a symbolic link in the folder, however deep, which what reads
+    and writes there would follow, or a pipe or device, which has no end; or if it can not be read.
+    What is no folder holds none."""
+    folders, strange = [path], []
     with suppress(FileNotFoundError, NotADirectoryError):
         try:
-            links = sorted(entry.name for entry in path.iterdir() if entry.is_symlink())
+            while folders:
+                with os.scandir(folders.pop()) as entries:
+                    for entry in entries:
+                        if entry.is_dir(follow_symlinks=False):
+                            folders.append(Path(entry.path))
+                        elif not entry.is_file(follow_symlinks=False):
+                            kind = "symbolic link" if entry.is_symlink() else "pipe or device"
+                            strange.append((kind, str(Path(entry.path).relative_to(path))))
         except PermissionError as error:
             raise UsageError(
                 "this folder can not be read", where=str(path), remedy="get leave to read it"
             ) from error
-    if links:
+    for kind, name in sorted(strange)[:1]:
         raise UsageError(
-            f"this run folder holds a symbolic link ({', '.join(links[:3])}), which may lead "
-            "anywhere; nothing was read or changed there",
+            f"this run folder holds a {kind} ({name}), which may lead anywhere; nothing was read "
+            "or changed there",
             where=str(path),
-            remedy="remove the link, or put the files themselves in its place",
+            remedy="remove it, or put the files themselves in its place",
         )
 
 

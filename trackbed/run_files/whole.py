@@ -75,10 +75,10 @@ def write_whole(path: Path, content: str | bytes) -> None:
         stream.write(content.encode() if isinstance(content, str) else content)
 
 
-def append_line(path: Path, line: str) -> None:
-    """Append a line of text to a file; raises `OSError`, ELOOP for a symbolic link."""
+def append_text(path: Path, text: str) -> None:
+    """Append lines of text to a file; raises `OSError`, ELOOP for a symbolic link."""
     with open_unlinked(path, "a") as stream:
-        stream.write(line + "\n")
+        stream.write(text)
 
 
 def seal_file(path: Path) -> str:
