@@ -9,7 +9,7 @@ import time
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from trackbed.run_files import add_run_arguments, place_run, refuse_both
+from trackbed.run_files import add_run_arguments, place_run, refuse_both, time_step
 
 if TYPE_CHECKING:
     from rigid_lcp.scene import SceneFile, Simulation
@@ -50,12 +50,13 @@ def _format_value(value: Any) -> str:
 
 
 def _preview_run(file: SceneFile) -> dict[str, Any]:
-    """What a run would be: bodies, steps, what is left out."""
+    """What a run would be: bodies, steps, about what they cost, what is left out."""
     from rigid_lcp.scene import count_unknowns, list_left_out, make_simulation, plan_steps
 
     _, run = make_simulation(file)
     tables = file.tables.run
     steps, step = plan_steps(file)
+    seconds = time_step(run.advance, step, steps)
     return {
         "title": file.tables.title,
         "method": tables.method,
@@ -64,6 +65,7 @@ def _preview_run(file: SceneFile) -> dict[str, Any]:
         "step": step,
         "unknowns_a_contact": count_unknowns(file),
         "frames": tables.frames,
+        "estimated_s": seconds * steps,
         "left_out": list_left_out(file),
     }
 

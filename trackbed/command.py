@@ -122,8 +122,17 @@ def explain_import(error: ImportError) -> str:
     )
 
 
+def find_interrupt(error: BaseException | None) -> BaseException | None:
+    """The Ctrl-C that an error came of: what compiles or unpacks wraps it in one of its own."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        explained = isinstance(error, TrackbedError | OSError)
+        error = error.__cause__ or (None if explained else error.__context__)
+    return error
+
+
 def explain_error(error: BaseException) -> tuple[str, int]:
     """What to say of an error, and the exit code."""
+    error = find_interrupt(error) or error
     if isinstance(error, TrackbedError | Interrupted):
         return str(error), error.exit_code
     if isinstance(error, KeyboardInterrupt):

@@ -25,9 +25,13 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
             help="where the bed ratchets or collapses, so that no jump is allowed, or a jump and "
             "its shorter tries failed, compute cycles instead of stopping with exit code 6",
         )  # fmt: skip
+    if verb == "resume":
+        parser.add_argument(
+            "--cycles", type=int, metavar="N", help="extend the run to N cycles in all"
+        )
     elif verb == "status":
         add_json(parser)
-    else:
+    elif verb == "report":
         parser.add_argument("--open", action="store_true", help="show it, when there is a display")
     commands = {
         "run": run_command, "resume": run_resume, "status": run_status, "report": run_report,
@@ -57,7 +61,10 @@ def register_run(parser: argparse.ArgumentParser) -> None:
         "--cycles", type=int, metavar="N", help="short for --set procedure.total_cycles=N"
     )
     parser.add_argument(
-        "--dry-run", action="store_true", help="write the decks and print the engine's command"
+        "--dry-run",
+        action="store_true",
+        help="say what would run and about what it would cost, write the decks, and print the "
+        "engine's command",
     )
 
 
@@ -96,7 +103,9 @@ def run_resume(arguments: argparse.Namespace) -> int:
     """Go on with a run from its last window that passes the checks."""
     from adapters.procedure import run as procedure
 
-    procedure.resume(arguments.run_folder, cycle_by_cycle=arguments.cycle_by_cycle)
+    procedure.resume(
+        arguments.run_folder, cycles=arguments.cycles, cycle_by_cycle=arguments.cycle_by_cycle
+    )
     return 0
 
 

@@ -89,6 +89,10 @@ class Engine(Protocol):
     def auto_order(self) -> int | None:
         """Place among those that ``auto`` tries, lowest first; None: never, without mechanics."""
 
+    @property
+    def grain_steps_per_s(self) -> float:
+        """Time steps of a grain in a second of CPU time, for what a run will about cost."""
+
     def program(self) -> list[str] | None:
         """Words that start the engine's program; None where it is not installed."""
 

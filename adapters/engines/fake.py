@@ -58,6 +58,7 @@ class FakeEngine:
 
     name = "fake"
     auto_order = None
+    grain_steps_per_s = 1e9  # it computes none
 
     def program(self) -> list[str] | None:
         """There is none."""

@@ -63,6 +63,7 @@ class LammpsEngine(DeckEngine):
 
     name = "lammps"
     auto_order = 1
+    grain_steps_per_s = 2.4e6  # tens of thousands of grains on one core: docs/engines.md
     package = "lammps_inputs"
     title, banner = "LAMMPS", BANNER
     oldest = (2025,)  # from then on every style of the decks is there

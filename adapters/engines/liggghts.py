@@ -25,6 +25,7 @@ class LiggghtsEngine(DeckEngine):
 
     name = "liggghts"
     auto_order = 0
+    grain_steps_per_s = 3.5e6  # tens of thousands of grains on one core: docs/engines.md
     package = "liggghts_inputs"
     title, banner, oldest = "LIGGGHTS", BANNER, (3, 8)
     remedy = "sudo apt-get install liggghts"

@@ -17,6 +17,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import repeat
+from math import inf
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -38,6 +39,9 @@ class ProcessNumbers:
     start_s: float = 30  # from its start in which a second one beside it is looked for [s]
     start_bytes: int = 1 << 16  # of its print in which the engines' first words are looked for
     patience_s: float = 60  # for a program to print its version [s]
+    silent_s: float = 7200
+    """Without a word in any file before an engine is ended [s]: ten million grains on one core
+    write a line in an hour."""
 
 
 PROCESS = ProcessNumbers()
@@ -49,12 +53,13 @@ def _die_with_parent() -> None:
 
 
 def run_process(
-    command: Sequence[str], folder: Path, watch: Callable[[], None]
+    command: Sequence[str], folder: Path, watch: Callable[[], None], silent_s: float = inf
 ) -> tuple[int, float, float]:
     """Run ``command`` in ``folder``, output to ``screen.txt``; exit status, CPU s, elapsed s.
 
     On any exception, Ctrl-C included, it is ended first as `end_process` does.
-    Raises `EngineMissing` when the program cannot be started.
+    Raises `EngineMissing` when the program cannot be started, `EngineFailed` when it writes
+    nothing in its folder for ``silent_s``.
     """
     environment = os.environ | {
         "OMPI_ALLOW_RUN_AS_ROOT": "1",
@@ -79,11 +84,17 @@ def run_process(
                 remedy="install it, or correct the scene's engine.launcher; see: trackbed doctor",
             ) from error
         try:
-            pid = 0
+            pid, written, silent = 0, 0, 0.0
             while pid == 0:
                 pause = max(PROCESS.poll_s, PROCESS.poll_share * (time.monotonic() - started))
-                time.sleep(min(pause, PROCESS.poll_most_s))
+                pause = min(pause, PROCESS.poll_most_s)
+                time.sleep(pause)
                 watch()
+                # pauses are summed: a batch system may have halted us both for a day
+                now = find_last_change(folder)
+                written, silent = now, silent + pause if now == written else 0.0
+                if silent > silent_s:
+                    raise explain_silence(folder, silent)
                 pid, status, usage = os.wait4(child.pid, os.WNOHANG)
         except BaseException:
             end_process(child)
@@ -111,6 +122,24 @@ def end_process(child: subprocess.Popen[bytes]) -> None:
         with suppress(ProcessLookupError):
             os.killpg(child.pid, signal.SIGKILL)
         child.wait()
+
+
+def find_last_change(folder: Path) -> int:
+    """Time of the last change of a file in a folder [ns]."""
+    with os.scandir(folder) as entries:
+        return max((one.stat(follow_symlinks=False).st_mtime_ns for one in entries), default=0)
+
+
+def explain_silence(folder: Path, silent_s: float) -> EngineFailed:
+    """The error for an engine that hangs, with its last words; no jump is to blame for it."""
+    error = EngineFailed(
+        f"the engine wrote nothing for {silent_s / 60:.3g} minutes and was ended; its last "
+        f"words: {read_screen_tail(folder) or 'none'}",
+        where=str(folder),
+        remedy="look whether its launcher or disk hangs, then: trackbed resume RUN",
+    )
+    error.from_outside = True
+    return error
 
 
 CRASHES = (signal.SIGSEGV, signal.SIGFPE, signal.SIGABRT, signal.SIGBUS, signal.SIGILL)
@@ -301,7 +330,7 @@ class ProcessEngine(ABC):
                 refuse_several(folder, self.begun, self.launch)
             watch()
 
-        status, cpu_s, wall_s = run_process(command, folder, watch_start)
+        status, cpu_s, wall_s = run_process(command, folder, watch_start, PROCESS.silent_s)
         refuse_several(folder, self.begun, self.launch)
         text = (folder / "screen.txt").read_text(errors="replace")
         if "NOT SETTLED" in text:

@@ -44,6 +44,7 @@ class YadeEngine(ProcessEngine):
 
     name = "yade"
     auto_order = 2
+    grain_steps_per_s = 0.58e6  # tens of thousands of grains on one core: docs/engines.md
     title, question, banner = "Yade", "--version", BANNER
     oldest = (2023,)  # from then on walls are known to be flat when asked (``hertzian``)
     remedy = "sudo apt-get install yade"

@@ -2,14 +2,14 @@
 
 from adapters.jumps.band import BAND_PROBABILITY, Band, estimate_band
 from adapters.jumps.check import accept, judge, reject
-from adapters.jumps.control import Control, Decision, Settings, decide, join_stretch, observe
+from adapters.jumps.control import JUMP, Control, Decision, Settings, decide, join_stretch, observe
 from adapters.jumps.forecast import fit_forecast
 from adapters.jumps.rates import Stretch, find_rates
 from adapters.jumps.schedule import schedule_jumps
 from adapters.jumps.slopes import Jumped, Landing, estimate_slopes, find_asked_gain, remove_moves
 
 __all__ = [
-    "BAND_PROBABILITY", "Band", "Control", "Decision", "Jumped", "Landing", "Settings", "Stretch",
-    "accept", "decide", "estimate_band", "estimate_slopes", "find_asked_gain", "find_rates",
+    "BAND_PROBABILITY", "JUMP", "Band", "Control", "Decision", "Jumped", "Landing", "Settings",
+    "Stretch", "accept", "decide", "estimate_band", "estimate_slopes", "find_asked_gain", "find_rates",
     "fit_forecast", "join_stretch", "judge", "observe", "reject", "remove_moves", "schedule_jumps",
 ]  # fmt: skip

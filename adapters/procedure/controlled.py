@@ -39,6 +39,9 @@ from adapters.procedure.record import CHECK, DECISION, make_plain
 from adapters.procedure.seating import seat_piston, warn_if_hung
 from adapters.procedure.stages import Bed, Run
 
+ASKED = ("action", "jump", "window")
+"""What tells two decisions from one state: a run that was extended decides its end again."""
+
 
 def settle_controlled(run: Run, bed: Bed) -> Bed:
     """From the bed after k_i cycles to the end: windows and jumps as the controller decides.
@@ -202,7 +205,7 @@ class Journal:
     def __init__(self, run: Run) -> None:
         self._run = run
         self._known = {
-            (event["event"], event["cycle"], event["attempt"], event.get("action"))
+            (event["event"], event["cycle"], event["attempt"], *map(event.get, ASKED))
             for event in run.folder.events()
             if event["event"] in (DECISION, CHECK)
         }
@@ -210,7 +213,7 @@ class Journal:
 
     def write(self, what: str, cycle: int, attempt: int, content: Mapping[str, Any]) -> None:
         """One event, unless it is there; a run that cannot jump says so on the screen, once."""
-        key = (what, cycle, attempt, content.get("action"))
+        key = (what, cycle, attempt, *map(content.get, ASKED))
         if key in self._known:
             return
         self._known.add(key)

@@ -18,6 +18,7 @@ from adapters.files import RunFolder, explain_full_disk
 from adapters.procedure import stages
 from adapters.procedure.controlled import settle_controlled
 from adapters.procedure.fixed import settle_fixed
+from adapters.procedure.outlook import describe_plan, warn_without_jumps
 from adapters.procedure.progress import Progress
 from adapters.procedure.stages import Bed, Clock, Run, Variant
 from adapters.scene import Scene, load_scene
@@ -61,7 +62,7 @@ def run_scene(
         overrides = [*overrides, f'engine.name="{name}"']
         scene = load_scene(scene_path, overrides)
         progress.print_line(f"engine: {scene.engine.name}")
-    for warning in scene.warnings:
+    for warning in (*scene.warnings, *warn_without_jumps(scene)):
         progress.print_line(f"warning: {warning}")
     if dry_run:
         _write_dry_run(scene, run_path)
@@ -73,17 +74,47 @@ def run_scene(
 
 
 def resume(
-    run_path: Path, *, cycle_by_cycle: bool = False, progress: Progress | None = None
-) -> None:
-    """Go on with the run in ``run_path`` from its last whole stage; see `run_scene`."""
+    run_path: Path, *, cycles: int | None = None, cycle_by_cycle: bool = False,
+    progress: Progress | None = None,
+) -> None:  # fmt: skip
+    """Go on with the run in ``run_path`` from its last whole stage, to more ``cycles`` in all if
+    given; see `run_scene`."""
     folder = RunFolder(run_path)
     manifest = folder.manifest()
     scene = load_scene(run_path / "scene.toml", manifest["overrides"])
     with allow_interrupts(), explain_full_disk(run_path), folder.lock():
         refuse_differences(manifest["scene"], record_scene(scene), run_path)
+        if cycles is not None and (
+            scene.procedure is None or cycles != scene.procedure.total_cycles
+        ):
+            scene = extend(folder, manifest, scene, cycles)
         folder.add_event("resumed")
         asked = folder.keep_cycle_by_cycle(cycle_by_cycle)
         _run_all(folder, scene, manifest["control"], asked, progress or Progress())
+
+
+def extend(folder: RunFolder, manifest: dict[str, Any], scene: Scene, cycles: int) -> Scene:
+    """The scene of a run to more ``cycles`` in all, which its manifest then holds.
+
+    The stages are those of a run that was asked for so many from the start; what its last ones
+    computed because the end was near goes to discarded/.  The lengths of jumps stay.
+    """
+    p = scene.procedure
+    if p is None or cycles < p.total_cycles:
+        have = f"this run is of {p.total_cycles} cycles" if p else "this run has no load cycles"
+        raise UsageError(
+            f"{have}, and can not be shortened to {cycles}" if p else have,
+            where=str(folder.path), remedy="give more cycles, or another folder",
+        )  # fmt: skip
+    more = [f"procedure.total_cycles={cycles}"]
+    if p.h is not None:
+        more.append(f"procedure.h={list(p.h)}")
+    overrides = [*manifest["overrides"], *more]
+    longer = load_scene(folder.path / "scene.toml", overrides)
+    record = {"scene": record_scene(longer), "overrides": overrides}
+    write_whole(folder.path / "manifest.json", json.dumps(manifest | record, indent=1) + "\n")
+    folder.add_event("extended", cycles=[p.total_cycles, cycles])
+    return longer
 
 
 def _run_all(
@@ -192,10 +223,13 @@ def prepare_manifest(
 def refuse_differences(old: dict[str, Any], new: dict[str, Any], path: Path) -> None:
     """Raise `SceneError` with every parameter that differs from the run's manifest."""
     if lines := list(list_differences("", old, new)):
+        longer = all(line.startswith(("procedure.total_cycles:", "procedure.h:")) for line in lines)
+        extend_it = f"trackbed resume {shlex.quote(str(path))} --cycles N computes more cycles; or "
         raise SceneError(
             "the scene differs from the one this run was started with:\n  " + "\n  ".join(lines),
             where=str(path),
-            remedy="take the parameters back, or start a new run: --run-folder FOLDER",
+            remedy=extend_it * longer
+            + "take the parameters back, or start a new run: --run-folder FOLDER",
         )
 
 
@@ -210,5 +244,7 @@ def _write_dry_run(scene: Scene, run_path: Path) -> None:
         radius, scene.container, scene.sample.relative_density_start, scene.sample.seed
     )
     engine.write_preparation(scene, position, radius, height, folder)
+    for sentence in describe_plan(scene, height):
+        print(f"# {sentence}")
     print(f"cd {shlex.quote(str(folder))}")
     print(shlex.join(engine.command(scene, "in.prepare")))

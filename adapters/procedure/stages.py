@@ -164,7 +164,7 @@ def compute(run: Run, bed: Bed, cycles: int, healing: int = 0) -> Bed:
     """A window of ``cycles`` load cycles, fresh process; the first ``healing`` are not fitted."""
     name = f"window_{bed.cycle:06d}"
     outcome = run.folder.outcome(name)
-    if outcome is None:
+    if outcome is None or outcome.last_cycle != bed.cycle + cycles:
         folder = _begin(run, name)
         decks = run.engine.write_cycles(run.scene, bed.start, cycles, folder)
         done = run.engine.run(run.scene, "in.cycles", folder, _watch(run, bed, folder), decks)
@@ -211,7 +211,8 @@ def jump(
     """
     name = f"jump_{bed.cycle:06d}_{attempt}"
     folder = run.folder.path / name
-    if run.folder.outcome(name) is None:
+    outcome = run.folder.outcome(name)
+    if outcome is None or outcome.last_cycle != bed.cycle + h:
         folder = _begin(run, name)
         with run.clock.time_part("parse"):
             window = load_window(run.folder.path / bed.window / "states.npz")
@@ -334,9 +335,8 @@ def _make_run_notes(done: EngineRun) -> dict[str, Any]:
 
 def _begin(run: Run, name: str) -> Path:
     if (run.folder.path / name).exists():
-        run.progress.print_line(
-            f"{name} is damaged: it is computed again, the old is in discarded/"
-        )
+        why = "damaged" if run.folder.outcome(name) is None else "of another length"
+        run.progress.print_line(f"{name} is {why}: it is computed again, the old is in discarded/")
     return run.folder.begin(name)
 
 

@@ -12,13 +12,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from trackbed.run_files import add_run_arguments, place_run, refuse_both
+from trackbed.run_files import add_run_arguments, place_run, refuse_both, time_step
 
 if TYPE_CHECKING:
     from qdem_fem.tables import Prepared
-
-TRIAL = 0.5
-"""Time that a dry run may spend on trial steps to tell the cost [s]."""
 
 
 def register(verb: str, parser: argparse.ArgumentParser) -> None:
@@ -137,7 +134,7 @@ def _preview_run(prepared: Prepared) -> dict[str, Any]:
         plan = make_plan(prepared, float(run.step))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", StepWarning)  # the outlook has its text
-            seconds = _time_step(run, plan.total)
+            seconds = time_step(run.advance, float(run.step), plan.total)
         outlook |= {
             "step": plan.step,
             "steps": plan.total,
@@ -146,19 +143,6 @@ def _preview_run(prepared: Prepared) -> dict[str, Any]:
             "estimated_s": seconds * plan.total,
         }
     return outlook
-
-
-def _time_step(run: Any, most: int) -> float:
-    """Time of one step on the clock [s], from a few steps; the first ones compile."""
-    run.advance(run.step)
-    steps = 1
-    while True:
-        started = time.perf_counter()
-        run.advance(steps * run.step)
-        spent = time.perf_counter() - started
-        if spent > TRIAL / 4 or 2 * steps > most:
-            return spent / steps
-        steps *= 2
 
 
 def _print(content: dict[str, Any], as_json: bool) -> None:

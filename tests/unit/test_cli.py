@@ -108,6 +108,12 @@ def test_wrong_use(words: list[str], sentence: str, tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+def wrap(error: BaseException) -> BaseException:
+    """An error that a Ctrl-C in compiled code is turned into."""
+    error.__cause__ = errors.Interrupted("x")
+    return error
+
+
 @pytest.mark.parametrize(
     ("error", "code"),
     [
@@ -123,6 +129,8 @@ def test_wrong_use(words: list[str], sentence: str, tmp_path: Path) -> None:
         (ModuleNotFoundError("No module named 'numba'", name="numba"), 4),
         (ImportError("cannot import name 'x'", name="adapters.laws.fit.prediction"), 1),
         (ZeroDivisionError("division by zero"), 1),
+        (wrap(SystemError("a kernel returned a result with an exception set")), 130),
+        (wrap(errors.UsageError("this is no whole file")), 130),
     ],
 )
 def test_exit_codes(

@@ -64,6 +64,7 @@ def test_a_dry_run_writes_nothing(scene: Path, capsys: pytest.CaptureFixture[str
     assert command.main(["rigid", str(scene), "--dry-run", "--json"]) == 0
     outlook = json.loads(capsys.readouterr().out)
     assert (outlook["bodies"], outlook["steps"]) == (1, 30)
+    assert outlook["estimated_s"] > 0
     assert not scene.with_name("slide-run").exists()
 
 

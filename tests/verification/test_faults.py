@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 from adapters.engines import lammps as engine_lammps
+from adapters.engines import process as engine_process
 from adapters.engines.contract import EngineRun, list_real_engines
 from adapters.engines.fake import FakeEngine
 from adapters.engines.process import explain_engine_failure
@@ -514,6 +515,18 @@ def test_engine_that_fails(scene, programs, capsys, work, code, words):
     assert words in said
     assert "this is a bug" not in said
     assert RunFolder(scene.parent / "run").stage_names() == []
+
+
+def test_an_engine_that_hangs_is_ended(scene, programs, monkeypatch, capsys):
+    """Once it has written nothing, in any file, for the time that is allowed; a slow one is not."""
+    numbers = replace(engine_process.PROCESS, silent_s=0.5)
+    monkeypatch.setattr(engine_process, "PROCESS", numbers)
+    slow = "for i in 1 2 3 4; do echo $i >> piston.txt; sleep 0.3; done"
+    install(programs, GOOD, f"{slow}; echo so far; sleep 600")
+    assert run_on(scene) == 5
+    said = capsys.readouterr().err
+    assert "the engine wrote nothing for" in said
+    assert "its last words: so far" in said
 
 
 @pytest.mark.parametrize(

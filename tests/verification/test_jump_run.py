@@ -91,6 +91,29 @@ def test_to_the_end_with_its_control(tmp_path: Path) -> None:
     assert "because it was moved (in the" not in page
 
 
+@pytest.mark.parametrize("jumps", ["procedure.h=8", "procedure.tolerance=0.02"])
+def test_a_finished_run_is_extended(
+    jumps: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its table is that of a run which was asked for so many cycles from the start, its control's
+    too; what is left of its old end is kept apart.  It is not shortened."""
+    scene = tmp_path / "scene.toml"
+    scene.write_text(small_bed(k=4, h=8, total_cycles=47))
+    words = ["run", str(scene), "--control", "--set", "procedure.k_i=15", "--set", jumps]
+    assert command.main([*words, "--run-folder", str(tmp_path / "run")]) == 0
+    assert command.main(["resume", str(tmp_path / "run"), "--cycles", "100"]) == 0
+    assert command.main([*words, "--cycles", "100", "--run-folder", str(tmp_path / "long")]) == 0
+    for one in ("", "control"):
+        assert read_rows(tmp_path / "run" / one) == read_rows(tmp_path / "long" / one)
+    assert list((tmp_path / "run" / "discarded").iterdir())
+    assert read_status(tmp_path / "run").state == "finished"
+    assert command.main(["resume", str(tmp_path / "run")]) == 0
+    assert command.main(["resume", str(tmp_path / "run"), "--cycles", "90"]) == 2
+    assert "can not be shortened to 90" in capsys.readouterr().err
+    assert command.main([*words, "--cycles", "200", "--run-folder", str(tmp_path / "run")]) == 3
+    assert f"trackbed resume {tmp_path}/run --cycles N" in capsys.readouterr().err
+
+
 def test_the_mean_grain_moves_by_what_was_decided(tmp_path: Path) -> None:
     """Before relaxation the mean drop of each jump is what the decision says, to round-off."""
     run(tmp_path, 120)

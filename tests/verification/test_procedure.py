@@ -27,7 +27,8 @@ from adapters.procedure.progress import Progress
 from adapters.procedure.stages import Run, Variant
 from adapters.scene.file import load_scene
 from adapters.scene.tables import Scene
-from tests.small_bed import read_rows
+from tests.small_bed import read_rows, small_bed
+from trackbed.command import main
 from trackbed.scenes import find_scene_file
 
 QUIET = Progress(quiet=True)
@@ -75,6 +76,27 @@ def test_flow_chart(tmp_path: Path) -> None:
     assert [cycle for cycle, kind in kinds.items() if kind == "jumped"] == [25, 52]
     assert [cycle for cycle, kind in kinds.items() if kind == "healing"] == [26, 27, 53, 54]
     assert max(kinds) == 70
+
+
+@pytest.mark.parametrize("total", [24, 15, 14, 60])
+def test_a_dry_run_tells_the_plan_that_the_run_follows(
+    total: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Jumps, cycles computed and cost; a run without room for a jump says so before it starts."""
+    scene = tmp_path / "scene.toml"
+    scene.write_text(small_bed(k=2, h=8, total_cycles=total))
+    assert main(["run", str(scene), "--dry-run"]) == 0
+    told = capsys.readouterr()
+    assert main(["run", str(scene)]) == 0
+    outcomes = RunFolder(tmp_path / "run").outcomes()
+    jumps = [f"{one.first_cycle} to {one.last_cycle}" for one in outcomes if one.stage == "jump"]
+    computed = sum(o.last_cycle - o.first_cycle for o in outcomes if o.stage == "window")
+    assert f"# plan: {total} cycles, {computed} of them computed" in told.out
+    assert ", ".join(jumps) in told.out
+    assert "# estimated CPU time: at least" in told.out
+    lacks = "no jump fits into 14 cycles, so every one is computed"
+    for said in (told.err, capsys.readouterr().err):
+        assert (lacks in said) is (total == 14) is (not jumps)
 
 
 def test_healing_cycles_stay_out_of_fit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
