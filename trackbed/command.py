@@ -139,6 +139,8 @@ def explain_error(error: BaseException) -> tuple[str, int]:
         return "interrupted", 130
     if isinstance(error, ImportError) and (why := explain_import(error)):
         return why, 4
+    if isinstance(error, MemoryError):
+        return f"there is too little memory ({error})\n  -> ask for less, or on a larger machine", 5
     if isinstance(error, OSError):
         return str(error), 5 if error.errno in NO_ROOM else 2
     return (

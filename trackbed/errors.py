@@ -11,7 +11,7 @@ EXIT_CODES = {
     2: "usage",
     3: "scene invalid",
     4: "engine or library missing",
-    5: "engine failed, or disk full",
+    5: "engine failed, disk or memory full",
     6: "result not credible",
     7: "not converged",
     8: "members of a sweep failed",
@@ -81,6 +81,12 @@ class DiskFull(TrackbedError):
 
     Everything finished is saved; with room again the run goes on.
     """
+
+    exit_code = 5
+
+
+class OutOfMemory(TrackbedError, MemoryError):
+    """What was asked for would need more memory than there is; it was not taken."""
 
     exit_code = 5
 

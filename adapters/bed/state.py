@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adapters.errors import UsageError
+from trackbed.memory import read_arrays
 from trackbed.run_files import replace_file
 
 FloatArray = NDArray[np.float64]
@@ -94,13 +95,11 @@ def save_state(state: State, path: Path) -> None:
 def load_state(path: Path) -> State:
     """Read what `save_state` wrote; raises `UsageError` when ``path`` is no such file."""
     try:
-        with np.load(path, allow_pickle=False) as data:
-            height, cycle, step = data["scalars"]
-            contacts = Contacts(
-                **{name[8:]: data[name] for name in data.files if name.startswith("contact_")}
-            )
-            walls = {name[5:]: data[name] for name in data.files if name.startswith("wall_")}
-            grains = {name: data[name] for name in GRAIN_ARRAYS}
+        data = read_arrays(path)
+        height, cycle, step = data["scalars"]
+        contacts = Contacts(**{n[8:]: value for n, value in data.items() if n[:8] == "contact_"})
+        walls = {name[5:]: value for name, value in data.items() if name.startswith("wall_")}
+        grains = {name: data[name] for name in GRAIN_ARRAYS}
     except Exception as error:  # numpy raises many kinds for a file that is not a whole npz
         raise UsageError(
             f"this is not a whole state file ({error})",

@@ -15,13 +15,15 @@ import re
 import shutil
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
+from datetime import datetime
 from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
 from adapters.errors import UsageError
+from trackbed.memory import read_bounded
 from trackbed.run_files import (
     append_text,
     digest_file,
@@ -65,6 +67,7 @@ NEEDED = ("*.npz", "end.restart")
 """Files of a stage that a run goes on from; the others may be removed to save space."""
 MANIFEST = ("scene", "overrides", "control")
 """What a manifest must hold for its run to be resumed."""
+EVENTS = "events.jsonl"
 ASKED_ON = "asked to go on cycle by cycle"
 """Event of a run whose user wants every cycle computed where no jump is allowed."""
 STAGES = ("preparation", "jump", "window")
@@ -72,7 +75,7 @@ STAGES = ("preparation", "jump", "window")
 STAGE = re.compile(r"preparation|jump_\d{6,}_\d+|window_\d{6,}")
 """Name of a stage's folder."""
 SEAL = "seal"
-"""Key of an ``outcome.json`` with the SHA-256 of the others; older records have none."""
+"""Key of a record, such as an outcome, with the SHA-256 of the others; older ones have none."""
 
 
 @dataclass
@@ -100,8 +103,7 @@ class RunFolder:
     def __init__(self, path: Path) -> None:
         self.path = path
         self._known: dict[str, tuple[list[tuple[str, tuple[int, ...]]], bool, Outcome, str]] = {}
-        """Of stages read before: identities of their files, whether their digests were looked at,
-        outcome, and rows of the table."""
+        """Of stages read before: identities of files, whether digests were seen, outcome, rows."""
         self._listing: Listing | None = None
 
     @contextmanager
@@ -124,8 +126,9 @@ class RunFolder:
     def add_event(self, what: str, **details: object) -> None:
         """Append one line to ``events.jsonl``."""
         now = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
-        line = json.dumps({"time": now, "event": what, **details})
-        append_text(self.path / "events.jsonl", line + "\n")
+        record = json.loads(json.dumps({"time": now, "event": what, **details}))
+        line = json.dumps(record | {SEAL: _digest(record)})
+        append_text(self.path / EVENTS, line + "\n")
 
     def keep_cycle_by_cycle(self, now: bool) -> bool:
         """Whether this run was asked to compute where it may not jump, ``now`` or ever before."""
@@ -135,14 +138,30 @@ class RunFolder:
         return now or before
 
     def events(self) -> list[dict[str, Any]]:
-        """All events; a last line cut short by a crash is left out."""
-        path = self.path / "events.jsonl"
-        text = path.read_text(encoding="utf-8", errors="replace") if path.exists() else ""
-        events = []
-        for line in text.splitlines():
-            with suppress(json.JSONDecodeError):
-                events.append(json.loads(line))
-        return events
+        """All events; a line cut short by a crash, or changed since, is left out."""
+        return [event for event in self._read_events() if event]
+
+    def _read_events(self) -> list[dict[str, Any]]:
+        """An event a line, empty where the line is not one that we wrote."""
+        try:
+            text = read_bounded(self.path / EVENTS, errors="replace")
+        except FileNotFoundError:
+            return []
+        return [_read_event(line) for line in text.splitlines()]
+
+    def list_damaged(self) -> list[str]:
+        """What in the folder is not as it was left: stages, which count for nothing then, and
+        the records beside them."""
+        listing, path = self._list_stages(), self.path / "settlement.csv"
+        names = [n for n in listing.names if n not in listing.finished and not self.failure(n)]
+        if not all(self._read_events()[:-1]):  # a crash cuts the last one
+            names.append(EVENTS)
+        rows = "".join(self._known[name][3] for name in listing.finished)
+        table = ",".join(COLUMNS) + "\n" + rows
+        text = read_bounded(path, errors="replace") if path.exists() else ""
+        if rows and not names and not (text and table.startswith(text)):  # a kill may miss a row
+            names.append("settlement.csv")
+        return names
 
     def outcome(self, name: str, *, verify: bool = True) -> Outcome | None:
         """Outcome of a finished stage; None when it is not there, or not as it was left.
@@ -289,8 +308,7 @@ class RunFolder:
         listing.table = _identify(str(path))
 
     def _add_rows(self, name: str) -> None:
-        """Put the rows of a stage that was just finished behind those in ``settlement.csv``; the
-        table is written again where it is not as we left it."""
+        """Put a stage's rows behind those in ``settlement.csv``, where that is as we left it."""
         path, listing = self.path / "settlement.csv", self._listing
         found = self.outcome(name, verify=False)
         if listing is not None and found is not None:  # `begin` has left none behind it
@@ -349,10 +367,23 @@ def _digest(record: dict[str, Any]) -> str:
 
 def _read_outcome(folder: Path) -> Outcome:
     """The record of a stage; raises `ValueError` and others for one that is none or was changed."""
-    record = json.loads((folder / "outcome.json").read_text(encoding="utf-8"))
+    return Outcome(**_open_seal(json.loads(read_bounded(folder / "outcome.json"))))
+
+
+def _open_seal(record: dict[str, Any]) -> dict[str, Any]:
+    """A record without its seal; raises `ValueError` where it is not the seal of this record."""
     if (seal := record.pop(SEAL, None)) is not None and seal != _digest(record):
         raise ValueError("changed since it was written")
-    return Outcome(**record)
+    return record
+
+
+def _read_event(line: str) -> dict[str, Any]:
+    try:
+        event = _open_seal(json.loads(line))
+        datetime.fromisoformat(event["time"])
+        return event if isinstance(event["event"], str) else {}
+    except (ValueError, TypeError, AttributeError, KeyError):
+        return {}
 
 
 def _identify(path: str) -> tuple[int, ...]:

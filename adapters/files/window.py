@@ -13,6 +13,7 @@ from adapters.bed import Contacts, FloatArray, IntArray, State
 from adapters.errors import EngineFailed
 from adapters.files.dump import Frame
 from adapters.files.dump_reader import read_frames
+from trackbed.memory import read_arrays
 from trackbed.run_files import replace_file
 
 ARRAYS = ("time_step", "identifier", "radius", "mass", "position", "velocity", "spin")
@@ -235,8 +236,7 @@ def save_window(window: Window, path: Path) -> None:
 def load_window(path: Path) -> Window:
     """Read what `save_window` wrote; raises `EngineFailed` when the file is damaged."""
     try:
-        with np.load(path, allow_pickle=False) as data:
-            arrays = {name: data[name] for name in data.files}
+        arrays = read_arrays(path)
     except Exception as error:  # numpy raises many kinds for a file that is not a whole npz
         raise EngineFailed(
             f"the saved window is damaged ({error})",

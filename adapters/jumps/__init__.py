@@ -10,6 +10,7 @@ from adapters.jumps.slopes import Jumped, Landing, estimate_slopes, find_asked_g
 
 __all__ = [
     "BAND_PROBABILITY", "JUMP", "Band", "Control", "Decision", "Jumped", "Landing", "Settings",
-    "Stretch", "accept", "decide", "estimate_band", "estimate_slopes", "find_asked_gain", "find_rates",
-    "fit_forecast", "join_stretch", "judge", "observe", "reject", "remove_moves", "schedule_jumps",
+    "Stretch", "accept", "decide", "estimate_band", "estimate_slopes", "find_asked_gain",
+    "find_rates", "fit_forecast", "join_stretch", "judge", "observe", "reject", "remove_moves",
+    "schedule_jumps",
 ]  # fmt: skip

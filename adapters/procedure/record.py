@@ -41,6 +41,8 @@ class Track:
     discarded: tuple[str, ...]
     """Stages whose unfinished or superseded work was moved away; empty folders left out."""
     events: tuple[dict[str, Any], ...]
+    damaged: tuple[str, ...] = ()
+    """Stages and records that are not as the run left them."""
 
     @cached_property
     def history(self) -> History:
@@ -69,11 +71,21 @@ class Track:
 
     def start(self) -> State:
         """The bed before the first load cycle."""
-        return load_state(self.folder.path / "preparation" / "state.npz")
+        return load_state(self._find_sound("preparation") / "state.npz")
+
+    def _find_sound(self, name: str) -> Path:
+        """Folder of a stage whose states are as the run left them; raises `UsageError` else."""
+        if self.folder.outcome(name) is None:
+            raise UsageError(
+                "the states of this stage were changed since they were written",
+                where=str(self.folder.path / name),
+                remedy=f"trackbed resume {self.folder.path} computes it again",
+            )
+        return self.folder.path / name
 
     def window(self, name: str) -> Window:
         """States and piston of one window."""
-        return load_window(self.folder.path / name / "states.npz")
+        return load_window(self._find_sound(name) / "states.npz")
 
     def position(self, cycle: int) -> FloatArray:
         """Centres at the end of a cycle [m], shape (n, 3); raises `UsageError` for a jumped one."""
@@ -84,7 +96,7 @@ class Track:
                 return self.window(name).state(cycle - outcome.first_cycle).position
         for name, outcome in self.jumps:
             if outcome.last_cycle == cycle:
-                return load_state(self.folder.path / name / "relaxed.npz").position
+                return load_state(self._find_sound(name) / "relaxed.npz").position
         raise UsageError(f"no state was computed at cycle {cycle}", where=str(self.folder.path))
 
 
@@ -127,6 +139,7 @@ def read_track(folder: RunFolder) -> Track:
         failed_jumps=list_failed_jumps(folder),
         discarded=tuple(discarded),
         events=tuple(folder.events()),
+        damaged=tuple(folder.list_damaged()),
     )
 
 

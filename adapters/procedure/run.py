@@ -22,10 +22,13 @@ from adapters.procedure.outlook import describe_plan, warn_without_jumps
 from adapters.procedure.progress import Progress
 from adapters.procedure.stages import Bed, Clock, Run, Variant
 from adapters.scene import Scene, load_scene
+from trackbed.memory import refuse_more_memory
 from trackbed.run_files import list_differences, record_provenance, refuse_writing, write_whole
 
 OWN_FILES = ("lock", "scene.toml", "load_series.csv", "dry_run")
 """What may be in a run folder before its manifest is written."""
+STATE_BYTES = 500
+"""Memory that a grain takes at each cycle end of a window, contacts and wall forces too [bytes]."""
 CONTROL = Variant("control", jumps=False)
 
 
@@ -62,6 +65,7 @@ def run_scene(
         overrides = [*overrides, f'engine.name="{name}"']
         scene = load_scene(scene_path, overrides)
         progress.print_line(f"engine: {scene.engine.name}")
+    refuse_large(scene)
     for warning in (*scene.warnings, *warn_without_jumps(scene)):
         progress.print_line(f"warning: {warning}")
     if dry_run:
@@ -117,6 +121,17 @@ def extend(folder: RunFolder, manifest: dict[str, Any], scene: Scene, cycles: in
     return longer
 
 
+def refuse_large(scene: Scene) -> None:
+    """Raise `OutOfMemory` where the states of one window would not fit into memory."""
+    p = scene.procedure
+    cycles = max(p.k_i, p.window_cycles) if p else 0
+    grains = scene.grain_count
+    refuse_more_memory(
+        STATE_BYTES * grains * (1 + cycles), f"{grains} grains over a window of {cycles} cycles",
+        "sample and procedure", "fewer grains, or shorter windows (procedure.k_i, procedure.k)",
+    )  # fmt: skip
+
+
 def _run_all(
     folder: RunFolder, scene: Scene, control: bool, cycle_by_cycle: bool, progress: Progress
 ) -> None:
@@ -146,6 +161,9 @@ def run_variant(
         here = folder.enter(variant.name)
         here.share_start(folder, count_shared_cycles(folder, scene, variant))
         progress.print_line(variant.name.replace("_", " "))
+    if scene.engine.launcher:
+        words = shlex.join(engine.command(scene, "in.prepare"))
+        progress.print_line(f"the scene's launcher is started, as in: {words}")
     run = Run(scene, here, engine, variant, progress, cycle_by_cycle)
     if variant.name == "procedure":
         run.clock = Clock(0.0)  # it bears the start-up of Python; the others come in its wake

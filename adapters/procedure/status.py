@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from math import isfinite, nan
 from pathlib import Path
 
+from adapters.files import EVENTS
 from adapters.jumps import BAND_PROBABILITY
 from adapters.procedure.history import History, find_speed_up, list_jumped_spans, sum_cost
 from adapters.procedure.record import (
@@ -45,6 +46,8 @@ class Status:
     """Of a run with a tolerance: a full run would be between them with probability 0.9."""
     control_cycle: int | None
     """Cycles the full run beside it has done; None without one."""
+    damaged: str
+    """Stages, which count for nothing then, and records that are not as the run left them."""
     next: str
     """The command that goes on from here."""
 
@@ -60,7 +63,7 @@ def judge_progress(record: Record) -> Status:
     cycle = int(history.cycle[-1]) if len(history.cycle) else 0
     computed = history.count_computed(cycle)
     state = "running" if is_written(run_folder, "lock") else "stopped"
-    if state == "stopped" and _is_finished(record):
+    if state == "stopped" and _is_finished(record) and not set(record.run.damaged) - {EVENTS}:
         state = "finished"
     at, ratio = find_comparable_cycle(record), nan
     if record.control is not None and at:
@@ -86,6 +89,7 @@ def judge_progress(record: Record) -> Status:
         cpu_s=sum(sum_cost(outcome.cost) for outcome in record.run.outcomes),
         band_m=None if band is None else (band.low, band.high),
         control_cycle=_find_last_cycle(record.control) if record.control is not None else None,
+        damaged=", ".join(record.run.damaged),
         next=f"trackbed {verb} {shlex.quote(str(run_folder))}",
     )
 

@@ -66,6 +66,7 @@ class Numbers:
     stops: tuple[tuple[str, str], ...]
     """Time and reason of every stop of the run before its end."""
     discarded: tuple[str, ...]
+    damaged: tuple[str, ...]
     engines: tuple[str, ...]
     """Name and version banner."""
     provenance: dict[str, Any]
@@ -122,6 +123,7 @@ def gather_numbers(record: Record) -> Numbers:
         failed_jumps=tuple((jump.stage, jump.why) for jump in run.failed_jumps),
         stops=tuple((e["time"], e.get("why", "")) for e in run.events if e["event"] == "stopped"),
         discarded=run.discarded + (() if control is None else control.discarded),
+        damaged=run.damaged + (() if control is None else control.damaged),
         engines=tuple(dict.fromkeys(f"{e['name']}: {e['version']}" for e in engines)),
         provenance=dict(record.manifest.get("provenance", {})),
         parameters={key: value for key, value in parameters.items() if value is not None},

@@ -236,6 +236,10 @@ def _describe_failures(numbers: Numbers) -> str:
     )
     items = [f"<code>{escape(stage)}</code>: {escape(why)}" for stage, why in numbers.failed_jumps]
     items += [f"stopped {escape(time)}: {escape(why)}" for time, why in numbers.stops]
+    items += [
+        f"<code>{escape(name)}</code> is not as the run left it: trackbed resume makes it again"
+        for name in numbers.damaged
+    ]
     items += [f"discarded <code>{escape(name)}</code>" for name in numbers.discarded]
     return make_section("Failures", counted, make_list(items) if items else "")
 

@@ -6,6 +6,7 @@ writer cut short is cut back to its last sound row (`Table.cut`).
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,7 +17,13 @@ import numpy.typing as npt
 
 from qdem_fem.files.arrays import Floats
 from qdem_fem.files.errors import UsageError
-from trackbed.run_files import open_unlinked, refuse_writing, replace_file, write_whole
+from trackbed.run_files import (
+    digest_file,
+    open_unlinked,
+    refuse_writing,
+    replace_file,
+    write_whole,
+)
 
 
 def write_bodies_vtu(path: Path, bodies: Sequence[Any]) -> None:
@@ -46,6 +53,10 @@ def write_bodies_vtu(path: Path, bodies: Sequence[Any]) -> None:
         mesh.write(temporary, file_format="vtu", compression=None)
 
 
+NOTHING = hashlib.sha256().hexdigest()
+"""Of a file before its first byte: the seal of tables of older versions."""
+
+
 class Table:
     """A CSV file that grows: a header, then rows of numbers, the first one the time [s]."""
 
@@ -67,16 +78,26 @@ class Table:
         with self.path.open("rb+") as stream:
             os.fsync(stream.fileno())
 
-    def cut(self, time: float, count: int) -> None:
+    def seal(self) -> tuple[int, str]:
+        """Length of the file so far [bytes], and its SHA-256."""
+        return self.path.stat().st_size, digest_file(self.path)
+
+    def cut(self, time: float, count: int, seal: tuple[int, str] = (0, NOTHING)) -> None:
         """Keep the sound rows up to ``time`` [s], as they were when the run had come there.
 
-        Raises `UsageError` when the file has other columns, is not there, or has not the
-        ``count`` rows that were written by then; it is left as it is.
+        Raises `UsageError` when the file has other columns, is not there, was changed since it had
+        this ``seal``, or has not the ``count`` rows that were written by then; it is left as it is.
         """
         header = (",".join(self.columns) + "\n").encode()
         kept, rows = len(header), 0
         try:
             with self.path.open("rb+") as stream:
+                if hashlib.sha256(stream.read(seal[0])).hexdigest() != seal[1]:
+                    raise UsageError(
+                        "this table was changed since it was written", where=str(self.path),
+                        remedy="start again: --force",
+                    )  # fmt: skip
+                stream.seek(0)
                 if stream.readline() != header:
                     raise UsageError("this table has other columns", where=str(self.path))
                 for line in stream:

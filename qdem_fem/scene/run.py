@@ -22,7 +22,7 @@ from trackbed.run_files import folder as run_folder
 ENERGIES = ("kinetic", "elastic", "external")
 CONTACT_ENERGIES = ("contact", "friction")
 VISCOUS_ENERGY = ("viscous",)
-CHECKPOINT, COST, PEAK = "checkpoint.npz", "cost.json", "peak.npz"
+CHECKPOINT, COST, PEAK, SEALS = "checkpoint.npz", "cost.json", "peak.npz", "tables"
 
 
 @dataclass(frozen=True)
@@ -142,8 +142,9 @@ def run_dynamic(
     done = Done(run, bodies, plan, {"cpu_s": 0.0, "wall_s": 0.0})
     record = _Record(done, plan, folder.path, probes, prepared.scene.audit)
     if goes_on:
-        done.cost |= read_object(folder.path / COST) or {}  # none: killed before it was written
-        record.resume()
+        cost = read_object(folder.path / COST) or {}  # none: killed before it was written
+        record.resume(cost.pop(SEALS, {}))
+        done.cost |= cost
     else:
         record.begin()
     saved = time.monotonic()
@@ -211,13 +212,14 @@ class _Record:
         self.write_energy(0.0)
         self.write_fields()
 
-    def resume(self) -> None:
-        """Take back what was written behind the checkpoint."""
+    def resume(self, seals: dict[str, tuple[int, str]]) -> None:
+        """Take back what was written behind the checkpoint; ``seals`` of the tables by name."""
         now = (self.run.steps_done + 0.5) * self.plan.step
         done, plan = self.run.steps_done, self.plan
-        self.rows.cut(now, done // plan.sampling + 1)
         at_end = done == plan.total and done % plan.energy > 0
-        self.energies.cut(now, done // plan.energy + 1 + at_end)
+        counts = (done // plan.sampling + 1, done // plan.energy + 1 + at_end)
+        for table, count in zip((self.rows, self.energies), counts, strict=True):
+            table.cut(now, count, *([seals[table.path.name]] if table.path.name in seals else []))
         self.account.add_rows(read_table(self.energies.path))
         if (self.path / PEAK).exists():
             with np.load(self.path / PEAK) as peak:
@@ -282,11 +284,12 @@ class _Record:
         """Save the state; the tables reach the disk first, so that they hold all rows up to it."""
         self.rows.sync()
         self.energies.sync()
+        seals = {table.path.name: table.seal() for table in (self.rows, self.energies)}
         self.run.save(checkpoint)
         peak = io.BytesIO()
         np.savez(peak, displacement=self.peak, energy=self.peak_energy)
         write_whole(self.path / PEAK, peak.getvalue())
-        write_whole(self.path / COST, json.dumps(self.done.cost) + "\n")
+        write_whole(self.path / COST, json.dumps(self.done.cost | {SEALS: seals}) + "\n")
 
 
 def list_energies(run: Any) -> tuple[str, ...]:

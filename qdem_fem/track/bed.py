@@ -44,6 +44,7 @@ from qdem_fem.grains import GrainSet
 from qdem_fem.march import Damping, Rest, find_rest, read_checkpoint, write_checkpoint
 from qdem_fem.track.bodies import GAP, place_grains
 from qdem_fem.track.recipe import SLEEPER, BedRecipe, make_bed_bodies, make_bed_grains
+from trackbed.memory import read_arrays
 from trackbed.run_files import write_whole
 
 if TYPE_CHECKING:
@@ -289,8 +290,7 @@ def read_bed(path: Path, recipe: BedRecipe) -> Bed:
     """Read what `write_bed` wrote for this recipe; raises `CheckpointError` else."""
     remedy = "give another file, or remove it to prepare the bed again"
     try:
-        with np.load(path, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
+        arrays = read_arrays(path)
         head = json.loads(str(arrays.pop("head")))
         there, here = json.loads(head["recipe"]), json.loads(recipe.format_json())
         counts, nodes = arrays.pop("counts"), arrays.pop("nodes")

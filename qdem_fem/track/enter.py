@@ -98,6 +98,12 @@ def check_track(text: SceneText) -> TrackPrepared:
         bed = (text.path.parent / track.bed).parent
         if not bed.is_dir():  # or minutes of preparation would find no place
             problems.append(Problem("track.bed", f"there is no folder {bed}"))
+        inside = bed.resolve().is_relative_to(text.path.parent.resolve())
+        if not inside and "track.bed" not in text.overrides:
+            what = (
+                f"a scene writes into its own folder, not {bed}: to have it so, use --set track.bed"
+            )
+            problems.append(Problem("track.bed", what))
     text.refuse(problems + list(find_output_faults(text)))
     scene = TrackScene.model_validate(text.data)
     track = scene.track

@@ -20,6 +20,7 @@ from rigid_lcp.friction.files import DAMAGED
 from rigid_lcp.motion import Motion, Pace, Scene, make_world
 from rigid_lcp.scene.simulation import Simulation
 from rigid_lcp.wear import Broken, WearState, WornShape
+from trackbed.memory import read_arrays
 from trackbed.run_files import RESULT, write_whole
 from trackbed.run_files import folder as run_folder
 
@@ -147,8 +148,7 @@ class RunFolder(run_folder.RunFolder):
 def read_frame(path: Path) -> dict[str, Any]:
     """Arrays of a frame by name, with ``motion``, ``contacts`` and ``pace`` put together, counters
     as numbers.  Raises one of `DAMAGED` if it can not be read, or is of another version."""
-    with path.open("rb") as stream, np.load(stream) as file:  # it leaves damaged ones open
-        arrays = {name: file[name] for name in file.files}
+    arrays = read_arrays(path)
     if arrays.get("wear_counts", np.zeros(0)).ndim != 1:
         raise ValueError("its corners wore as those of an earlier version did")
     arrays |= {name: arrays[name].item() for name in (*COUNTERS, "energy", "overlap", "cpu")}

@@ -102,6 +102,14 @@ def test_cut_refuses_another_table(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="2 rows up to 1 s were written, 1 are there"):
         Table(tmp_path / "t.csv", ["time", "a"]).cut(1.0, 2)
     assert (tmp_path / "t.csv").read_text() == "time,a\n0.0,1.0\n1.0,"
+    (tmp_path / "t.csv").write_text("time,a\n0.0,1.0\n")
+    seal = Table(tmp_path / "t.csv", ["time", "a"]).seal()
+    with (tmp_path / "t.csv").open("a") as stream:
+        stream.write("1.0,1.0\n")
+    Table(tmp_path / "t.csv", ["time", "a"]).cut(0.5, 1, seal)
+    (tmp_path / "t.csv").write_text("time,a\n0.0,2.0\n")
+    with pytest.raises(UsageError, match="was changed since it was written"):
+        Table(tmp_path / "t.csv", ["time", "a"]).cut(0.5, 1, seal)
     (tmp_path / "t.csv").write_text("time,a\n0,x\n")
     with pytest.raises(UsageError, match="no table"):
         read_table(tmp_path / "t.csv")

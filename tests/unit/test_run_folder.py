@@ -278,3 +278,25 @@ def test_shared_start(run: RunFolder, tmp_path: Path) -> None:
     other.path.mkdir()
     other.share_start(run, 4)
     assert other.stage_names() == ["preparation"]
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "damaged"),
+    [
+        ("events.jsonl", "{broken\n5\n", ["events.jsonl"]),
+        ("settlement.csv", "", ["settlement.csv"]),
+        ("window_000000/outcome.json", '{"stage": "window"}', ["window_000000"]),
+    ],
+)
+def test_changed_records_are_listed(
+    run: RunFolder, name: str, content: str, damaged: list[str]
+) -> None:
+    """What a run left is as it was left, or named; an event that was changed counts for nothing."""
+    run.add_event("decision", cycle=1)
+    run.add_event("stopped")
+    assert RunFolder(run.path).list_damaged() == []
+    (run.path / name).write_text(content + (run.path / name).read_text() * name.startswith("ev"))
+    assert RunFolder(run.path).list_damaged() == damaged
+    text = (run.path / "events.jsonl").read_text()
+    (run.path / "events.jsonl").write_text(text.replace('"cycle": 1', '"cycle": 2'))
+    assert [event["event"] for event in RunFolder(run.path).events()] == ["stopped"]

@@ -487,7 +487,9 @@ def test_launcher_missing(scene: Path, programs: Path, capsys: pytest.CaptureFix
     install(programs, GOOD)
     words = ["run", str(scene), "--engine", "liggghts", "--launcher", "no-such-launcher -np 2"]
     assert command.main(words) == 4
-    assert "cannot start no-such-launcher" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "the scene's launcher is started, as in: no-such-launcher -np 2 " in said
+    assert "cannot start no-such-launcher" in said.partition("as in:")[2]  # shown before it runs
 
 
 @pytest.mark.parametrize(

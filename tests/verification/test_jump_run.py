@@ -80,7 +80,7 @@ def test_to_the_end_with_its_control(tmp_path: Path) -> None:
     procedure.resume(tmp_path / "run", progress=QUIET)  # finished: the same decisions, none printed
     assert list_decisions(RunFolder(tmp_path / "run").events()) == decisions
     assert len(RunFolder(tmp_path / "run").events()) == events + 3  # resumed, two engines
-    newer = {"moved", "correction", "kappa", "reseated"}
+    newer = {"moved", "correction", "kappa", "reseated", "seal"}
     older = [
         {name: value for name, value in event.items() if name not in newer}
         for event in RunFolder(tmp_path / "run").events()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -183,6 +184,18 @@ def test_a_record_of_the_load_belongs_to_the_run(tmp_path: Path) -> None:
 def test_an_impossible_track_is_refused(tmp_path: Path, change: str, said: str) -> None:
     with pytest.raises(SceneError, match=said):
         load_of(tmp_path, "lead = 1.0", change)
+
+
+def test_a_scene_writes_no_bed_outside_its_folder(tmp_path: Path) -> None:
+    """Unless the user says where: a scene may come from anyone."""
+    load_of(tmp_path, "lead = 1.0")
+    path = tmp_path / "scene.toml"
+    text = re.sub(r"(?m)^bed = .*", 'bed = "../bed.npz"', path.read_text(encoding="utf-8"))
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(SceneError, match=r"track\.bed: a scene writes into its own folder, not"):
+        load_scene(path)
+    prepared = load_scene(path, ("track.bed=../bed.npz",))
+    assert isinstance(prepared, TrackPrepared)
 
 
 def test_device_of_a_scene_is_of_its_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,6 +13,7 @@ from typing import IO, Any
 from xml.sax.saxutils import quoteattr
 
 from trackbed.errors import NO_ROOM, DiskFull, UsageError
+from trackbed.memory import read_bounded
 
 NO_FOLDER = (EEXIST, ENOTDIR)
 """A file where the folder, or one above it, should be."""
@@ -108,10 +109,10 @@ def sync_folder(path: Path) -> None:
 def read_object(path: Path) -> dict[str, Any] | None:
     """An object of a JSON file; None where there is no file, empty when it can not be read."""
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(read_bounded(path))
     except FileNotFoundError:
         return None
-    except (OSError, ValueError, RecursionError):
+    except (OSError, ValueError, RecursionError, MemoryError):
         return {}
     return content if isinstance(content, dict) else {}
 

@@ -29,6 +29,7 @@ from rigid_lcp.friction.files.damaged import DAMAGED, describe_damage, name_miss
 from rigid_lcp.friction.files.fclib import read_fclib_forces, read_fclib_problem
 from rigid_lcp.friction.files.siconos import read_siconos_problem
 from rigid_lcp.friction.problem import BODY_SIZE, BodySpace, FrictionProblem, make_problem
+from trackbed.memory import read_arrays
 
 SAME_MATRIX = 1e-8
 """W and its factors, both stored, differ by less than this share of the largest entry of W."""
@@ -120,8 +121,7 @@ def _read_npz_forces(path: Path) -> Floats:
 def _read_npz_arrays(path: Path) -> dict[str, NDArray[Any]]:
     """All arrays of a file."""
     try:
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
-            return {name: file[name] for name in file.files}
+        return read_arrays(path)
     except DAMAGED as error:
         raise ProblemError(
             f"it can not be read as npz: {error}", where=str(path),
