@@ -76,22 +76,20 @@ def _run(file: SceneFile, arguments: argparse.Namespace) -> dict[str, Any]:
     from rigid_lcp.scene import RESULT, RunFolder, make_simulation, run_scene, summarise_run
     from trackbed.run_files import raise_on_signals, record_provenance, write_whole
 
-    scene, run = make_simulation(file)  # what it refuses must not leave a folder behind
     path = place_run(arguments)
     folder = RunFolder(path)
     manifest = {
         "scene": file.tables.model_dump(mode="json"),
         "provenance": record_provenance(["trackbed", *sys.argv[1:]]),
     }
+    given = {"resume": arguments.resume, "force": arguments.force}
+    if finished := folder.look_ahead(manifest, **given):
+        return finished | {"folder": str(path)}
+    scene, run = make_simulation(file)  # what it refuses must not leave a folder behind
     kept = "every finished frame is saved"
     remedy = "the same command with --resume goes on from the last one"
     with folder.lock(), raise_on_signals(kept, remedy, str(path)):
-        goes_on = folder.prepare(
-            manifest, file.text, resume=arguments.resume, force=arguments.force
-        )
-        there = folder.summary
-        if goes_on and there is not None:
-            return there | {"folder": str(path)}
+        goes_on = folder.prepare(manifest, file.text, **given)
         run_scene(file, run, folder, resume=goes_on, progress=_make_progress())
         summary = summarise_run(file, scene, run, folder)
         write_report(folder, scene, manifest, summary, draw=not arguments.no_pictures)

@@ -68,11 +68,29 @@ def choose_command(arguments: argparse.Namespace) -> Callable[[argparse.Namespac
     command: Callable[[argparse.Namespace], int] = arguments.command
     if arguments.verb not in RUN_VERBS:
         return command
+    refuse_no_run(arguments.run_folder)
     refuse_links(arguments.run_folder)
     kind = find_kind(arguments.run_folder)
     if kind is None or not kind.states:
         return command
     return lambda given: DOES[given.verb](given, kind)
+
+
+def refuse_no_run(path: Path) -> None:
+    """Raise `UsageError` for a folder that is not there or holds no run, and say what is near."""
+    if not path.is_dir():
+        near = [f"{one.parent}" for one in sorted(path.parent.glob(f"*/{MANIFEST}"))[:3]]
+        raise UsageError(
+            "this is a file, not a run folder" if path.exists() else "there is no such folder",
+            where=str(path), remedy=f"the runs beside it: {', '.join(near) or 'none'}",
+        )  # fmt: skip
+    if (path / MANIFEST).exists():
+        return
+    runs = [str(one.parent) for one in sorted(path.glob(f"*/{MANIFEST}"))[:3]]
+    outer = next((one for one in path.absolute().parents if (one / MANIFEST).exists()), None)
+    if runs or outer:
+        remedy = f"its runs: {', '.join(runs)}" if runs else f"it is a part of the run {outer}"
+        raise UsageError("this is not a run folder", where=str(path), remedy=remedy)
 
 
 def describe_run(path: Path, kind: Kind) -> dict[str, Any]:

@@ -139,6 +139,8 @@ def _run_all(
         run_variant(folder, scene, Variant(), progress, cycle_by_cycle)
         if control:
             run_variant(folder, scene, CONTROL, progress)
+        path = shlex.quote(str(folder.path))
+        progress.print_line(f"the run is finished: trackbed report {path}")
     except BaseException as error:
         with explain_full_disk(folder.path):
             folder.add_event("stopped", why=str(error) or type(error).__name__)

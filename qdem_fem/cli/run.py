@@ -61,7 +61,6 @@ def _run(
     )
     from trackbed.run_files import RESULT, record_provenance, write_whole
 
-    run, bodies = make_simulation(prepared)  # what it refuses must not leave a folder behind
     folder = RunFolder(path)
     manifest = {
         "scene": prepared.scene.parameters(),
@@ -69,12 +68,12 @@ def _run(
         "overrides": arguments.overrides,
         **record_provenance(["trackbed", *sys.argv[1:]]),
     }
+    given = {"resume": arguments.resume, "force": arguments.force}
+    if finished := folder.look_ahead(manifest, **given):
+        return finished | {"folder": str(path)}
+    run, bodies = make_simulation(prepared)  # what it refuses must not leave a folder behind
     with folder.lock():
-        goes_on = folder.prepare(
-            manifest, prepared.text.text, resume=arguments.resume, force=arguments.force
-        )
-        if goes_on and (summary := folder.summary):
-            return summary | {"folder": str(path)}
+        goes_on = folder.prepare(manifest, prepared.text.text, **given)
         if prepared.scene.simulation.method == "static":
             done = run_static(prepared, run, bodies, folder)
         else:

@@ -97,6 +97,26 @@ def test_report_of_a_finished_run_is_shown(
 
 
 @pytest.mark.parametrize(
+    ("place", "said"),
+    [
+        ("runs", "this is not a run folder\n  -> its runs: {}/runs/a"),
+        ("runs/a/stage", "this is not a run folder\n  -> it is a part of the run {}/runs/a"),
+        ("runs/b", "there is no such folder\n  -> the runs beside it: {}/runs/a"),
+        ("file", "this is a file, not a run folder\n  -> the runs beside it: none"),
+    ],
+)
+@pytest.mark.parametrize("verb", ["status", "report", "resume"])
+def test_a_place_beside_a_run_folder_names_the_run(
+    verb: str, place: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "runs").mkdir()
+    (folder_of("rigid", tmp_path / "runs" / "a") / "stage").mkdir()
+    (tmp_path / "file").touch()
+    assert main([verb, str(tmp_path / place)]) == 2
+    assert said.replace("{}", str(tmp_path)) in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
     "content", [None, b"", b"{", b"[]", b"null", b"\xff", b'{"scene": 3}', b'{"scene": {}}']
 )
 @pytest.mark.parametrize("verb", ["status", "report", "resume"])

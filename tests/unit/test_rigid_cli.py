@@ -52,11 +52,17 @@ def test_a_run_goes_on_from_its_last_sound_frame_to_the_same_end(scene: Path) ->
     np.testing.assert_array_equal(again["motion"].rates, last["motion"].rates)
 
 
-def test_another_scene_needs_force(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_another_scene_needs_force(
+    scene: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The folder is looked at before anything is compiled."""
     run = ["rigid", str(scene), "--no-pictures"]
     assert command.main(run) == 0
-    assert command.main([*run, "--set", "run.step=1e-3"]) == 2
-    assert "another scene" in capsys.readouterr().err
+    with monkeypatch.context() as context:
+        context.setattr("rigid_lcp.scene.make_simulation", None)
+        assert command.main([*run, "--set", "run.step=1e-3"]) == 2
+        assert "another scene" in capsys.readouterr().err
+        assert command.main([*run, "--resume"]) == 0
     assert command.main([*run, "--set", "run.step=1e-3", "--force"]) == 0
 
 

@@ -108,6 +108,7 @@ def test_a_finished_run_is_extended(
     assert list((tmp_path / "run" / "discarded").iterdir())
     assert read_status(tmp_path / "run").state == "finished"
     assert command.main(["resume", str(tmp_path / "run")]) == 0
+    assert capsys.readouterr().err.endswith(f"is finished: trackbed report {tmp_path / 'run'}\n")
     assert command.main(["resume", str(tmp_path / "run"), "--cycles", "90"]) == 2
     assert "can not be shortened to 90" in capsys.readouterr().err
     assert command.main([*words, "--cycles", "200", "--run-folder", str(tmp_path / "run")]) == 3

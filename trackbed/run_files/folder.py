@@ -180,6 +180,28 @@ class RunFolder:
         the run's own files are removed.  So does a folder with files of other people and no run,
         always.
         """
+        if self._judge(manifest, resume=resume, force=force):
+            return True
+        with refuse_writing(self.path):
+            for pattern in self.own:
+                for path in self.path.glob(pattern):
+                    path.unlink()
+        write_whole(self.path / "scene.toml", scene)
+        content = {"format": FORMAT, **manifest}
+        write_whole(self.path / MANIFEST, json.dumps(content, indent=1) + "\n")
+        return False
+
+    def look_ahead(
+        self, manifest: Mapping[str, Any], *, resume: bool, force: bool
+    ) -> dict[str, Any] | None:
+        """Raise what `prepare` would, before anything is compiled; the summary of a run that would
+        go on and is finished."""
+        if not self.path.exists():
+            return None
+        with self.lock():
+            return self.summary if self._judge(manifest, resume=resume, force=force) else None
+
+    def _judge(self, manifest: Mapping[str, Any], *, resume: bool, force: bool) -> bool:
         there = read_object(self.path / MANIFEST)
         if there is None:
             self._refuse_strangers()
@@ -194,13 +216,6 @@ class RunFolder:
                 f"this run is there already and {state}", where=str(self.path),
                 remedy="--resume to go on with it, or --force to compute it again",
             )  # fmt: skip
-        with refuse_writing(self.path):
-            for pattern in self.own:
-                for path in self.path.glob(pattern):
-                    path.unlink()
-        write_whole(self.path / "scene.toml", scene)
-        content = {"format": FORMAT, **manifest}
-        write_whole(self.path / MANIFEST, json.dumps(content, indent=1) + "\n")
         return False
 
     def _refuse_strangers(self) -> None:
