@@ -21,6 +21,7 @@ from adapters.bed.overlaps import (
     check_bed,
     find_behind_discs,
     find_pairs,
+    judge_state,
     list_wall_names,
     list_wall_rows,
     measure_bed,
@@ -54,7 +55,7 @@ __all__ = [
     "contact_law", "count_sides", "draw_radii", "draw_sample_start", "expect_grains",
     "find_behind_discs", "find_literal_restitution", "find_normal_force",
     "find_overlap_under_force", "find_pairs", "find_radius_that_fits", "find_rayleigh_time",
-    "find_rebound_damping", "find_sample_mass", "list_wall_names", "list_wall_rows", "load_state",
-    "make_no_contacts", "measure_bed", "measure_bed_height", "measure_relative_density",
-    "measure_rows", "measure_sample", "save_state", "solve_collision",
+    "find_rebound_damping", "find_sample_mass", "judge_state", "list_wall_names",
+    "list_wall_rows", "load_state", "make_no_contacts", "measure_bed", "measure_bed_height",
+    "measure_relative_density", "measure_rows", "measure_sample", "save_state", "solve_collision",
 ]  # fmt: skip

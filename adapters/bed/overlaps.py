@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from adapters.bed.container import Walls
-from adapters.bed.state import BoolArray, FloatArray, IntArray
+from adapters.bed.state import BoolArray, FloatArray, IntArray, State
 from adapters.errors import UsageError
 
 CYLINDER = "cylinder"
@@ -148,6 +148,41 @@ def check_bed(position: FloatArray, radius: FloatArray) -> None:
             where=f"grain {int(np.flatnonzero(bad)[0])} (counted from 0)",
             remedy="check the state that was read, and the law that extrapolated it",
         )
+
+
+DEEPEST = 0.5
+"""Overlap over the smaller radius above which a state is hardly a bed [-]: contacts bear to .05."""
+
+
+def judge_state(state: State, walls: Walls, where: str) -> str:
+    """A sentence on grains so deep in one another that radii and positions hardly belong together.
+
+    Raises `UsageError` for grains outside the ``walls``: this is no bed of theirs.
+    """
+    check_bed(state.position, state.radius)
+    rows = find_pairs(state.position, state.radius, walls)
+    at_wall = rows.second < 0
+    behind = np.where(at_wall, rows.overlap - state.radius[rows.first], -1.0)
+    if (behind > 0).any():
+        count, row = len(np.unique(rows.first[behind > 0])), np.argmax(behind)
+        raise UsageError(
+            f"{count} of {len(state.radius)} grains have their centres outside the walls of the "
+            f"scene, grain {state.identifier[rows.first[row]]} by {behind[row]:.3g} m behind "
+            f"{list_wall_names(walls)[-1 - rows.second[row]]}: this is no bed of this scene",
+            where=where,
+            remedy="give its own scene, in the units and the place of the state (floor at z = 0)",
+        )
+    least = np.minimum(state.radius[rows.first], state.radius[np.maximum(rows.second, 0)])
+    share = np.where(at_wall, 0.0, rows.overlap / least)
+    if not (share > DEEPEST).any():
+        return ""
+    row = np.argmax(share)
+    first, second = state.identifier[[rows.first[row], rows.second[row]]]
+    return (
+        f"{where}: grains {first} and {second} lie {share[row]:.2g} of the smaller radius in one "
+        f"another, {(share > DEEPEST).sum()} pairs deeper than {DEEPEST:g}: look whether radii are "
+        "diameters, and all lengths in one unit"
+    )
 
 
 def measure_bed(position: FloatArray, touching: Neighbours) -> Bed:

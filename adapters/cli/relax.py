@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 from adapters.cli.arguments import add_json, print_json
@@ -48,7 +49,7 @@ def run_relax(arguments: argparse.Namespace) -> int:
     """Relax a state, write it at rest, print what changed."""
     import numpy as np
 
-    from adapters.bed import make_no_contacts
+    from adapters.bed import judge_state, make_no_contacts
     from adapters.files import check_state_name, read_state_file, write_state_file
     from adapters.relaxation import relax, relax_bare
     from adapters.scene import flatten_keys, load_scene
@@ -63,6 +64,8 @@ def run_relax(arguments: argparse.Namespace) -> int:
     density = scene.material.grain.density
     state = read_state_file(arguments.state, density)
     walls = scene.container.walls(state.piston_height, scene.piston_reach)
+    if doubt := judge_state(state, walls, str(arguments.state)):
+        print(f"warning: {doubt}", file=sys.stderr)
     if arguments.before is None:
         load = float(scene.stress_at(0.0)) * scene.loaded_area
         relaxation = relax_bare(state, walls, scene.stiffness, method=arguments.method, load=load)

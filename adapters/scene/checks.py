@@ -203,7 +203,9 @@ def find_problems(values: Mapping[str, Any], invalid: Iterable[str] = ()) -> lis
     ``values`` by dotted key, defaults included; ``invalid`` names keys and tables that are not
     valid in themselves.
     """
-    return _run_checks(CHECKS, Values(values, invalid))
+    scene = Values(values, invalid)
+    found = _run_checks(CHECKS, scene)
+    return found + _run_checks(mechanics.IMPLAUSIBLE, scene) if found else []  # maybe the cause
 
 
 def find_warnings(values: Mapping[str, Any]) -> list[Problem]:

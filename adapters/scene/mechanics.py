@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from adapters.bed import (
@@ -18,6 +19,7 @@ from adapters.bed import (
 from adapters.errors import SceneError
 from adapters.files import read_load_series
 from adapters.scene.values import Check, NotValid, Values, find_geometry, find_radii
+from trackbed.plausible import Quantity, describe_implausible
 from trackbed.scene_files import Problem
 
 COUNT_GREATEST = 10**8
@@ -182,7 +184,25 @@ def _warn_of_far_jump(scene: Values) -> Iterator[Problem]:
         )
 
 
+SIZES: tuple[tuple[str, Quantity, float], ...] = (
+    ("material.grain.friction", "friction", 1), ("material.wall.friction", "friction", 1),
+    ("material.grain.young", "young", 1), ("material.wall.young", "young", 1),
+    ("material.grain.density", "density", 1), ("sample.grain_radius.mean", "grain", 2),
+    ("sample.radius", "body", 2), ("sample.size_x", "body", 1), ("sample.size_y", "body", 1),
+)  # fmt: skip
+"""Keys whose values are looked at for a unit that is not SI, and factors from radii to sizes."""
+
+
+def _warn_of_implausible_size(
+    key: str, quantity: Quantity, factor: float, scene: Values
+) -> Iterator[Problem]:
+    if said := describe_implausible(quantity, factor * scene.need(key), key):
+        yield Problem(key, said.removeprefix(f"{key}: "))
+
+
+IMPLAUSIBLE = tuple(partial(_warn_of_implausible_size, *row) for row in SIZES)
 DOUBTS: tuple[Check, ...] = (
+    *IMPLAUSIBLE,
     _warn_of_long_step, _warn_of_narrow_bed, _warn_of_few_steps,
     _warn_of_deep_chains, _warn_of_far_jump,
 )  # fmt: skip

@@ -244,6 +244,8 @@ def test_scene_survives_json(tmp_path: Path) -> None:
         ("sample.radius=0.02", "mean grain diameters wide"),
         ("loading.frequency=50000.0", "time steps long"),
         ("procedure.h=1000", "a jump of 1000 cycles is fitted to 20"),
+        ("material.grain.friction=30", "as an angle in degrees it would be 0.5774"),
+        ("material.grain.density=2.71", "as g/cm^3 it would be 2710 kg/m^3"),
         ("material.grain.young=1e8", "in force chains; above 0.05 a run is refused"),
     ],
 )

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from adapters.bed.state import State
+from adapters.engines.fake import place_lattice
 from adapters.errors import DumpError, UsageError
 from adapters.files import Frame, read_frames, write_dump
 from adapters.files.states import read_state_file, write_state_file
+from adapters.scene import load_scene
+from tests.small_bed import small_bed
 from trackbed.command import main
 
 
@@ -147,3 +151,29 @@ def test_export_has_remedies(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     ):
         assert main(["export", str(tmp_path / name), "--to", "csv"]) == 2
         assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("move", "scale", "said"),
+    [
+        ([0, 0, -0.5], 1, r"60 of 60 grains have their centres outside the walls.* behind floor"),
+        ([0.1, 0, 0], 1, r"outside the walls of the scene, grain \d+ by .* behind cylinder"),
+        ([0, 0, 0], 2, r"warning: .* of the smaller radius in one another.*radii are diameters"),
+        ([0, 0, 0], 1, ""),
+    ],
+)
+def test_a_state_of_another_scene_is_not_relaxed(
+    move: list[float], scale: float, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Exit code 2 and the grain, where it would be moved back without a word; a warning of grains
+    in one another."""
+    (tmp_path / "scene.toml").write_text(small_bed(k=4, h=8, total_cycles=24))
+    radius = np.full(60, 2e-3)
+    position = place_lattice(load_scene(tmp_path / "scene.toml"), 60, 2e-3) + move
+    still = np.zeros((60, 3))
+    state = State(np.arange(1, 61), position, scale * radius, radius, still, still)
+    write_state_file(state, tmp_path / "state.npz")
+    words = ["relax", str(tmp_path / "state.npz"), "--scene", str(tmp_path / "scene.toml")]
+    code = main([*words, "--out", str(tmp_path / "out.npz")])
+    assert (code == 2) is ("outside" in said)
+    assert re.search(said, capsys.readouterr().err)
