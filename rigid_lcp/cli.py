@@ -26,10 +26,12 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
 
 def run_rigid(arguments: argparse.Namespace) -> int:
     """Run a scene, or tell what would run."""
-    from rigid_lcp.scene import load_scene
+    from rigid_lcp.scene import list_doubts, load_scene
 
     refuse_both(arguments)
     file = load_scene(arguments.scene, arguments.overrides)
+    for doubt in list_doubts(file.tables):
+        print(f"warning: {doubt}", file=sys.stderr)
     answer = _preview_run(file) if arguments.dry_run else _run(file, arguments)
     if arguments.json:
         print(json.dumps(answer, indent=1))

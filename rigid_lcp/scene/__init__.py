@@ -1,6 +1,6 @@
 """Scenes: their file, grains poured, the run; `Simulation` is here."""
 
-from rigid_lcp.scene.file import SceneFile, load_scene
+from rigid_lcp.scene.file import SceneFile, list_doubts, load_scene
 from rigid_lcp.scene.run import (
     count_unknowns,
     list_left_out,
@@ -15,7 +15,7 @@ from rigid_lcp.scene.run_folder import RESULT, RunFolder, read_frame, rebuild_fr
 from rigid_lcp.scene.simulation import Simulation
 
 __all__ = [
-    "RESULT", "RunFolder", "SceneFile", "Simulation", "count_unknowns", "list_left_out",
-    "load_scene", "make_simulation", "plan_steps", "read_frame", "read_history",
+    "RESULT", "RunFolder", "SceneFile", "Simulation", "count_unknowns", "list_doubts",
+    "list_left_out", "load_scene", "make_simulation", "plan_steps", "read_frame", "read_history",
     "rebuild_frame_scene", "run_scene", "summarise_run", "write_history",
 ]  # fmt: skip

@@ -9,12 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import ShapeError
 from rigid_lcp.motion import Loads, Motion, Scene
 from rigid_lcp.scene.types import BodyTable, Grains, Load, SceneTables, find_faults
 from rigid_lcp.shapes import (
+    FLATNESS,
     Disc,
     HalfSpace,
     Polygon,
@@ -24,6 +26,7 @@ from rigid_lcp.shapes import (
     make_box,
     make_rotation,
 )
+from trackbed.plausible import describe_implausible
 from trackbed.scene_files import Guide, read_scene
 
 GUIDE = Guide("pile", "run.duration=0.1")
@@ -127,7 +130,45 @@ def make_shape(body: BodyTable, dim: int) -> Any:
             return Disc(body.radius) if dim == 2 else Sphere(body.radius)
         if body.box is not None:
             return Polygon.rectangle(*body.box) if dim == 2 else make_box(*body.box)
-        return (Polygon if dim == 2 else Polyhedron)(np.array(body.vertices))
+        given = np.array(body.vertices)
+        if dim == 2:
+            return Polygon(given)
+        shape = Polyhedron(given)
+        refuse_lost_vertices(given, shape)
+        return shape
+
+
+def refuse_lost_vertices(given: Floats, shape: Polyhedron) -> None:
+    """Raise `ShapeError` for vertices (n, 3) [m] that are no corners of their hull ``shape``: mass
+    and inertia would be those of another body, as of a channel with its lid on."""
+    apart, _ = cKDTree(shape.vertices + shape.centroid).query(given)
+    lost = np.flatnonzero(apart > FLATNESS * shape.reach)
+    if len(lost):
+        raise ShapeError(
+            f"it is not convex, or has needless vertices: {', '.join(map(str, lost[:5]))} "
+            f"({len(lost)} of {len(given)}, counted from 0) are no corners of the hull",
+            remedy="take the body apart into convex ones, or leave these vertices out",
+        )
+
+
+def list_doubts(tables: SceneTables) -> list[str]:
+    """Sentences on values that are likely in another unit than SI."""
+    named: list[tuple[str, Any]] = [("surface", tables.surface)]
+    for kind in ("ground", "body", "grains"):
+        named += [(f"{kind}.{i}", one) for i, one in enumerate(getattr(tables, kind))]
+    found: list[str | None] = []
+    for key, one in named:
+        for quantity in ("friction", "density"):
+            if (value := getattr(one, quantity, None)) is not None:
+                found.append(describe_implausible(quantity, value, f"{key}.{quantity}"))
+        if isinstance(one, Grains):
+            found.append(describe_implausible("grain", one.size[1], f"{key}.size"))
+        if isinstance(one, BodyTable):
+            size = 2 * (one.radius or 0.0) if one.vertices is None else float(
+                np.ptp(np.array(one.vertices), axis=0).max()
+            )  # fmt: skip
+            found.append(describe_implausible("body", max(size, *(one.box or [0.0])), key))
+    return [said for said in found if said]
 
 
 def make_loads(file: SceneFile) -> Loads | None:

@@ -12,7 +12,7 @@ from rigid_lcp.shapes.disc import Disc
 from rigid_lcp.shapes.half_space import HalfSpace
 from rigid_lcp.shapes.numbers import require_real, require_vector
 from rigid_lcp.shapes.polygon import Polygon
-from rigid_lcp.shapes.polyhedron import Polyhedron, make_box
+from rigid_lcp.shapes.polyhedron import FLATNESS, Polyhedron, make_box
 from rigid_lcp.shapes.rotations import (
     extract_quaternion,
     find_quaternion_rate,
@@ -28,7 +28,7 @@ from rigid_lcp.shapes.sphere import Sphere
 from trackbed.choices import find_choice
 
 __all__ = [
-    "Disc", "HalfSpace", "Polygon", "Polyhedron", "Sphere", "extract_quaternion",
+    "FLATNESS", "Disc", "HalfSpace", "Polygon", "Polyhedron", "Sphere", "extract_quaternion",
     "find_quaternion_rate", "get_shape", "make_box", "make_quaternion", "make_rotation",
     "multiply_quaternions", "normalise", "require_real", "require_vector", "rotate",
     "rotate_back", "turn_quaternion",

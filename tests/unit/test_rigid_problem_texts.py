@@ -96,6 +96,7 @@ def test_text_of_every_storage(tmp_path_factory, dim, contacts, seed, kind):
 TEXT_DAMAGED: dict[str, tuple[str, Callable[[str], str], str]] = {
     "empty": ("dense", lambda text: "", "0 of 5 numbers"),
     "cut short": ("dense", lambda text: text[: len(text) // 2], "ends within W"),
+    "left over": ("dense", lambda text: text + "0.5 0.5\n", "2 numbers are left over behind mu"),
     "no friction": ("blocks", lambda text: text[: text.rindex("\n", 0, -1)], "ends within mu"),
     "words": ("dense", lambda text: text.replace("e+00", "x", 1), "could not convert"),
     "rolling": ("dense", lambda text: text.replace("2", "5", 1), "rolling friction"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from contextlib import suppress
 from pathlib import Path
 from random import Random
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 from rigid_lcp.errors import RigidError, SceneError, ShapeError
-from rigid_lcp.scene.file import build_scene, find_force, load_scene, make_loads
+from rigid_lcp.scene.file import build_scene, find_force, list_doubts, load_scene, make_loads
 from rigid_lcp.scene.types import Load
 from rigid_lcp.shapes.irregular import draw_polygon
 
@@ -192,6 +193,39 @@ def test_cyclic_load_runs_between_its_forces() -> None:
 def test_a_shape_that_is_none_is_named(tmp_path: Path, old: str, new: str, said: str) -> None:
     with pytest.raises(ShapeError, match=said):
         build_scene(load_scene(written(tmp_path, SMALL.replace(old, new))))
+
+
+CUBE = [[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]
+
+
+@pytest.mark.parametrize("more", [[0.5, 0.5, 0.5], [0.5, 0.5, 0], [0.5, 0, 0]])
+def test_vertices_of_another_body_than_their_hull_are_refused(
+    tmp_path: Path, more: list[float]
+) -> None:
+    """In space as in the plane: inside it, in a face, on an edge."""
+    text = SMALL.replace("= 2\n", "= 3\n").replace("[0, 1]", "[0, 0, 1]")
+    text = text.replace("[0.0, 0.05]", "[0, 0, 1]")
+    whole, other = (
+        text.replace("box = [0.2, 0.1]", f"vertices = {v}") for v in (CUBE, [more, *CUBE])
+    )
+    assert build_scene(load_scene(written(tmp_path, whole))).bodies[-1].mass == pytest.approx(2000)
+    with pytest.raises(ShapeError, match=r"body block: .*vertices: 0 \(1 of 9, counted from 0\)"):
+        build_scene(load_scene(written(tmp_path, other)))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("box = [0.2, 0.1]", "box = [200, 100]", "body.0: a body of 200 m is above 100; as mm it"),
+        ("box = [0.2, 0.1]", "radius = 60", "body.0: a body of 120 m is above 100"),
+        ("density = 2000.0", "density = 2.0", "body.0.density: a density of 2 .* is below 500"),
+        ("density = 2000.0", "density = 2000.0\nfriction = 30", "body.0.friction: .* angle in deg"),
+    ],
+)
+def test_values_in_another_unit_are_doubted(tmp_path: Path, old: str, new: str, said: str) -> None:
+    assert list_doubts(load_scene(written(tmp_path, SMALL)).tables) == []
+    (doubt,) = list_doubts(load_scene(written(tmp_path, SMALL.replace(old, new))).tables)
+    assert re.search(said, doubt)
 
 
 def test_a_load_acts_on_the_named_body_alone() -> None:

@@ -96,7 +96,10 @@ def _read_parts(text: str) -> tuple[sp.csr_array, Floats, Floats, int]:
         matrix = _read_dense(rest, size) if storage == DENSE else _read_blocks(rest, size)
     else:
         raise ValueError(f"storage of W is {storage}, not 0 (dense), 1 (blocks) or 2 (sparse)")
-    return matrix, rest.take(size, "q"), rest.take(contacts, "mu"), dim
+    q, mu = rest.take(size, "q"), rest.take(contacts, "mu")
+    if (left := len(rest.words) - rest.at) > 1:  # some files end with a number more
+        raise ValueError(f"{left} numbers are left over behind mu, so it is no such problem")
+    return matrix, q, mu, dim
 
 
 def _read_dense(numbers: _Numbers, size: int) -> sp.csr_array:
