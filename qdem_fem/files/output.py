@@ -92,12 +92,6 @@ class Table:
         kept, rows = len(header), 0
         try:
             with self.path.open("rb+") as stream:
-                if hashlib.sha256(stream.read(seal[0])).hexdigest() != seal[1]:
-                    raise UsageError(
-                        "this table was changed since it was written", where=str(self.path),
-                        remedy="start again: --force",
-                    )  # fmt: skip
-                stream.seek(0)
                 if stream.readline() != header:
                     raise UsageError("this table has other columns", where=str(self.path))
                 for line in stream:
@@ -110,6 +104,12 @@ class Table:
                         where=str(self.path),
                         remedy="start again: --force",
                     )
+                stream.seek(0)
+                if hashlib.sha256(stream.read(seal[0])).hexdigest() != seal[1]:
+                    raise UsageError(
+                        "this table was changed since it was written", where=str(self.path),
+                        remedy="start again: --force",
+                    )  # fmt: skip
                 stream.truncate(kept)
         except (OSError, ValueError) as error:
             raise UsageError(

@@ -134,10 +134,10 @@ def test_interrupt_is_no_damaged_file(tmp_path: Path, monkeypatch: pytest.Monkey
 
     load = np.load
 
-    def interrupt(path: Path, **named: Any) -> Any:
-        if path.name == "states.npz":
+    def interrupt(file: Any, **named: Any) -> Any:
+        if Path(file.name).name == "states.npz":
             os.kill(os.getpid(), signal.SIGTERM)
-        return load(path, **named)
+        return load(file, **named)
 
     monkeypatch.setattr(np, "load", interrupt)
     assert command.main(["run", str(tmp_path / "scene.toml")]) == 130
