@@ -11,6 +11,7 @@ from textwrap import wrap
 
 from trackbed import __version__
 from trackbed.errors import NO_ROOM, Interrupted, TrackbedError, describe_exit_codes
+from trackbed.run_files import note_interrupts
 from trackbed.run_verbs import choose_command
 
 START, RUN = "adapters.cli.start", "adapters.cli.run"
@@ -154,9 +155,10 @@ def main(words: Sequence[str] | None = None) -> int:
     """Run one verb; every outcome is an exit code and, if bad, a sentence on stderr."""
     words = sys.argv[1:] if words is None else words
     try:
-        arguments = build_parser(find_verb(words)).parse_args(words)
-        code = choose_command(arguments)(arguments)
-        sys.stdout.flush()
+        with note_interrupts():
+            arguments = build_parser(find_verb(words)).parse_args(words)
+            code = choose_command(arguments)(arguments)
+            sys.stdout.flush()
         return code
     except BrokenPipeError:  # the reader of our output went away, as in: trackbed ... | head
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import json
 import math
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -17,6 +19,7 @@ import pytest
 import trackbed
 from adapters import errors
 from trackbed.command import VERBS, explain_error, main
+from trackbed.run_files import raise_on_signals
 
 ROOT = Path(__file__).parents[2]
 
@@ -150,6 +153,28 @@ def test_exit_codes(
     assert "Traceback" not in text
     assert main(["cite", "--debug"]) == main(["--debug", "cite"]) == code
     assert capsys.readouterr().err.count("Traceback") == 2
+
+
+@pytest.mark.parametrize("begins", [True, False])
+def test_an_interrupt_that_python_drops_ends_the_command(
+    begins: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What is raised in a finaliser is printed and dropped: Ctrl-C there counts all the same."""
+    after: list[str] = []
+
+    def work(_arguments: object) -> int:
+        with contextlib.suppress(KeyboardInterrupt):  # as Python itself does
+            os.kill(os.getpid(), signal.SIGINT)
+        if begins:
+            with raise_on_signals("nothing", "again"):
+                after.append("computed")
+        return 0
+
+    monkeypatch.setattr("adapters.cli.start.run_cite", work)
+    assert main(["cite"]) == 130
+    assert after == []
+    assert "interrupted" in capsys.readouterr().err
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_reader_goes_away() -> None:

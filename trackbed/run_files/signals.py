@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
@@ -12,9 +12,46 @@ from typing import Any
 from trackbed.errors import Interrupted
 
 
+@dataclass
+class Stop:
+    """Whether we were asked to stop: ``name`` of the signal."""
+
+    name: str = ""
+
+
+HEARD = Stop()
+"""The Ctrl-C that a command got; Python drops what is raised while it clears away an object."""
+
+
 @contextmanager
-def handle_signals(act: Callable[[signal.Signals], None], *, once: bool = False) -> Iterator[None]:
-    """Call ``act`` for SIGTERM and Ctrl-C inside; the handlers before come back behind it.
+def note_interrupts() -> Iterator[None]:
+    """Raise `KeyboardInterrupt` at Ctrl-C inside, and again where a run begins or the block ends
+    if nobody took notice."""
+
+    def interrupt(number: signal.Signals) -> None:
+        HEARD.name = number.name
+        raise KeyboardInterrupt
+
+    try:
+        with handle_signals(interrupt, (signal.SIGINT,)):
+            yield
+            raise_if_heard()
+    finally:
+        HEARD.name = ""
+
+
+def raise_if_heard() -> None:
+    """Raise `KeyboardInterrupt` if there was one."""
+    if HEARD.name:
+        raise KeyboardInterrupt
+
+
+@contextmanager
+def handle_signals(
+    act: Callable[[signal.Signals], None],
+    numbers: Sequence[signal.Signals] = (signal.SIGTERM, signal.SIGINT), *, once: bool = False,
+) -> Iterator[None]:  # fmt: skip
+    """Call ``act`` for these signals inside; the handlers before come back behind it.
 
     With ``once`` they come back at the first signal already.  In the main thread only: elsewhere
     whoever runs us takes care of signals.
@@ -31,7 +68,7 @@ def handle_signals(act: Callable[[signal.Signals], None], *, once: bool = False)
         act(signal.Signals(number))
 
     with suppress(ValueError):  # not in the main thread
-        for number in (signal.SIGTERM, signal.SIGINT):
+        for number in numbers:
             before[number] = signal.signal(number, call_handler)
     try:
         yield
@@ -47,15 +84,9 @@ def raise_on_signals(kept: str, remedy: str, where: str = "") -> Iterator[None]:
         place = f"{where}: " if where else ""
         raise Interrupted(f"{place}stopped by {number.name}; {kept}\n  -> {remedy}")
 
+    raise_if_heard()
     with handle_signals(stop):
         yield
-
-
-@dataclass
-class Stop:
-    """Whether we were asked to stop: ``name`` of the signal."""
-
-    name: str = ""
 
 
 @contextmanager
@@ -70,5 +101,6 @@ def note_signals() -> Iterator[Stop]:
         stop.name = number.name
         print(f"{stop.name}: the state is saved, then the run stops", file=sys.stderr)
 
+    raise_if_heard()
     with handle_signals(note, once=True):
         yield stop
