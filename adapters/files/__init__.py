@@ -12,7 +12,7 @@ from adapters.files.window import Window, load_window, read_state, read_window, 
 
 __all__ = [
     "COLUMNS", "EVENTS", "UNKNOWN", "Frame", "Kind", "LoadSeries", "Outcome", "RunFolder", "Series",
-    "Window", "check_state_name", "explain_full_disk", "load_window", "make_too_few_error", "place_stage",
-    "read_frames", "read_load_series", "read_series", "read_state", "read_state_file",
-    "read_window", "save_window", "write_dump", "write_state_file",
+    "Window", "check_state_name", "explain_full_disk", "load_window", "make_too_few_error",
+    "place_stage", "read_frames", "read_load_series", "read_series", "read_state",
+    "read_state_file", "read_window", "save_window", "write_dump", "write_state_file",
 ]  # fmt: skip

@@ -233,7 +233,7 @@ def march_grains(
     listed_at[0, 0] = np.inf  # no list yet
     pairs = np.zeros((0, 2), dtype=np.int64)
     bodies, numbers = np.zeros((0, 2), dtype=np.int64), np.zeros((0, 7))
-    carried = np.zeros((0, 2))
+    carried, still = np.zeros((0, 2)), np.zeros((count, 3))
     work = 0.0
     for step in range(steps):
         position = place[:, :2].copy()
@@ -249,7 +249,7 @@ def march_grains(
             pairs = list_pairs(kind, first, world_vertices, world_normals, radius, position,
                                  movable, skin)  # fmt: skip
         bodies, numbers, new_key = find_pair_contacts(
-            pairs, kind, first, world_vertices, world_normals, radius, position, none
+            pairs, kind, first, world_vertices, world_normals, radius, position, none, still
         )
         new_pair = np.empty(len(bodies), dtype=np.int64)
         for c in range(len(bodies)):
@@ -258,6 +258,9 @@ def march_grains(
                 new_pair[c] = a * count + b
             else:
                 new_pair[c] = min(a, b) * count + max(a, b)
+        order = np.argsort(new_pair, kind="mergesort")
+        new_pair, new_key, numbers = new_pair[order], new_key[order], numbers[order]
+        bodies = bodies[order]
         spring = keep_springs(new_pair, new_key, numbers[:, :2], pair, key, point, spring)
         pair, key, point = new_pair, new_key, numbers[:, :2].copy()
         at = (step + 0.5) / steps * (len(forces) - 1)
