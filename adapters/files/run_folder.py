@@ -49,10 +49,8 @@ class Outcome:
 
     stage: str
     """``preparation``, ``window`` or ``jump``."""
-    first_cycle: int
-    """Cycles done before the stage."""
-    last_cycle: int
-    """Cycles done after it."""
+    first_cycle: int  # cycles done before the stage
+    last_cycle: int  # and after it
     rows: list[dict[str, Any]]
     """One row of ``settlement.csv`` for each cycle end, by the names in `COLUMNS`."""
     cost: dict[str, float]
@@ -343,12 +341,9 @@ class RunFolder:
         for name in other.stage_names():
             outcome = other.outcome(name)
             here = self.path / name
-            if (
-                outcome is None
-                or outcome.stage == "jump"
-                or outcome.last_cycle > last_cycle
-                or here.exists()
-            ):
+            if outcome is None or outcome.stage == "jump" or outcome.last_cycle > last_cycle:
+                continue
+            if here.exists():
                 continue
             temporary = self.path / f".{name}.linked"
             shutil.rmtree(temporary, ignore_errors=True)
