@@ -322,16 +322,10 @@ class RunFolder:
         """The manifest; raises `UsageError` when this is no run folder."""
         content = read_object(self.path / "manifest.json") or {}
         if not content.keys() >= set(MANIFEST):
-            inner, do = self.path / "run", "give the folder that trackbed run made"
-            if (inner / "manifest.json").is_file():
-                do = f"the run is in it: give {inner}"
-            elif self.path.is_dir():
-                do += "; if it was stopped in its first second, start it again: trackbed run SCENE"
-            else:
-                do += f", {'not a file' if self.path.exists() else 'which is not there'}"
             raise UsageError(
                 "this is not a run folder (no readable manifest.json)", where=str(self.path),
-                remedy=do,
+                remedy="give the folder that trackbed run made; if it was stopped in its first "
+                "second, start it again: trackbed run SCENE",
             )  # fmt: skip
         refuse_format(self.path, content)
         return content

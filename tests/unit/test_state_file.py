@@ -144,9 +144,9 @@ def test_export_has_remedies(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     (tmp_path / "bed" / "run" / "manifest.json").write_text("{}")
     (tmp_path / "scene.toml").write_text("")
     for name, said in (
-        ("none", "which is not there"),
-        ("scene.toml", "not a file"),
-        ("bed", f"the run is in it: give {tmp_path / 'bed' / 'run'}"),
+        ("none", "there is no such folder"),
+        ("scene.toml", "this is a file, not a run folder"),
+        ("bed", f"its runs: {tmp_path / 'bed' / 'run'}"),
         ("bed/run", "start it again"),
     ):
         assert main(["export", str(tmp_path / name), "--to", "csv"]) == 2
