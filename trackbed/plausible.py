@@ -18,8 +18,7 @@ class Bounds:
     unit: str
     least: float
     most: float
-    usual: tuple[float, float]
-    """Where a value lies once it is read in the unit that was meant."""
+    usual: tuple[float, float]  # where a value lies once it is read in the unit that was meant
     units: tuple[tuple[str, float], ...] = ()
     """Units that are mistaken for it, each with its factor to SI, the likeliest first."""
 

@@ -32,14 +32,11 @@ RUN_VERBS = ("status", "report", "export", "resume")
 class Kind:
     """A kind of run, by what its folder holds."""
 
-    table: str
-    """A table of the scene that only this kind has."""
-    verb: str
-    """The verb that runs such a scene."""
+    table: str  # a table of the scene that only this kind has
+    verb: str  # the verb that runs such a scene
     states: str = ""
     """Pattern of its saved states; empty for a kind whose story has the verbs itself."""
-    files: str = ""
-    """What its folder holds for other programs, as a sentence."""
+    files: str = ""  # what its folder holds for other programs, as a sentence
 
 
 KINDS = (

@@ -60,13 +60,11 @@ class Table:
     """Rows of text cells, k of them, as long as the header."""
 
     path: Path
-    header: list[str]
-    """Empty for a table of two columns that has none."""
+    header: list[str]  # empty for a table of two columns that has none
     header_line: int
     units: list[str]
     """Cells of a row of units below the header, without brackets; [] where there is none."""
-    lines: list[int]
-    """Line of each row in the file, for those who have to look there."""
+    lines: list[int]  # line of each row in the file, for those who have to look there
     rows: list[list[str]]
     decimal_comma: bool
     """True where a comma may stand for a decimal point, as it separates no cells."""

@@ -66,12 +66,9 @@ def combine_shear_moduli(
 class HertzStiffness:
     """Equivalent moduli E* of eq. 5 [Pa]."""
 
-    grain: float
-    """Between two grains."""
-    wall: float
-    """Between a grain and a wall."""
-    mirror: float
-    """Between a grain and its own mirror image, that is, a rigid symmetry plane."""
+    grain: float  # between two grains
+    wall: float  # between a grain and a wall
+    mirror: float  # between a grain and its own mirror image, that is, a rigid symmetry plane
 
 
 def make_hertz_stiffness(
@@ -177,12 +174,9 @@ def find_rebound_damping(restitution: float) -> float:
 class Collision:
     """Outcome of two grains, or a grain and a wall, that meet head-on."""
 
-    restitution: float
-    """Speed after over speed before, dimensionless."""
-    overlap_max: float
-    """Greatest overlap [m]."""
-    contact_time: float
-    """Time in contact [s]."""
+    restitution: float  # speed after over speed before, dimensionless
+    overlap_max: float  # greatest overlap [m]
+    contact_time: float  # time in contact [s]
 
 
 def solve_hertz_collision(speed: float, modulus: float, radius: float, mass: float) -> Collision:

@@ -20,18 +20,13 @@ SIDES_GAP = 0.01
 class Walls:
     """Walls that grains may touch: ``p`` planes, and a vertical cylinder around the z axis."""
 
-    plane_name: tuple[str, ...]
-    """Names, such as ``floor``, ``symmetry_x``, ``piston``; p of them."""
-    plane_point: FloatArray
-    """A point of each plane [m], shape (p, 3)."""
-    plane_normal: FloatArray
-    """Unit normal of each plane, pointing at the grains, shape (p, 3)."""
-    plane_frictionless: tuple[bool, ...]
-    """True for symmetry planes; p of them."""
+    plane_name: tuple[str, ...]  # names, such as ``floor``, ``symmetry_x``, ``piston``; p of them
+    plane_point: FloatArray  # a point of each plane [m], shape (p, 3)
+    plane_normal: FloatArray  # unit normal of each plane, pointing at the grains, shape (p, 3)
+    plane_frictionless: tuple[bool, ...]  # true for symmetry planes; p of them
     plane_reach: FloatArray
     """Distance from the z axis beyond which a plane ends [m], shape (p,); inf for whole planes."""
-    cylinder_radius: float = np.inf
-    """Inner radius of the cylinder [m]; inf without one."""
+    cylinder_radius: float = np.inf  # inner radius of the cylinder [m]; inf without one
 
     @property
     def geometry(self) -> tuple[FloatArray, FloatArray, FloatArray, float]:
@@ -57,15 +52,11 @@ class Container:
     (size_x, size_y); its wall x = 0 is a mirror when "x" is in ``symmetry``, else a wall.
     """
 
-    shape: str
-    """"cylinder" or "box"."""
+    shape: str  # "cylinder" or "box"
     symmetry: tuple[str, ...] = ()
-    radius: float = np.nan
-    """Radius of the cylinder [m]."""
-    size_x: float = np.nan
-    """Length of the box along x [m]."""
-    size_y: float = np.nan
-    """Length of the box along y [m]."""
+    radius: float = np.nan  # radius of the cylinder [m]
+    size_x: float = np.nan  # length of the box along x [m]
+    size_y: float = np.nan  # length of the box along y [m]
     sides: int = 0
     """Planes that stand for a whole cylinder, tangent to it, in an engine that has none; a
     multiple of 4, so that mirror planes pass through corners.  0: a true cylinder."""

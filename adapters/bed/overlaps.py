@@ -19,14 +19,10 @@ CYLINDER = "cylinder"
 class Neighbours:
     """Rows: one for each pair of grains, and for each grain and wall, nearer than some gap."""
 
-    first: IntArray
-    """Index of the grain, shape (m,)."""
-    second: IntArray
-    """Index of the other grain, above ``first``; or wall w as -1 - w; shape (m,)."""
-    normal: FloatArray
-    """Unit vector that points at the first grain, shape (m, 3)."""
-    overlap: FloatArray
-    """Overlap delta [m], negative for a gap, shape (m,)."""
+    first: IntArray  # index of the grain, shape (m,)
+    second: IntArray  # index of the other grain, above ``first``; or wall w as -1 - w; shape (m,)
+    normal: FloatArray  # unit vector that points at the first grain, shape (m, 3)
+    overlap: FloatArray  # overlap delta [m], negative for a gap, shape (m,)
 
     def __len__(self) -> int:
         return len(self.first)
@@ -36,18 +32,13 @@ class Neighbours:
 class Bed:
     """What the overlaps of one configuration say."""
 
-    contacts: int
-    """Rows in contact: pairs of grains, and grains with walls."""
-    coordination_number: float
-    """Mean number of contacts of a grain with other grains."""
+    contacts: int  # rows in contact: pairs of grains, and grains with walls
+    coordination_number: float  # mean number of contacts of a grain with other grains
     coordination_with_walls: float
     """The same, contacts with walls, mirror planes and piston counted too."""
-    max_penetration: float
-    """Greatest overlap [m]; 0 without contact."""
-    mean_penetration: float
-    """Mean overlap of the contacts [m]; 0 without contact."""
-    mean_height: float
-    """Mean height of the centres [m]."""
+    max_penetration: float  # greatest overlap [m]; 0 without contact
+    mean_penetration: float  # mean overlap of the contacts [m]; 0 without contact
+    mean_height: float  # mean height of the centres [m]
 
 
 def list_wall_names(walls: Walls) -> tuple[str, ...]:

@@ -23,10 +23,8 @@ class RadiusDistribution:
     deviation is what it says; ``constant`` is the mean.
     """
 
-    name: str
-    """"normal", "uniform" or "constant"."""
-    mean: float
-    """Mean radius [m]."""
+    name: str  # "normal", "uniform" or "constant"
+    mean: float  # mean radius [m]
     standard_deviation: float = 0.0
     """Standard deviation [m]; of the normal distribution before it is cut."""
     truncation: float = 2.0

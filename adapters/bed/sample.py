@@ -131,14 +131,11 @@ def measure_bed_height(position: FloatArray, radius: FloatArray) -> float:
 class CoordinationNumber:
     """Mean number of contacts of a grain, three ways."""
 
-    grains: float
-    """Contacts with other grains; what LIGGGHTS' ``compute contact/atom`` averages."""
-    with_walls: float
-    """Contacts with walls, mirror planes and the piston counted too."""
+    grains: float  # contacts with other grains; what LIGGGHTS' ``compute contact/atom`` averages
+    with_walls: float  # contacts with walls, mirror planes and the piston counted too
     without_rattlers: float
     """The same over grains of two contacts and more, which carry the bed (Thornton 2000)."""
-    rattler_share: float
-    """Part of the grains with fewer than two contacts."""
+    rattler_share: float  # part of the grains with fewer than two contacts
 
 
 def measure_coordination(
@@ -165,15 +162,11 @@ def measure_coordination(
 class SampleFigures:
     """Figures of a bed at one instant, as in Fig. 3 of the paper."""
 
-    weight: float
-    """Weight of all grains [N]."""
-    apparent_weight: float
-    """Force on the floor [N]; the side walls carry the rest by friction."""
+    weight: float  # weight of all grains [N]
+    apparent_weight: float  # force on the floor [N]; the side walls carry the rest by friction
     coordination: CoordinationNumber
-    relative_density: float
-    """Below `SURFACE_SHARE` of the bed's height."""
-    height: float
-    """`measure_bed_height` [m]."""
+    relative_density: float  # below `SURFACE_SHARE` of the bed's height
+    height: float  # `measure_bed_height` [m]
 
 
 def measure_sample(state: State, container: Container) -> SampleFigures:

@@ -25,12 +25,9 @@ GRAIN_ARRAYS = ("identifier", "position", "radius", "mass", "velocity", "spin")
 class Contacts:
     """Grain-grain contacts of one instant, each pair once."""
 
-    pair: IntArray
-    """Grain identifiers (i, j) with i < j, shape (m, 2)."""
-    overlap: FloatArray
-    """Overlap delta_n = r_i + r_j - |x_i - x_j| [m], shape (m,)."""
-    normal_force: FloatArray
-    """Normal force on grain i, elastic and viscous part [N], shape (m, 3)."""
+    pair: IntArray  # grain identifiers (i, j) with i < j, shape (m, 2)
+    overlap: FloatArray  # overlap delta_n = r_i + r_j - |x_i - x_j| [m], shape (m,)
+    normal_force: FloatArray  # normal force on grain i, elastic and viscous part [N], shape (m, 3)
     tangential_force: FloatArray
     """Tangential force on grain i [N], shape (m, 3); zeros in a frictionless scene."""
     tangential_spring: FloatArray
@@ -55,27 +52,18 @@ def make_no_contacts() -> Contacts:
 class State:
     """Grains, contacts and piston at one instant, SI units; grains sorted by identifier."""
 
-    identifier: IntArray
-    """Grain identifiers, ascending, shape (n,)."""
-    position: FloatArray
-    """Centres [m], shape (n, 3)."""
-    radius: FloatArray
-    """Radii [m], shape (n,)."""
-    mass: FloatArray
-    """Masses [kg], shape (n,)."""
-    velocity: FloatArray
-    """Velocities [m/s], shape (n, 3)."""
-    spin: FloatArray
-    """Angular velocities [rad/s], shape (n, 3)."""
+    identifier: IntArray  # grain identifiers, ascending, shape (n,)
+    position: FloatArray  # centres [m], shape (n, 3)
+    radius: FloatArray  # radii [m], shape (n,)
+    mass: FloatArray  # masses [kg], shape (n,)
+    velocity: FloatArray  # velocities [m/s], shape (n, 3)
+    spin: FloatArray  # angular velocities [rad/s], shape (n, 3)
     contacts: Contacts = field(default_factory=make_no_contacts)
     wall_force: dict[str, FloatArray] = field(default_factory=dict)
     """Force of each named wall on each grain [N], shape (n, 3) each."""
-    piston_height: float = np.nan
-    """Height of the piston's lower face [m]; nan without a piston."""
-    cycle: int = 0
-    """Load cycles done, jumped ones included."""
-    time_step: int = 0
-    """The engine's own step count."""
+    piston_height: float = np.nan  # height of the piston's lower face [m]; nan without a piston
+    cycle: int = 0  # load cycles done, jumped ones included
+    time_step: int = 0  # the engine's own step count
 
     def move_to(self, position: FloatArray, **change: object) -> State:
         """The same grains at other positions [m], shape (n, 3)."""

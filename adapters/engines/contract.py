@@ -39,18 +39,13 @@ ENGINE_REMEDY = (
 class EngineStart:
     """The saved state from which a window starts."""
 
-    restart: Path
-    """The engine's own restart file."""
-    time_step: int
-    """Its step count."""
-    piston_mesh: int
-    """Number of the piston's mesh: a jump places a new one."""
-    piston_height: float
-    """Height of the piston's face [m]."""
+    restart: Path  # the engine's own restart file
+    time_step: int  # its step count
+    piston_mesh: int  # number of the piston's mesh: a jump places a new one
+    piston_height: float  # height of the piston's face [m]
     moved: State | None = None
     """Positions after a jump, at rest; None goes on from the restart file as it is."""
-    first: bool = False
-    """True for the first window after the preparation, which has no piston yet."""
+    first: bool = False  # true for the first window after the preparation, which has no piston yet
 
     perturbation: float = 0.0
     """Displacement [m] of the first grain along x, for a control of round-off."""
@@ -70,14 +65,11 @@ class EngineRun:
     """One process of an engine that ended and said so."""
 
     command: tuple[str, ...]
-    cpu_s: float
-    """CPU time of the process and its children, user and system [s]."""
-    wall_s: float
-    """Elapsed time [s]."""
+    cpu_s: float  # CPU time of the process and its children, user and system [s]
+    wall_s: float  # elapsed time [s]
     start_up_s: float
     """CPU time before and after the time steps: reading, building neighbours, writing [s]."""
-    decks: dict[str, str]
-    """SHA-256 of every static deck used."""
+    decks: dict[str, str]  # SHA-256 of every static deck used
 
 
 class Engine(Protocol):

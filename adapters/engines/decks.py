@@ -62,8 +62,7 @@ PARTS_CYCLES = ("in.cycles", "settings.in", "bed.in", "piston.in")
 class DeckEngine(ProcessEngine):
     """What LIGGGHTS and LAMMPS share: static decks copied, what the scene names written beside."""
 
-    package: str
-    """Where the static decks are."""
+    package: str  # where the static decks are
     loop_time = LOOP_TIME
 
     @abstractmethod

@@ -19,15 +19,11 @@ LIBRARIES = (
 class Finding:
     """One thing looked for on this machine."""
 
-    kind: str
-    """"engine", "python" or "library"."""
+    kind: str  # "engine", "python" or "library"
     name: str
-    version: str
-    """As the thing prints it; empty when it is not there."""
-    where: str = ""
-    """Path of a program."""
-    remedy: str = ""
-    """What to do; empty when nothing is wrong."""
+    version: str  # as the thing prints it; empty when it is not there
+    where: str = ""  # path of a program
+    remedy: str = ""  # what to do; empty when nothing is wrong
 
 
 def _check_engine(name: str) -> Finding:

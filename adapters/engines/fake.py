@@ -38,8 +38,7 @@ def find_logarithm(cycle: FloatArray) -> FloatArray:
 class FakeBed:
     """How the mean grain settles."""
 
-    law: Callable[[FloatArray], FloatArray] = find_logarithm
-    """u(N) [m]."""
+    law: Callable[[FloatArray], FloatArray] = find_logarithm  # u(N) [m]
     sinking: float = field(default=0.0, kw_only=True)
     """What the piston sinks further than the mean grain, each cycle [m]."""
 

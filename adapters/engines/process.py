@@ -220,24 +220,19 @@ class ProcessEngine(ABC):
     """What engines with a process of their own share: how a deck is run and judged."""
 
     name: str
-    title: str
-    """What it calls itself."""
-    question: str = "-h"
-    """The word that its version is asked with."""
+    title: str  # what it calls itself
+    question: str = "-h"  # the word that its version is asked with
     banner: re.Pattern[str]
     """What it answers: group 1 is the version's text, further groups are numbers."""
-    oldest: tuple[int, ...]
-    """Those numbers of the oldest version that is known to work."""
-    remedy: str
-    """How to get it."""
+    oldest: tuple[int, ...]  # those numbers of the oldest version that is known to work
+    remedy: str  # how to get it
     begun: re.Pattern[str]
     """What the engine prints once when it starts; without it the failure came from outside (a
     launcher, a loader), twice it is two runs in one folder."""
     loop_time: re.Pattern[str]
     """Its words for the seconds that the time steps took and the processes they took them on, 1
     where it says CPU time."""
-    launch: str
-    """How it is launched rightly."""
+    launch: str  # how it is launched rightly
     ended_early: str | None = None
     """What it prints when it is ended by SIGTERM and exits 0 all the same."""
     piston_wall = "piston_wall"

@@ -19,8 +19,7 @@ class Instant:
     """The bed at the end of a load cycle; at cycle 0 before loading."""
 
     state: State
-    displacement: FloatArray
-    """Of every grain since cycle 0 [m], shape (n, 3)."""
+    displacement: FloatArray  # of every grain since cycle 0 [m], shape (n, 3)
     coordination: IntArray
     """Contacts of every grain with other grains, shape (n,); their mean is the run's table's."""
 

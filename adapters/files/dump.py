@@ -41,8 +41,7 @@ TILTS = {2: "ff ff ff", 3: "xy xz yz ff ff ff", 4: "abc origin ff ff ff"}
 class Frame:
     """One instant of a dump: n rows of named columns, in the units of the run (here SI)."""
 
-    time_step: int
-    """The engine's step count."""
+    time_step: int  # the engine's step count
     columns: tuple[str, ...]
     """Names as the header has them, such as ``x`` or ``c_contacts[1]``; c of them."""
     values: FloatArray
@@ -51,8 +50,7 @@ class Frame:
     """Box, low and high [m], shape (3, 2); (3, 3) or (3, 4) for a tilted box, (0, 2) for none."""
     kind: Kind = "atoms"
     """"atoms" for grains (dump custom), "entries" for contacts and the like (dump local)."""
-    boundary: str = "ff ff ff"
-    """What the header says of the box's sides and tilt."""
+    boundary: str = "ff ff ff"  # what the header says of the box's sides and tilt
 
     def column(self, name: str) -> FloatArray:
         """Values of one column, shape (n,); raises `DumpError` when there is none of this name."""

@@ -20,10 +20,8 @@ SPACING_TOLERANCE = 1e-6
 class LoadSeries:
     """One period of a load, sampled evenly; the last sample is the first of the next period."""
 
-    time: FloatArray
-    """Times [s], shape (n + 1,)."""
-    stress: FloatArray
-    """Stress on the loaded area [Pa], shape (n + 1,); first = last."""
+    time: FloatArray  # times [s], shape (n + 1,)
+    stress: FloatArray  # stress on the loaded area [Pa], shape (n + 1,); first = last
 
     @property
     def period(self) -> float:

@@ -47,16 +47,14 @@ COLUMNS = (
 class Outcome:
     """What a finished stage left behind, besides its files."""
 
-    stage: str
-    """``preparation``, ``window`` or ``jump``."""
+    stage: str  # ``preparation``, ``window`` or ``jump``
     first_cycle: int  # cycles done before the stage
     last_cycle: int  # and after it
     rows: list[dict[str, Any]]
     """One row of ``settlement.csv`` for each cycle end, by the names in `COLUMNS`."""
     cost: dict[str, float]
     """CPU time by purpose [s]: engine, start_up (part of engine), parse, fit, relax, other."""
-    checks: dict[str, float] = field(default_factory=dict)
-    """Figures the validators judged."""
+    checks: dict[str, float] = field(default_factory=dict)  # figures the validators judged
     notes: dict[str, Any] = field(default_factory=dict)
     """What else the report tells: time step, piston mesh, command, relaxation."""
 
@@ -81,12 +79,9 @@ class Listing:
     """What is in a folder whose lock we hold: nobody else makes or moves stages there, so it is
     read once, and a further stage costs as much as the first."""
 
-    names: list[str]
-    """Of all stages, in order."""
-    finished: dict[str, Outcome]
-    """Those finished, in order, without failed jumps."""
-    table: tuple[int, ...] = ()
-    """Identity of the ``settlement.csv`` that has all their rows."""
+    names: list[str]  # of all stages, in order
+    finished: dict[str, Outcome]  # those finished, in order, without failed jumps
+    table: tuple[int, ...] = ()  # identity of the ``settlement.csv`` that has all their rows
 
 
 def place_stage(name: str) -> tuple[int, int, str]:

@@ -22,22 +22,15 @@ UNKNOWN = "unknown"
 class Series:
     """Settlement at ascending cycles, k of them."""
 
-    cycle: FloatArray
-    """Load cycles done, not always whole numbers, none twice, shape (k,)."""
-    settlement: FloatArray
-    """Settlement, positive downwards, in ``unit``, shape (k,)."""
-    unit: str = "m"
-    """m, cm, mm, um, %, 1 (strain), or `UNKNOWN`."""
-    begun: float = 0.0
-    """Settlement before cycle 0, where that is known, in ``unit``."""
+    cycle: FloatArray  # load cycles done, not always whole numbers, none twice, shape (k,)
+    settlement: FloatArray  # settlement, positive downwards, in ``unit``, shape (k,)
+    unit: str = "m"  # m, cm, mm, um, %, 1 (strain), or `UNKNOWN`
+    begun: float = 0.0  # settlement before cycle 0, where that is known, in ``unit``
     counted_from: float = 0.0
     """The user's number of cycle 0: the load change that ``cycle`` is counted from."""
-    where: str = ""
-    """File or folder it was read from, for errors."""
-    left_out: int = 0
-    """Rows that `keep_from` and `restart_after` left out."""
-    columns: str = ""
-    """Columns of a table that were taken, and the line that names them, to tell."""
+    where: str = ""  # file or folder it was read from, for errors
+    left_out: int = 0  # rows that `keep_from` and `restart_after` left out
+    columns: str = ""  # columns of a table that were taken, and the line that names them, to tell
 
     @property
     def sinks_from(self) -> float | None:

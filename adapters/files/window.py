@@ -24,18 +24,12 @@ ARRAYS = ("time_step", "identifier", "radius", "mass", "position", "velocity", "
 class PistonTrack:
     """Samples of the piston over a window, ``s`` of them, evenly spaced in time."""
 
-    time_step: IntArray
-    """The engine's step count, shape (s,)."""
-    target_force: FloatArray
-    """Force the load asks for [N], downwards, shape (s,)."""
-    contact_force: FloatArray
-    """Force the bed exerts on the piston [N], upwards, shape (s,)."""
-    height: FloatArray
-    """Height of the piston's face [m], shape (s,)."""
-    kinetic_translational: FloatArray
-    """Translational kinetic energy of the grains [J], shape (s,)."""
-    kinetic_rotational: FloatArray
-    """Rotational kinetic energy of the grains [J], shape (s,)."""
+    time_step: IntArray  # the engine's step count, shape (s,)
+    target_force: FloatArray  # force the load asks for [N], downwards, shape (s,)
+    contact_force: FloatArray  # force the bed exerts on the piston [N], upwards, shape (s,)
+    height: FloatArray  # height of the piston's face [m], shape (s,)
+    kinetic_translational: FloatArray  # translational kinetic energy of the grains [J], shape (s,)
+    kinetic_rotational: FloatArray  # rotational kinetic energy of the grains [J], shape (s,)
 
     def cycles(self, steps_per_cycle: int) -> IntArray:
         """Cycles from the window's start that each sample comes after, shape (s,): 0, 1, ..."""
@@ -59,29 +53,19 @@ class PistonTrack:
 class Window:
     """``c`` load cycles of ``n`` grains: the state before the first and after each."""
 
-    first_cycle: int
-    """Cycles done before the window."""
-    time_step: IntArray
-    """The engine's step count, shape (c + 1,)."""
-    identifier: IntArray
-    """Grain identifiers, ascending, shape (n,)."""
-    radius: FloatArray
-    """Radii [m], shape (n,)."""
-    mass: FloatArray
-    """Masses [kg], shape (n,)."""
-    position: FloatArray
-    """Centres [m], shape (c + 1, n, 3)."""
-    velocity: FloatArray
-    """Velocities [m/s], shape (c + 1, n, 3)."""
-    spin: FloatArray
-    """Angular velocities [rad/s], shape (c + 1, n, 3)."""
+    first_cycle: int  # cycles done before the window
+    time_step: IntArray  # the engine's step count, shape (c + 1,)
+    identifier: IntArray  # grain identifiers, ascending, shape (n,)
+    radius: FloatArray  # radii [m], shape (n,)
+    mass: FloatArray  # masses [kg], shape (n,)
+    position: FloatArray  # centres [m], shape (c + 1, n, 3)
+    velocity: FloatArray  # velocities [m/s], shape (c + 1, n, 3)
+    spin: FloatArray  # angular velocities [rad/s], shape (c + 1, n, 3)
     wall_force: dict[str, FloatArray]
     """Force of each wall on each grain [N], shape (c + 1, n, 3) each."""
-    contacts: tuple[Contacts, ...]
-    """Contacts at each of the c + 1 instants."""
+    contacts: tuple[Contacts, ...]  # contacts at each of the c + 1 instants
     piston: PistonTrack
-    piston_start: float
-    """Height of the piston's face before the first cycle [m]."""
+    piston_start: float  # height of the piston's face before the first cycle [m]
 
     def __len__(self) -> int:
         """Number of load cycles."""

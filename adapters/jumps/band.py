@@ -34,22 +34,16 @@ class Band:
     """Settlement at the last cycle of a controlled run and its uncertainty; metres."""
 
     cycle: int
-    settlement: float
-    """Of the bed, as its table has it."""
+    settlement: float  # of the bed, as its table has it
     corrected: float
     """The same with the errors observed behind the jumps taken out: the middle of both bands."""
     low: float
-    high: float
-    """Between them a full run from the same state ends with `BAND_PROBABILITY`."""
+    high: float  # between them a full run from the same state ends with `BAND_PROBABILITY`
     mean_low: float
-    mean_high: float
-    """The same for the mean of many full runs."""
-    jumps: float
-    """Standard deviation from the noise of the rates that were computed."""
-    laws: float
-    """From the form of the law."""
-    scatter: float
-    """From the bursts of another run."""
+    mean_high: float  # the same for the mean of many full runs
+    jumps: float  # standard deviation from the noise of the rates that were computed
+    laws: float  # from the form of the law
+    scatter: float  # from the bursts of another run
 
 
 def estimate_band(cycle: int, settlement: float, checks: Sequence[Mapping[str, Any]]) -> Band:

@@ -37,20 +37,15 @@ class Check:
     gained: float
     """Settlement of the bed from the jump's start to the end of its healing cycles, with what it
     settled in the window because it was moved."""
-    expected: float
-    """The same by the rates computed on both sides: the corrected gain."""
-    noise: float
-    """Standard error of ``expected`` from the noise of the rates."""
+    expected: float  # the same by the rates computed on both sides: the corrected gain
+    noise: float  # standard error of ``expected`` from the noise of the rates
     form: float
     """Standard deviation of ``expected`` from the unknown exponent, and from that of kappa."""
     error: float
     """``gained`` less ``expected`` and ``Decision.correction``, over the total settlement."""
-    reseated: float
-    """What the bed settled more behind the jump because it was moved."""
-    kappa: float
-    """Of `adapters.jumps.slopes`, by all jumps up to this one."""
-    deviation: float
-    """Of the window's rate from its forecast, in standard errors."""
+    reseated: float  # what the bed settled more behind the jump because it was moved
+    kappa: float  # of `adapters.jumps.slopes`, by all jumps up to this one
+    deviation: float  # of the window's rate from its forecast, in standard errors
     drift: tuple[float, float]
     """Deviations summed, upwards and downwards, see `sum_drift`; standard errors."""
     changed: bool
@@ -113,12 +108,9 @@ class Expected:
     """Gain over a jump and its healing cycles by the rates on both sides; metres."""
 
     mean: float
-    noise: float
-    """Standard error from the noise of the rates."""
-    form: float
-    """Standard deviation from the unknown exponent."""
-    shares: FloatArray
-    """Derivative by the gain of each block, shape (b,)."""
+    noise: float  # standard error from the noise of the rates
+    form: float  # standard deviation from the unknown exponent
+    shares: FloatArray  # derivative by the gain of each block, shape (b,)
 
 
 def compare_rate(before: Forecast, past: Sequence[Stretch], window: Stretch) -> float:

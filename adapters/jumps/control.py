@@ -59,11 +59,9 @@ class Settings:
     """What the scene says."""
 
     tolerance: float
-    healing: int
-    """Cycles m behind a jump that are kept out of the fit."""
+    healing: int  # cycles m behind a jump that are kept out of the fit
     total_cycles: int
-    cycle_by_cycle: bool = False
-    """Where no jump is allowed: True computes on, False refuses."""
+    cycle_by_cycle: bool = False  # where no jump is allowed: True computes on, False refuses
 
     @property
     def shortest_jump(self) -> int:
@@ -115,35 +113,24 @@ class Decision:
     ``trackbed resume`` end, exit code 6.
     """
 
-    cycle: int
-    """Cycles done since the start of the run, with those jumped over."""
-    action: str
-    """``jump``, ``compute``, ``refuse`` or ``end``."""
-    window: int
-    """Cycles k to compute: behind the healing cycles of a jump, or at once."""
-    jump: int = 0
-    """Cycles h."""
-    gain: float = 0.0
-    """Settlement expected over the h cycles [m]."""
-    moved: float = 0.0
-    """Settlement that the mean grain is moved by [m]."""
+    cycle: int  # cycles done since the start of the run, with those jumped over
+    action: str  # ``jump``, ``compute``, ``refuse`` or ``end``
+    window: int  # cycles k to compute: behind the healing cycles of a jump, or at once
+    jump: int = 0  # cycles h
+    gain: float = 0.0  # settlement expected over the h cycles [m]
+    moved: float = 0.0  # settlement that the mean grain is moved by [m]
     correction: float = 0.0
     """What is to be gained beyond ``gain``, for the errors of earlier jumps [m]."""
     half_width: float = 0.0
     """How far that can be off with `JUMP.probability`, before it is tried [m]."""
-    limits: tuple[tuple[str, float], ...] = ()
-    """Longest jump by each rule [cycles]."""
-    binding: str = ""
-    """The rule that set h."""
+    limits: tuple[tuple[str, float], ...] = ()  # longest jump by each rule [cycles]
+    binding: str = ""  # the rule that set h
     regime: str = ""
     """One of `fit.regime.REGIMES`, of the bed or, where that is refused, of the piston; empty
     before the first cycles to be fitted."""
-    exponent: float = 0.0
-    """beta: the rate goes as N^(beta - 1)."""
-    attempt: int = 1
-    """Which try of a jump from this cycle it is, from 1."""
-    why: str = ""
-    """One sentence, or the part of one that follows "up to cycle N" where it refuses."""
+    exponent: float = 0.0  # beta: the rate goes as N^(beta - 1)
+    attempt: int = 1  # which try of a jump from this cycle it is, from 1
+    why: str = ""  # one sentence, or the part of one that follows "up to cycle N" where it refuses
 
 
 def observe(control: Control, stretch: Stretch, settlement: float) -> Control:

@@ -31,17 +31,12 @@ from adapters.laws.fit import (
 class Forecast:
     """Amplitude, its standard error and the probability of each exponent beta, shape (g,) each."""
 
-    last_cycle: float
-    """N_k."""
-    rate: FloatArray
-    """A [m a cycle]."""
-    error: FloatArray
-    """Standard error of A [m a cycle]."""
+    last_cycle: float  # N_k
+    rate: FloatArray  # A [m a cycle]
+    error: FloatArray  # standard error of A [m a cycle]
     weight: FloatArray
-    freedom: float
-    """Degrees of freedom of the errors."""
-    influence: FloatArray
-    """Derivative of A by the gain of each block, shape (b, g)."""
+    freedom: float  # degrees of freedom of the errors
+    influence: FloatArray  # derivative of A by the gain of each block, shape (b, g)
 
     def gain(self, start: float, end: float | FloatArray) -> FloatArray:
         """Mean gain from cycle ``start`` to ``end`` [m].

@@ -26,14 +26,10 @@ LAW_ERROR = 0.02
 class Stretch:
     """Cycles computed one after another, healing cycles left out; k of them."""
 
-    first_cycle: int
-    """Cycles done before."""
-    gain: FloatArray
-    """Settlement gained in each cycle [m], shape (k,)."""
-    coordination: FloatArray
-    """Contacts with other grains a grain, at each cycle's end, shape (k,)."""
-    deflection: FloatArray
-    """Rise of the piston on unloading [m], shape (k,)."""
+    first_cycle: int  # cycles done before
+    gain: FloatArray  # settlement gained in each cycle [m], shape (k,)
+    coordination: FloatArray  # contacts with other grains a grain, at each cycle's end, shape (k,)
+    deflection: FloatArray  # rise of the piston on unloading [m], shape (k,)
 
     @property
     def last_cycle(self) -> int:
@@ -55,16 +51,11 @@ class Stretch:
 class Rates:
     """Gains of b blocks of cycles with their variances, each of shape (b,)."""
 
-    start: FloatArray
-    """Cycles done before each block."""
-    end: FloatArray
-    """Cycles done after it."""
-    gain: FloatArray
-    """Settlement gained in it [m]."""
-    variance: FloatArray
-    """Of the gain [m^2]."""
-    freedom: float
-    """Degrees of freedom that the variances are known with."""
+    start: FloatArray  # cycles done before each block
+    end: FloatArray  # cycles done after it
+    gain: FloatArray  # settlement gained in it [m]
+    variance: FloatArray  # of the gain [m^2]
+    freedom: float  # degrees of freedom that the variances are known with
 
     @property
     def last_cycle(self) -> float:
@@ -95,10 +86,8 @@ def estimate_long_run_variance(series: FloatArray) -> float:
 class Noise:
     """Noise of the gains of s stretches."""
 
-    variance: FloatArray
-    """Long-run variance S [m^2 a cycle] of each, shape (s,)."""
-    freedom: float
-    """Degrees of freedom that it is known with."""
+    variance: FloatArray  # long-run variance S [m^2 a cycle] of each, shape (s,)
+    freedom: float  # degrees of freedom that it is known with
 
 
 def find_noise(stretches: Sequence[Stretch]) -> Noise:

@@ -53,16 +53,12 @@ class Landing:
 class Slopes:
     """Slopes of b blocks of computed cycles, and the covariance that they are read with."""
 
-    place: FloatArray
-    """ln N in the middle of each block, shape (b,)."""
-    slope: FloatArray
-    """Settlement over the length in ln N [m], shape (b,)."""
-    reseated: FloatArray
-    """What kappa = 1 adds to each slope [m], shape (b,)."""
+    place: FloatArray  # ln N in the middle of each block, shape (b,)
+    slope: FloatArray  # settlement over the length in ln N [m], shape (b,)
+    reseated: FloatArray  # what kappa = 1 adds to each slope [m], shape (b,)
     system: FloatArray
     """Kriging's matrix over the walk's variance in a unit of ln N, shape (b + 1, b + 1)."""
-    walk: float = 1.0
-    """That variance [m^2]."""
+    walk: float = 1.0  # that variance [m^2]
 
     def at(self, places: FloatArray) -> FloatArray:
         """Estimate of a [m] at places (p,) of ln N, not below 0: no bed rises for long."""
@@ -156,8 +152,7 @@ class Jumped:
 
     cycles: IntArray
     """Cycles done before it, behind it, and at the end of the window behind it, shape (3,)."""
-    settlement: FloatArray
-    """At their ends [m], shape (3,)."""
+    settlement: FloatArray  # at their ends [m], shape (3,)
 
     @property
     def landing(self) -> Landing:

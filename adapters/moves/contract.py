@@ -18,13 +18,10 @@ class Jump:
     cycle: FloatArray
     """Cycles done at the window's cycle ends, the first the state before it, healing cycles left
     out, shape (k+1,)."""
-    position: FloatArray
-    """Centres then [m], shape (k+1, n, 3)."""
-    radius: FloatArray
-    """Radii [m], shape (n,)."""
+    position: FloatArray  # centres then [m], shape (k+1, n, 3)
+    radius: FloatArray  # radii [m], shape (n,)
     law: Law
-    h: float
-    """Cycles to jump."""
+    h: float  # cycles to jump
     container: Container
 
     @property
@@ -54,8 +51,7 @@ class Jump:
 class Move:
     """A way to move grains in a jump; a file with an object ``MOVE`` is one."""
 
-    name: str
-    """The name in scenes: that of the file, dashes for its underscores."""
+    name: str  # the name in scenes: that of the file, dashes for its underscores
     displacement: Callable[[Jump], FloatArray]
     """Displacement of every grain over the jump [m], shape (n, 3)."""
     moves_piston: bool = True

@@ -26,16 +26,11 @@ class History:
     """A run at the ends of its cycles, r rows in ascending cycles; nan where not measured."""
 
     cycle: IntArray
-    kind: tuple[str, ...]
-    """``computed``, ``healing`` or ``jumped``."""
-    settlement: FloatArray
-    """Mean settlement of the grains since the preparation [m]."""
-    coordination_number: FloatArray
-    """Contacts with other grains, mean over all grains."""
-    elastic_deflection: FloatArray
-    """Rise of the piston on unloading [m]."""
-    cpu_s: FloatArray
-    """CPU time from the start of loading to the row [s]."""
+    kind: tuple[str, ...]  # ``computed``, ``healing`` or ``jumped``
+    settlement: FloatArray  # mean settlement of the grains since the preparation [m]
+    coordination_number: FloatArray  # contacts with other grains, mean over all grains
+    elastic_deflection: FloatArray  # rise of the piston on unloading [m]
+    cpu_s: FloatArray  # CPU time from the start of loading to the row [s]
 
     def row(self, cycle: int) -> int:
         """Index of a cycle's row; raises `UsageError` when it was not computed."""
@@ -128,8 +123,7 @@ class FailedJump:
     stage: str
     first_cycle: int
     why: str
-    lost_s: float
-    """What it cost and no finished stage bears [s]; see `find_lost_time`."""
+    lost_s: float  # what it cost and no finished stage bears [s]; see `find_lost_time`
 
 
 def list_failed_jumps(folder: RunFolder) -> tuple[FailedJump, ...]:

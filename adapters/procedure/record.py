@@ -33,16 +33,13 @@ class Track:
     """One run of the scene: the procedure, or the full run beside it."""
 
     folder: RunFolder
-    outcomes: tuple[Outcome, ...]
-    """Finished stages in order, failed jumps left out."""
-    names: tuple[str, ...]
-    """Their folders."""
+    outcomes: tuple[Outcome, ...]  # finished stages in order, failed jumps left out
+    names: tuple[str, ...]  # their folders
     failed_jumps: tuple[FailedJump, ...]
     discarded: tuple[str, ...]
     """Stages whose unfinished or superseded work was moved away; empty folders left out."""
     events: tuple[dict[str, Any], ...]
-    damaged: tuple[str, ...] = ()
-    """Stages and records that are not as the run left them."""
+    damaged: tuple[str, ...] = ()  # stages and records that are not as the run left them
 
     @cached_property
     def history(self) -> History:
@@ -108,8 +105,7 @@ class Record:
     manifest: dict[str, Any]
     scene: Scene
     run: Track
-    control: Track | None
-    """None when there is none, or it has not yet a cycle of its own."""
+    control: Track | None  # none when there is none, or it has not yet a cycle of its own
 
 
 def read_run_record(path: Path) -> Record:

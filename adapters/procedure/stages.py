@@ -51,8 +51,7 @@ class Variant:
     """Which of the runs of a scene this is."""
 
     name: str = "procedure"
-    jumps: bool = True
-    """False computes every cycle: the control."""
+    jumps: bool = True  # false computes every cycle: the control
     still: bool = False
     """True jumps over no cycle: dump, relax, resubmit, which shows what that alone costs."""
     perturbation: float = 0.0
@@ -118,13 +117,10 @@ class Run:
 class Bed:
     """Where a run is: the saved state the next window starts from."""
 
-    cycle: int
-    """Cycles done, jumped ones included."""
+    cycle: int  # cycles done, jumped ones included
     start: EngineStart
-    window: str = ""
-    """Name of the stage with the last computed window."""
-    healing: int = 0
-    """First cycles of that window to keep out of the fit."""
+    window: str = ""  # name of the stage with the last computed window
+    healing: int = 0  # first cycles of that window to keep out of the fit
 
 
 def prepare(run: Run) -> Bed:

@@ -25,14 +25,10 @@ class Status:
     """How far a run is; SI units, None for what is not known yet."""
 
     run_folder: str
-    state: str
-    """``running``, ``finished`` or ``stopped``."""
-    why: str
-    """Why it stopped, the first of the run's last words."""
-    cycle: int
-    """Load cycles done."""
-    total_cycles: int
-    """0 for a scene without loading."""
+    state: str  # ``running``, ``finished`` or ``stopped``
+    why: str  # why it stopped, the first of the run's last words
+    cycle: int  # load cycles done
+    total_cycles: int  # 0 for a scene without loading
     cycles_computed: int
     cycles_jumped: int
     jumps: int
@@ -40,16 +36,13 @@ class Status:
     settlement_m: float | None
     speed_up_so_far: float | None
     """CPU time of the full run beside it over its own, as in the report; None without one."""
-    cpu_s: float
-    """CPU time of all finished stages, preparation included [s]."""
+    cpu_s: float  # CPU time of all finished stages, preparation included [s]
     band_m: tuple[float, float] | None
     """Of a run with a tolerance: a full run would be between them with probability 0.9."""
-    control_cycle: int | None
-    """Cycles the full run beside it has done; None without one."""
+    control_cycle: int | None  # cycles the full run beside it has done; None without one
     damaged: str
     """Stages, which count for nothing then, and records that are not as the run left them."""
-    next: str
-    """The command that goes on from here."""
+    next: str  # the command that goes on from here
 
 
 def read_status(run_folder: Path) -> Status:

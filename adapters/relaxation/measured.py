@@ -34,8 +34,7 @@ from adapters.errors import NotConverged, UsageError
 class Surroundings:
     """What does not change while the centres of ``n`` grains move."""
 
-    radius: FloatArray
-    """Radii [m], (n,)."""
+    radius: FloatArray  # radii [m], (n,)
     walls: Walls
     behind: BoolArray
     """Which grains lie behind each plane that ends, (n, p): `adapters.bed.find_behind_discs`."""
@@ -75,25 +74,17 @@ class Surroundings:
 class Relaxation:
     """Relaxed positions, and what was changed to reach them."""
 
-    position: FloatArray
-    """Centres [m], (n, 3)."""
-    method: str
-    """One of `METHODS`."""
+    position: FloatArray  # centres [m], (n, 3)
+    method: str  # one of `METHODS`
     converged: bool
-    before: Bed
-    """Measures of the state before the jump."""
-    estimated: Bed
-    """Measures of the estimated positions."""
-    relaxed: Bed
-    """Measures of the relaxed positions."""
+    before: Bed  # measures of the state before the jump
+    estimated: Bed  # measures of the estimated positions
+    relaxed: Bed  # measures of the relaxed positions
     evaluations: int
     """Evaluations of all contacts; for ``smallest-move`` products with its matrix count too."""
-    cpu_s: float
-    """Processor time [s]."""
-    largest_move: float
-    """Greatest distance of a grain from its estimate [m]."""
-    median_move: float
-    """Median distance of a grain from its estimate [m]."""
+    cpu_s: float  # processor time [s]
+    largest_move: float  # greatest distance of a grain from its estimate [m]
+    median_move: float  # median distance of a grain from its estimate [m]
 
     @property
     def coordination_change(self) -> float:
@@ -119,14 +110,11 @@ class RelaxationNotConverged(NotConverged):
 class Estimated:
     """The bed that a jump estimates, the state it came from, and what both touch."""
 
-    position: FloatArray
-    """Estimated centres [m], (n, 3)."""
+    position: FloatArray  # estimated centres [m], (n, 3)
     before: State
     scene_before: Surroundings
-    scene: Surroundings
-    """The same with the piston where it is now."""
-    carried: Neighbours
-    """Contacts of ``before``."""
+    scene: Surroundings  # the same with the piston where it is now
+    carried: Neighbours  # contacts of ``before``
 
     @property
     def mean_weight(self) -> float:

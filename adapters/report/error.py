@@ -41,24 +41,18 @@ class Comparison:
     """
 
     name: str
-    computed: int
-    """Load cycles the engine computed for it."""
-    settlement: float
-    """[m]"""
-    settlement_error: float
-    """Over what the full run gained since the state before the first jump."""
+    computed: int  # load cycles the engine computed for it
+    settlement: float  # [m]
+    settlement_error: float  # over what the full run gained since the state before the first jump
     coordination_number: float = nan
     """Mean of the last `AVERAGED` cycles, as the elastic deflection."""
     coordination_number_error: float = nan
-    elastic_deflection: float = nan
-    """[m]"""
+    elastic_deflection: float = nan  # [m]
     elastic_deflection_error: float = nan
     jump_displacement_error: float = nan
     """E_r (eq. 22) of the residual displacement since the state before the first jump."""
-    coordinates_error: float = nan
-    """E_r of the coordinates, as in the paper: small for any method."""
-    cpu_s: float = nan
-    """CPU time from the start of loading [s]."""
+    coordinates_error: float = nan  # E_r of the coordinates, as in the paper: small for any method
+    cpu_s: float = nan  # CPU time from the start of loading [s]
     speed_up: float = nan
     speed_up_with_preparation: float = nan
 
@@ -129,16 +123,11 @@ class JumpFigures:
     stage: str
     first_cycle: int
     last_cycle: int
-    estimated: float
-    """Settlement over the jump by the law."""
-    truth: float
-    """Settlement of the control over the same cycles."""
-    law_error: float
-    """``estimated`` less ``truth``."""
-    relaxation_change: float
-    """Settlement that relaxation adds."""
-    healing_error: float
-    """Settlement of the healing cycles less that of the control's same cycles."""
+    estimated: float  # settlement over the jump by the law
+    truth: float  # settlement of the control over the same cycles
+    law_error: float  # ``estimated`` less ``truth``
+    relaxation_change: float  # settlement that relaxation adds
+    healing_error: float  # settlement of the healing cycles less that of the control's same cycles
     coordination_change: float
     """Relative change of the coordination number, walls counted, before the jump to relaxed."""
     height_change: float

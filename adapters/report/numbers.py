@@ -35,47 +35,33 @@ from adapters.scene import flatten_keys, list_omissions
 class Numbers:
     """All numbers of a report; SI units, errors and shares as fractions of one."""
 
-    scene: str
-    """What it is in one sentence."""
+    scene: str  # what it is in one sentence
     grains: int
     finished: bool
-    cycle: int
-    """Cycles done."""
+    cycle: int  # cycles done
     total_cycles: int
     cycles_computed: int
-    settlement: float
-    """At ``cycle`` [m]."""
-    band: Band | None
-    """Settlement of a run with a tolerance and how far it can be off."""
+    settlement: float  # at ``cycle`` [m]
+    band: Band | None  # settlement of a run with a tolerance and how far it can be off
     speed_up_most: float
     """Cycles done over cycles computed: a bound on the speed-up, which is one of CPU times."""
-    compared_at: int
-    """Cycle at which run and control are compared; 0 without a control."""
+    compared_at: int  # cycle at which run and control are compared; 0 without a control
     error_rows: tuple[Comparison, ...]
     jumps: tuple[JumpFigures, ...]
     preparation: dict[str, float]
     """Figures of the settled bed by dotted name; empty before it is settled."""
-    costs: tuple[dict[str, Any], ...]
-    """By `adapters.report.verdict.PURPOSES`."""
-    fails: tuple[str, ...]
-    """Where the claim fails, in sentences."""
-    left_out: tuple[str, ...]
-    """What the model leaves out."""
-    failed_jumps: tuple[tuple[str, str], ...]
-    """Stage and reason."""
-    stops: tuple[tuple[str, str], ...]
-    """Time and reason of every stop of the run before its end."""
+    costs: tuple[dict[str, Any], ...]  # by `adapters.report.verdict.PURPOSES`
+    fails: tuple[str, ...]  # where the claim fails, in sentences
+    left_out: tuple[str, ...]  # what the model leaves out
+    failed_jumps: tuple[tuple[str, str], ...]  # stage and reason
+    stops: tuple[tuple[str, str], ...]  # time and reason of every stop of the run before its end
     discarded: tuple[str, ...]
     damaged: tuple[str, ...]
-    engines: tuple[str, ...]
-    """Name and version banner."""
+    engines: tuple[str, ...]  # name and version banner
     provenance: dict[str, Any]
-    parameters: dict[str, Any]
-    """Effective parameters of the scene."""
-    decks: dict[str, str]
-    """SHA-256 of every static deck used."""
-    reproduce: str
-    """The command that makes this run again from its folder."""
+    parameters: dict[str, Any]  # effective parameters of the scene
+    decks: dict[str, str]  # SHA-256 of every static deck used
+    reproduce: str  # the command that makes this run again from its folder
 
     def row(self, name: str) -> Comparison | None:
         """A row of the error table."""

@@ -51,8 +51,7 @@ class GrainRadius(Table):
     """Distribution of the grains' radii."""
 
     distribution: Literal["normal", "uniform", "constant"]
-    mean: Positive
-    """Mean radius [m]."""
+    mean: Positive  # mean radius [m]
     standard_deviation: NonNegative = 0.0
     """Of the normal distribution before it is cut, or of the uniform one [m]."""
     truncation: Annotated[float, Field(ge=0.1, le=10, allow_inf_nan=False)] = 2.0
@@ -70,49 +69,37 @@ class Sample(Table):
     """The grains and the container they are poured into."""
 
     container: Literal["cylinder", "box"]
-    radius: Positive | None = None
-    """Radius of the cylinder [m]."""
-    size_x: Positive | None = None
-    """Length of the box along x [m]."""
-    size_y: Positive | None = None
-    """Length of the box along y [m]."""
+    radius: Positive | None = None  # radius of the cylinder [m]
+    size_x: Positive | None = None  # length of the box along x [m]
+    size_y: Positive | None = None  # length of the box along y [m]
     symmetry: Annotated[tuple[Literal["x", "y"], ...], Field(strict=False)] = ()
     """Axes whose plane through the origin is a mirror."""
-    count: Count | None = None
-    """Number of grains."""
-    fill_height: Positive | None = None
-    """Height of the settled bed [m], instead of ``count``."""
+    count: Count | None = None  # number of grains
+    fill_height: Positive | None = None  # height of the settled bed [m], instead of ``count``
     relative_density_start: Annotated[float, Field(ge=1e-3, le=0.15, allow_inf_nan=False)] = 0.05
     """Relative density of the random start, before the rain."""
-    seed: Annotated[int, Field(ge=0, lt=2**32)] = 1
-    """Seed of radii and start positions."""
+    seed: Annotated[int, Field(ge=0, lt=2**32)] = 1  # seed of radii and start positions
     grain_radius: GrainRadius
 
 
 class GrainMaterial(Table):
     """Material of the grains."""
 
-    young: Positive
-    """Young's modulus [Pa]."""
+    young: Positive  # Young's modulus [Pa]
     poisson: Poisson
-    density: Positive
-    """Mass density [kg/m^3]."""
-    viscous_alpha: ViscousAlpha | None = None
-    """Viscous coefficient alpha_n = alpha_t of eq. 7."""
+    density: Positive  # mass density [kg/m^3]
+    viscous_alpha: ViscousAlpha | None = None  # viscous coefficient alpha_n = alpha_t of eq. 7
     restitution: Restitution | None = None
     """Coefficient of restitution, instead of ``viscous_alpha``."""
-    friction: NonNegative
-    """Coulomb's coefficient between grains."""
+    friction: NonNegative  # Coulomb's coefficient between grains
 
 
 class WallMaterial(Table):
     """Material of floor, walls and piston; symmetry planes are rigid and frictionless."""
 
-    young: Positive
-    """Young's modulus [Pa]."""
+    young: Positive  # Young's modulus [Pa]
     poisson: Poisson
-    friction: NonNegative
-    """Coulomb's coefficient between grain and wall."""
+    friction: NonNegative  # Coulomb's coefficient between grain and wall
 
 
 class Material(Table):
@@ -126,18 +113,12 @@ class Loading(Table):
     """The cyclic load on the piston."""
 
     waveform: Literal["sine", "series"] = "sine"
-    amplitude: Positive | None = None
-    """Stress from trough to peak [Pa] of a sine."""
-    mean: NonNegative | None = None
-    """Mean stress [Pa] of a sine."""
-    frequency: Positive | None = None
-    """Cycles a second [Hz] of a sine."""
-    series: str | None = None
-    """CSV file with one period; `adapters.files.load_series`."""
-    area_share: Share = 1.0
-    """Part of the container's section under the piston."""
-    piston_mass: Positive
-    """Mass [kg] of the part of the piston inside the scene."""
+    amplitude: Positive | None = None  # stress from trough to peak [Pa] of a sine
+    mean: NonNegative | None = None  # mean stress [Pa] of a sine
+    frequency: Positive | None = None  # cycles a second [Hz] of a sine
+    series: str | None = None  # CSV file with one period; `adapters.files.load_series`
+    area_share: Share = 1.0  # part of the container's section under the piston
+    piston_mass: Positive  # mass [kg] of the part of the piston inside the scene
 
     @cached_property
     def samples(self) -> LoadSeries | None:
@@ -167,10 +148,8 @@ class Loading(Table):
 class Procedure(Table):
     """Numbers of cycles computed and jumped (Fig. 10 of the paper)."""
 
-    k_i: Annotated[int, Field(ge=1)]
-    """First cycles, computed before anything is fitted."""
-    k: Annotated[int, Field(ge=2)] | None = None
-    """Cycles computed and fitted before each jump."""
+    k_i: Annotated[int, Field(ge=1)]  # first cycles, computed before anything is fitted
+    k: Annotated[int, Field(ge=2)] | None = None  # cycles computed and fitted before each jump
     h: (
         Annotated[
             tuple[Annotated[int, Field(ge=0)], ...],
@@ -184,10 +163,8 @@ class Procedure(Table):
     """Error of the settlement gained in a jump over the total settlement, instead of k and h."""
     healing_cycles: Annotated[int, Field(ge=0)] = 5
     """Cycles computed after a jump and kept out of the fit."""
-    law: str = "log"
-    """Law of the residual displacement."""
-    move: str = MOVE_DEFAULT
-    """What a jump moves: a way of `adapters.moves`."""
+    law: str = "log"  # law of the residual displacement
+    move: str = MOVE_DEFAULT  # what a jump moves: a way of `adapters.moves`
     settlement: Literal["law", "history"] = "law"
     """What the mean grain settles by in a jump of h cycles: its law, or all cycles computed."""
     seating: Literal["any", "waits"] = "any"
@@ -199,8 +176,7 @@ class Procedure(Table):
     relaxation: str = "smallest-move"
     """How a moved bed gets rid of its overlaps: of `adapters.relaxation.methods.METHODS`, or
     "none"."""
-    total_cycles: Count
-    """Cycles computed and jumped at the end."""
+    total_cycles: Count  # cycles computed and jumped at the end
 
     @model_serializer(mode="wrap")
     def _drop_newer_defaults(self, whole: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -231,8 +207,7 @@ class Engine(Table):
     name: str = "auto"
     """Engine; ``auto`` is the first that is installed: liggghts, lammps, yade; ``fake`` writes
     analytic states, for tests."""
-    time_step: Positive | None = None
-    """Longest time step [s]."""
+    time_step: Positive | None = None  # longest time step [s]
     rayleigh_share: Share | None = None
     """Longest time step as a share of the smallest grain's Rayleigh time, instead."""
     launcher: Annotated[tuple[Annotated[str, Field(min_length=1)], ...], Field(strict=False)] = ()

@@ -43,22 +43,17 @@ LONGEST = 1 << 24
 class Problem:
     """What is wrong with a key."""
 
-    key: str
-    """Dotted key; entries of a list by their number from 0, as in ``load.0.force``."""
-    what: str
-    """One sentence."""
-    where: str = ""
-    """File and line where that is not the scene file."""
+    key: str  # dotted key; entries of a list by their number from 0, as in ``load.0.force``
+    what: str  # one sentence
+    where: str = ""  # file and line where that is not the scene file
 
 
 @dataclass(frozen=True)
 class Guide:
     """Where a user finds what a scene of this kind may hold."""
 
-    example: str
-    """Name of the example scene that explains every key."""
-    override: str
-    """An override that makes sense, such as ``procedure.k=10``."""
+    example: str  # name of the example scene that explains every key
+    override: str  # an override that makes sense, such as ``procedure.k=10``
 
     @property
     def copy(self) -> str:

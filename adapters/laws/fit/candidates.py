@@ -43,14 +43,11 @@ class Candidates:
     """Predictions of c candidates, each a law on a window, for n series."""
 
     law: tuple[str, ...]
-    increment: FloatArray
-    """From the last cycle to the one asked for, shape (c, n)."""
+    increment: FloatArray  # from the last cycle to the one asked for, shape (c, n)
     miss: FloatArray
     """Absolute error on the held-out block's last cycle, (c, n); nan where not tested."""
-    distance: float
-    """ln(N_k / N_h), length of the held-out block; 0 where there was none."""
-    combined_miss: FloatArray
-    """Error of the candidates' median there, shape (n,)."""
+    distance: float  # ln(N_k / N_h), length of the held-out block; 0 where there was none
+    combined_miss: FloatArray  # error of the candidates' median there, shape (n,)
 
     def votes(self, bounded: BoolArray, unbounded: BoolArray) -> BoolArray:
         """True for candidates that have a vote, shape (c, n); half of the admitted ones at least.

@@ -53,20 +53,15 @@ class Outlook:
     low: FloatArray
     high: FloatArray
     candidates: Candidates
-    votes: BoolArray
-    """Candidates that have a vote, shape (c, n)."""
+    votes: BoolArray  # candidates that have a vote, shape (c, n)
     last_cycle: float
     to_cycle: float
-    last: FloatArray
-    """Reading at the last cycle."""
-    settled: FloatArray
-    """Largest settlement so far, without its sign."""
-    judged: tuple[FloatArray, FloatArray]
-    """Low and high end of the band with probability `JUDGED`."""
+    last: FloatArray  # reading at the last cycle
+    settled: FloatArray  # largest settlement so far, without its sign
+    judged: tuple[FloatArray, FloatArray]  # low and high end of the band with probability `JUDGED`
     reading: FloatArray
     """Error of a reading: its half-width with `JUDGED`, `TAIL.resolution` of the range at least."""
-    counted_from: float = 0.0
-    """The user's number of cycle 0, as in `Series`: for sentences."""
+    counted_from: float = 0.0  # the user's number of cycle 0, as in `Series`: for sentences
 
 
 def find_outlook(
@@ -188,8 +183,7 @@ class LawSaid:
 
     prediction: float | None
     """Median of its windows, in the unit of the series; None where that is not finite."""
-    votes: int
-    """Of its windows, how many have a vote in the joint prediction: 0 to 3."""
+    votes: int  # of its windows, how many have a vote in the joint prediction: 0 to 3
     agrees: bool
     """Its increment is within `AGREE` of the joint one, whether that is given or refused; or both
     are below the error of a reading (`Outlook.reading`), so that no reading separates them: a bed

@@ -52,10 +52,8 @@ class Prediction:
     """A law fitted to a series, and what it says of a later cycle."""
 
     law: str
-    parameters: dict[str, float]
-    """By name; lengths in ``unit``, rates in ``unit`` per cycle."""
-    prediction: float
-    """Settlement at the cycle asked for, in ``unit``."""
+    parameters: dict[str, float]  # by name; lengths in ``unit``, rates in ``unit`` per cycle
+    prediction: float  # settlement at the cycle asked for, in ``unit``
     band: tuple[float, float]
     """Low and high end of the settlement at that cycle, in ``unit``; see
     `estimate_prediction_band`."""

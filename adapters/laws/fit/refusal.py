@@ -23,12 +23,9 @@ known of the future is then more than what is known of the past."""
 class Refusal:
     """Why there is no prediction; `fit` turns it into the error `JumpRefused`, exit code 6."""
 
-    regime: str
-    """``ratcheting``, ``collapse`` or `UNCERTAIN`."""
-    why: str
-    """One sentence; settlements in the unit of the series, cycles as the user counts them."""
-    remedy: str
-    """What to do."""
+    regime: str  # ``ratcheting``, ``collapse`` or `UNCERTAIN`
+    why: str  # one sentence; settlements in the unit of the series, cycles as the user counts them
+    remedy: str  # what to do
 
 
 def find_refusals(outlook: Outlook) -> list[Refusal | None]:

@@ -41,8 +41,7 @@ class Shape:
     low: float
     high: float
     count: int
-    logarithmic: bool = True
-    """True: searched in ln theta, as every number of cycles is."""
+    logarithmic: bool = True  # true: searched in ln theta, as every number of cycles is
 
     def make_grid(self) -> FloatArray:
         """Grid in the variable that is searched, shape (count,)."""

@@ -32,10 +32,8 @@ class SweepStopped(Exception):
 class Ended:
     """How a member's command ended."""
 
-    exit_code: int
-    """That of ``trackbed run``; minus the signal when one ended it."""
-    sentence: str
-    """What it said of its error; empty when it had none."""
+    exit_code: int  # that of ``trackbed run``; minus the signal when one ended it
+    sentence: str  # what it said of its error; empty when it had none
 
     @property
     def finished(self) -> bool:

@@ -29,15 +29,12 @@ NAME_LONGEST = 120
 class Member:
     """One run of a sweep."""
 
-    name: str
-    """Name of its folder, from its settings."""
+    name: str  # name of its folder, from its settings
     settings: Mapping[str, str]
     """Dotted key -> value as TOML text, of the keys swept over; the seed is kept apart."""
     seed: int
-    overrides: tuple[str, ...]
-    """KEY=VALUE of everything that differs from the scene file."""
-    scene: Scene
-    """The scene, checked."""
+    overrides: tuple[str, ...]  # KEY=VALUE of everything that differs from the scene file
+    scene: Scene  # the scene, checked
 
 
 @dataclass(frozen=True)

@@ -42,16 +42,11 @@ class Band:
 
     group: str
     settings: Mapping[str, Any]
-    seeds: int
-    """Finished members."""
-    asked: int
-    """Members in all."""
-    cycle: FloatArray
-    """Load cycles, shape (c,)."""
-    mean: FloatArray
-    """Mean settlement [m], shape (c,)."""
-    half: FloatArray
-    """Half the width of the confidence band [m], shape (c,); nan for a single seed."""
+    seeds: int  # finished members
+    asked: int  # members in all
+    cycle: FloatArray  # load cycles, shape (c,)
+    mean: FloatArray  # mean settlement [m], shape (c,)
+    half: FloatArray  # half the width of the confidence band [m], shape (c,); nan for a single seed
 
     @property
     def half_at_end(self) -> float | None:

@@ -33,20 +33,14 @@ class Result:
 
     member: str
     seed: int
-    state: str
-    """``finished``, ``failed``, ``stopped`` or ``waiting``."""
-    exit_code: int | None
-    """That of ``trackbed run``; minus the signal when one ended it."""
-    sentence: str
-    """What it said of its error."""
-    cycle: int
-    """Load cycles done."""
+    state: str  # ``finished``, ``failed``, ``stopped`` or ``waiting``
+    exit_code: int | None  # that of ``trackbed run``; minus the signal when one ended it
+    sentence: str  # what it said of its error
+    cycle: int  # load cycles done
     cycles_computed: int
     settlement_m: float | None
-    speed_up: float | None
-    """Cycles done over cycles computed."""
-    cpu_s: float
-    """CPU time of its finished stages [s]."""
+    speed_up: float | None  # cycles done over cycles computed
+    cpu_s: float  # CPU time of its finished stages [s]
     run_folder: str
 
 
@@ -54,12 +48,9 @@ class Result:
 class Cluster:
     """Where a sweep runs."""
 
-    scheduler: str = "local"
-    """``local``, ``slurm`` or the address of a Dask scheduler."""
-    config: Path | None = None
-    """TOML file with the keywords of `dask_jobqueue.SLURMCluster`."""
-    workers: int | None = None
-    """Members at a time here, or SLURM jobs."""
+    scheduler: str = "local"  # ``local``, ``slurm`` or the address of a Dask scheduler
+    config: Path | None = None  # TOML file with the keywords of `dask_jobqueue.SLURMCluster`
+    workers: int | None = None  # members at a time here, or SLURM jobs
 
 
 def find_result(sweep: Sweep, member: Member, ended: Ended | None) -> Result:
