@@ -68,14 +68,9 @@ class JumpRefused(NotCredible):
     def to_json(self, unit: str) -> dict[str, object]:
         """The keys of ``trackbed fit --json``, without a prediction; ``unit`` of the series."""
         return {
-            "law": self.law,
-            "parameters": self.parameters,
-            "prediction": None,
-            "band": None,
-            "unit": unit,
-            "regime": self.regime,
-            "laws": self.laws,
-        }
+            "law": self.law, "parameters": self.parameters, "prediction": None, "band": None,
+            "unit": unit, "regime": self.regime, "laws": self.laws,
+        }  # fmt: skip
 
 
 class SweepIncomplete(TrackbedError):

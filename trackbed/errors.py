@@ -6,17 +6,10 @@ from errno import EDQUOT, EFBIG, ENOSPC
 from typing import Self
 
 EXIT_CODES = {
-    0: "ok",
-    1: "bug in trackbed",
-    2: "usage",
-    3: "scene invalid",
-    4: "engine or library missing",
-    5: "engine failed, disk or memory full",
-    6: "result not credible",
-    7: "not converged",
-    8: "members of a sweep failed",
-    130: "interrupted, state saved",
-}
+    0: "ok", 1: "bug in trackbed", 2: "usage", 3: "scene invalid", 4: "engine or library missing",
+    5: "engine failed, disk or memory full", 6: "result not credible", 7: "not converged",
+    8: "members of a sweep failed", 130: "interrupted, state saved",
+}  # fmt: skip
 """What the command ``trackbed`` returns, and what it means."""
 
 NO_ROOM = (ENOSPC, EDQUOT, EFBIG)

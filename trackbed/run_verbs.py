@@ -98,12 +98,9 @@ def describe_run(path: Path, kind: Kind) -> dict[str, Any]:
     states = len(list(path.glob(kind.states)))
     state = "running" if is_written(path) else "finished" if summary else "stopped"
     said = {
-        "run_folder": str(path),
-        "kind": kind.verb,
-        "title": manifest["scene"].get("title", ""),
-        "state": state,
-        "saved_states": states,
-    }
+        "run_folder": str(path), "kind": kind.verb, "title": manifest["scene"].get("title", ""),
+        "state": state, "saved_states": states,
+    }  # fmt: skip
     said |= {key: summary[key] for key in ("time", "steps") if key in summary}
     next_step = {
         "running": f"trackbed status {shlex.quote(str(path))}",

@@ -223,14 +223,9 @@ def solve_collision(
 
     detect_parting.terminal, detect_parting.direction = True, -1  # type: ignore[attr-defined]
     solution = solve_ivp(
-        find_rate,
-        (0.0, 1e3),
-        [0.0, 1.0],
-        method="DOP853",
-        events=(detect_parting, detect_turning),
-        rtol=1e-10,
-        atol=1e-13,
-    )
+        find_rate, (0.0, 1e3), [0.0, 1.0], method="DOP853", events=(detect_parting, detect_turning),
+        rtol=1e-10, atol=1e-13,
+    )  # fmt: skip
     overlap_max = float(solution.y_events[1][0][0])
     end_time, end_velocity = float(solution.t_events[0][0]), float(solution.y_events[0][0][1])
     return Collision(-end_velocity, overlap_max * free.overlap_max, end_time * unit_time)

@@ -94,13 +94,10 @@ class Container:
             planes.append(("piston", (0, 0, piston_height), (0, 0, -1), False, piston_reach))
         name_, point, normal, frictionless, reach = zip(*planes, strict=True)
         return Walls(
-            name_,
-            np.array(point, float),
-            np.array(normal, float),
-            frictionless,
+            name_, np.array(point, float), np.array(normal, float), frictionless,
             np.array(reach, float),
             self.radius if self.shape == "cylinder" and not self.sides else np.inf,
-        )
+        )  # fmt: skip
 
     def side_angles(self) -> FloatArray:
         """Direction of each side's outward normal from the x axis [rad]; none without ``sides``."""

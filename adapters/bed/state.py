@@ -40,12 +40,9 @@ class Contacts:
 def make_no_contacts() -> Contacts:
     """No contact at all (a gas of grains)."""
     return Contacts(
-        np.empty((0, 2), np.int64),
-        np.empty(0),
+        np.empty((0, 2), np.int64), np.empty(0), np.empty((0, 3)), np.empty((0, 3)),
         np.empty((0, 3)),
-        np.empty((0, 3)),
-        np.empty((0, 3)),
-    )
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -95,10 +92,6 @@ def load_state(path: Path) -> State:
             remedy="give a .npz written by trackbed, or a LIGGGHTS dump",
         ) from error
     return State(
-        **grains,
-        contacts=contacts,
-        wall_force=walls,
-        piston_height=float(height),
-        cycle=int(cycle),
-        time_step=int(step),
-    )
+        **grains, contacts=contacts, wall_force=walls, piston_height=float(height),
+        cycle=int(cycle), time_step=int(step),
+    )  # fmt: skip

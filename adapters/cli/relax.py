@@ -77,13 +77,9 @@ def run_relax(arguments: argparse.Namespace) -> int:
                 remedy="give the state of the same bed before the jump",
             )  # fmt: skip
         relaxation = relax(
-            state.position,
-            before,
-            scene.container.walls(before.piston_height, scene.piston_reach),
-            scene.stiffness,
-            walls_after=walls,
-            method=arguments.method,
-        )
+            state.position, before, scene.container.walls(before.piston_height, scene.piston_reach),
+            scene.stiffness, walls_after=walls, method=arguments.method,
+        )  # fmt: skip
     still = np.zeros_like(state.position)
     # Contacts and wall forces belong to the positions before and are left out.
     relaxed = state.move_to(

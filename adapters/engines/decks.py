@@ -205,16 +205,12 @@ def gather_cycle_parameters(
     loading, steps = scene.loading, scene.steps_per_cycle
     assert loading is not None
     parameters: Parameters = {
-        "load_part": f"load_{loading.waveform}.in",
-        "run_part": f"run_{loading.waveform}.in",
+        "load_part": f"load_{loading.waveform}.in", "run_part": f"run_{loading.waveform}.in",
         "start_part": f"start_{start.kind}.in",
-        "seat_part": f"seat_{'first' if start.first else 'none'}.in",
-        "steps_per_cycle": steps,
-        "run_steps": cycles * steps,
-        "track_steps": steps // scene.samples_per_cycle,
-        "piston_atom": scene.grain_count + 1,
-        **own,
-    }
+        "seat_part": f"seat_{'first' if start.first else 'none'}.in", "steps_per_cycle": steps,
+        "run_steps": cycles * steps, "track_steps": steps // scene.samples_per_cycle,
+        "piston_atom": scene.grain_count + 1, **own,
+    }  # fmt: skip
     if start.kind == "perturbed":
         parameters["perturbation"] = start.perturbation
     if start.first:

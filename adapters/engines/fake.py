@@ -95,14 +95,11 @@ class FakeEngine:
             position = data["position"] if start.moved is None else start.moved.position
             position[0, 0] += start.perturbation
             np.savez(
-                folder / "input.npz",
-                position=position,
-                radius=data["radius"],
-                cycles=cycles,
+                folder / "input.npz", position=position, radius=data["radius"], cycles=cycles,
                 first_step=start.time_step,
                 first_cycle=data["cycle"] if start.moved is None else start.moved.cycle,
                 piston_height=start.piston_height,
-            )
+            )  # fmt: skip
         return {}
 
     def run(

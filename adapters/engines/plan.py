@@ -81,12 +81,9 @@ def plan_seating(scene: Scene) -> SeatPlan:
     press_s = 2 * scene.sample.grain_radius.law.greatest / PLAN.seat_speed
     cycles = ceil(press_s / (steps * scene.time_step))
     return SeatPlan(
-        min(PLAN.seat_share * peak, followed),
-        PLAN.seat_speed,
-        cycles * steps,
-        float(scene.stress_at(0.0)) * scene.loaded_area,
-        ceil(cycles / 2) * steps,
-    )
+        min(PLAN.seat_share * peak, followed), PLAN.seat_speed, cycles * steps,
+        float(scene.stress_at(0.0)) * scene.loaded_area, ceil(cycles / 2) * steps,
+    )  # fmt: skip
 
 
 def has_friction(scene: Scene) -> bool:

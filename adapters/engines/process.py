@@ -69,15 +69,9 @@ def run_process(
     with (folder / "screen.txt").open("wb") as screen:
         try:
             child = subprocess.Popen(
-                command,
-                cwd=folder,
-                env=environment,
-                stdin=subprocess.DEVNULL,
-                stdout=screen,
-                stderr=subprocess.STDOUT,
-                start_new_session=True,
-                preexec_fn=_die_with_parent,
-            )
+                command, cwd=folder, env=environment, stdin=subprocess.DEVNULL, stdout=screen,
+                stderr=subprocess.STDOUT, start_new_session=True, preexec_fn=_die_with_parent,
+            )  # fmt: skip
         except OSError as error:
             raise EngineMissing(
                 f"cannot start {command[0]} ({error.strerror})",
@@ -276,14 +270,9 @@ class ProcessEngine(ABC):
         try:
             with TemporaryDirectory() as folder:  # LIGGGHTS writes a log where it is started
                 asked = subprocess.run(
-                    [*words, self.question],
-                    cwd=folder,
-                    capture_output=True,
-                    text=True,
-                    errors="replace",
-                    stdin=subprocess.DEVNULL,
-                    timeout=PROCESS.patience_s,
-                )
+                    [*words, self.question], cwd=folder, capture_output=True, text=True,
+                    errors="replace", stdin=subprocess.DEVNULL, timeout=PROCESS.patience_s,
+                )  # fmt: skip
         except (OSError, subprocess.TimeoutExpired) as error:
             raise EngineMissing(
                 f"{self.title} does not start ({error})", where=words[-1], remedy=self.remedy

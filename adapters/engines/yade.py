@@ -81,12 +81,9 @@ class YadeEngine(ProcessEngine):
             **cover_piston(scene.container, scene.piston_reach, scene.sample.grain_radius.law),
         }
         content["window"] = {
-            "start": start.kind,
-            "cycles": cycles,
-            "steps_per_cycle": steps,
-            "track_steps": steps // scene.samples_per_cycle,
-            "load": _describe_load(scene),
-        }
+            "start": start.kind, "cycles": cycles, "steps_per_cycle": steps,
+            "track_steps": steps // scene.samples_per_cycle, "load": _describe_load(scene),
+        }  # fmt: skip
         if start.first:
             content["window"]["seat"] = asdict(plan_seating(scene))
         if start.moved is not None:

@@ -32,14 +32,11 @@ def read_state_file(path: Path, density: float) -> State:
         return frame.block(*columns) if there else np.zeros((len(radius), 3))
 
     return State(
-        frame.column("id").astype(np.int64),
-        place,
-        radius,
+        frame.column("id").astype(np.int64), place, radius,
         frame.column("mass") if "mass" in frame.columns else density * 4 / 3 * np.pi * radius**3,
-        read_vectors("vx", "vy", "vz"),
-        read_vectors("omegax", "omegay", "omegaz"),
+        read_vectors("vx", "vy", "vz"), read_vectors("omegax", "omegay", "omegaz"),
         time_step=frame.time_step,
-    )
+    )  # fmt: skip
 
 
 def check_state_name(path: Path) -> None:

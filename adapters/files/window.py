@@ -81,18 +81,11 @@ class Window:
         index = index % len(self.position)
         heights = self.piston_heights()
         return State(
-            self.identifier,
-            self.position[index],
-            self.radius,
-            self.mass,
-            self.velocity[index],
-            self.spin[index],
-            self.contacts[index],
-            {name: force[index] for name, force in self.wall_force.items()},
-            float(heights[index]),
-            cycle=self.first_cycle + index,
-            time_step=int(self.time_step[index]),
-        )
+            self.identifier, self.position[index], self.radius, self.mass, self.velocity[index],
+            self.spin[index], self.contacts[index],
+            {name: force[index] for name, force in self.wall_force.items()}, float(heights[index]),
+            cycle=self.first_cycle + index, time_step=int(self.time_step[index]),
+        )  # fmt: skip
 
     def piston_heights(self) -> FloatArray:
         """Height of the piston's face at each of the c + 1 instants [m]."""
@@ -161,19 +154,13 @@ def read_window(
     states = [_read_grains(*pair, wall_names) for pair in zip(frames, contact_frames, strict=True)]
     first = states[0]
     return Window(
-        first_cycle,
-        np.array([state.time_step for state in states], np.int64),
-        first.identifier,
-        first.radius,
-        first.mass,
-        np.array([state.position for state in states]),
-        np.array([state.velocity for state in states]),
-        np.array([state.spin for state in states]),
+        first_cycle, np.array([state.time_step for state in states], np.int64), first.identifier,
+        first.radius, first.mass, np.array([state.position for state in states]),
+        np.array([state.velocity for state in states]), np.array([state.spin for state in states]),
         {name: np.array([state.wall_force[name] for state in states]) for name in wall_names},
-        tuple(state.contacts for state in states),
-        read_piston_track(folder / "piston.txt"),
+        tuple(state.contacts for state in states), read_piston_track(folder / "piston.txt"),
         piston_start,
-    )
+    )  # fmt: skip
 
 
 def read_state(folder: Path, wall_names: tuple[str, ...]) -> State:
@@ -192,16 +179,11 @@ def _read_grains(grains: Frame, contacts: Frame, wall_names: tuple[str, ...]) ->
         for name in wall_names
     }
     return State(
-        grains.column("id").astype(np.int64),
-        grains.block("x", "y", "z"),
-        grains.column("radius"),
-        grains.column("mass"),
-        grains.block("vx", "vy", "vz"),
-        grains.block("omegax", "omegay", "omegaz"),
-        read_contacts(contacts),
-        forces,
+        grains.column("id").astype(np.int64), grains.block("x", "y", "z"), grains.column("radius"),
+        grains.column("mass"), grains.block("vx", "vy", "vz"),
+        grains.block("omegax", "omegay", "omegaz"), read_contacts(contacts), forces,
         time_step=grains.time_step,
-    )
+    )  # fmt: skip
 
 
 def save_window(window: Window, path: Path) -> None:

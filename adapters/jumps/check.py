@@ -88,19 +88,12 @@ def judge(
     error = gained - expected.mean - decision.correction
     relative = error / total if total > 0 else (inf if error else 0.0)
     return Check(
-        accepted=abs(relative) <= CHECK.roll_back * settings.tolerance,
-        gained=gained,
-        expected=expected.mean,
-        noise=expected.noise,
-        form=hypot(expected.form, kappa_error * by_kappa),
-        error=relative,
-        deviation=deviation,
-        drift=drift,
-        changed=changed,
-        reseated=gained - decision.moved - healed,
-        kappa=kappa,
+        accepted=abs(relative) <= CHECK.roll_back * settings.tolerance, gained=gained,
+        expected=expected.mean, noise=expected.noise,
+        form=hypot(expected.form, kappa_error * by_kappa), error=relative, deviation=deviation,
+        drift=drift, changed=changed, reseated=gained - decision.moved - healed, kappa=kappa,
         sources=sources,
-    )
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

@@ -143,20 +143,12 @@ def observe(control: Control, stretch: Stretch, settlement: float) -> Control:
     more = kappa * float(find_reseating(stretch, control.landings).sum())
     cycles, curve = trace_curve(stretch, settlement)
     return replace(
-        control,
-        cycle=stretch.last_cycle,
-        settlement=settlement,
-        windows=join_stretch(control.windows, stretch),
-        behind=behind,
-        kappa=kappa,
-        ahead=control.ahead + more,
-        reseated=control.reseated + more,
-        curve_cycle=control.curve_cycle + cycles,
-        curve_settlement=control.curve_settlement + curve,
-        longest=control.longest * JUMP.growth,
-        attempts=0,
-        window=len(stretch.gain),
-    )
+        control, cycle=stretch.last_cycle, settlement=settlement,
+        windows=join_stretch(control.windows, stretch), behind=behind, kappa=kappa,
+        ahead=control.ahead + more, reseated=control.reseated + more,
+        curve_cycle=control.curve_cycle + cycles, curve_settlement=control.curve_settlement + curve,
+        longest=control.longest * JUMP.growth, attempts=0, window=len(stretch.gain),
+    )  # fmt: skip
 
 
 def join_stretch(stretches: tuple[Stretch, ...], new: Stretch) -> tuple[Stretch, ...]:
@@ -193,22 +185,15 @@ def decide(control: Control, settings: Settings, piston: Regime | None = None) -
     forecast = fit_forecast(find_rates(control.stretches))
     regime = forecast.regime
     known = Decision(
-        control.cycle,
-        "compute",
-        min(control.window, left),
-        regime=regime.name,
-        exponent=regime.exponent,
-        attempt=control.attempts + 1,
-    )
+        control.cycle, "compute", min(control.window, left), regime=regime.name,
+        exponent=regime.exponent, attempt=control.attempts + 1,
+    )  # fmt: skip
     for one, why_not in ((regime, WHY_NOT), (piston, WHY_NOT_PISTON)):
         if one is not None and not one.jump_allowed:
             return replace(
-                known,
-                action="compute" if settings.cycle_by_cycle else "refuse",
-                regime=one.name,
-                exponent=one.exponent,
-                why=why_not[one.name],
-            )
+                known, action="compute" if settings.cycle_by_cycle else "refuse", regime=one.name,
+                exponent=one.exponent, why=why_not[one.name],
+            )  # fmt: skip
     room = left - settings.healing - JUMP.shortest_window
     if room < settings.shortest_jump:
         return replace(known, why="the end is too near for a jump")
@@ -232,16 +217,10 @@ def decide(control: Control, settings: Settings, piston: Regime | None = None) -
         why = f"no jump pays: {binding} allows {jump} cycles, healing takes {settings.healing}"
         return replace(known, window=min(window, left), why=why)
     return replace(
-        known,
-        action="jump",
-        jump=jump,
-        window=min(window, left - jump - settings.healing),
-        gain=gain,
-        moved=moved,
-        correction=moved * (1 + control.share) - gain,
-        half_width=width,
+        known, action="jump", jump=jump, window=min(window, left - jump - settings.healing),
+        gain=gain, moved=moved, correction=moved * (1 + control.share) - gain, half_width=width,
         why=f"{binding} allows {jump} cycles",
-    )
+    )  # fmt: skip
 
 
 def find_limits(

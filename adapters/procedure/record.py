@@ -129,14 +129,11 @@ def read_track(folder: RunFolder) -> Track:
     home = folder.path / "discarded"
     discarded = sorted(p.name for p in home.iterdir() if any(p.iterdir())) if home.exists() else []
     return Track(
-        folder=folder,
-        outcomes=tuple(outcome for _, outcome in stages),
-        names=tuple(stage for stage, _ in stages),
-        failed_jumps=list_failed_jumps(folder),
-        discarded=tuple(discarded),
-        events=tuple(folder.events()),
+        folder=folder, outcomes=tuple(outcome for _, outcome in stages),
+        names=tuple(stage for stage, _ in stages), failed_jumps=list_failed_jumps(folder),
+        discarded=tuple(discarded), events=tuple(folder.events()),
         damaged=tuple(folder.list_damaged()),
-    )
+    )  # fmt: skip
 
 
 def find_comparable_cycle(record: Record) -> int:

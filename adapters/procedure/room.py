@@ -42,13 +42,10 @@ def relax_target(
     if procedure.relaxation == "none":
         return target, {"method": "none"}
     relaxation = relax(
-        target,
-        before,
-        scene.container.walls(before.piston_height, scene.piston_reach),
-        scene.stiffness,
-        method=procedure.relaxation,
+        target, before, scene.container.walls(before.piston_height, scene.piston_reach),
+        scene.stiffness, method=procedure.relaxation,
         walls_after=scene.container.walls(piston_height, scene.piston_reach),
-    )
+    )  # fmt: skip
     return relaxation.position, relaxation.record()
 
 

@@ -230,12 +230,9 @@ def prepare_manifest(
         shutil.copyfile(scene.loading.series, folder.path / "load_series.csv")
         kept.append('loading.series="load_series.csv"')
     manifest = {
-        "scene": record_scene(scene),
-        "overrides": kept,
-        "control": control,
-        "variant": asdict(Variant()),
-        "provenance": record_provenance(sys.argv),
-    }
+        "scene": record_scene(scene), "overrides": kept, "control": control,
+        "variant": asdict(Variant()), "provenance": record_provenance(sys.argv),
+    }  # fmt: skip
     write_whole(path, json.dumps(manifest, indent=1) + "\n")
     folder.add_event("started")
 

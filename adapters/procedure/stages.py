@@ -225,12 +225,9 @@ def jump(
                 run.scene, before, target, piston_height, may_wait=gain is not None
             )
         after = before.move_to(
-            position,
-            velocity=np.zeros_like(target),
-            spin=np.zeros_like(target),
-            piston_height=piston_height,
-            cycle=bed.cycle + h,
-        )
+            position, velocity=np.zeros_like(target), spin=np.zeros_like(target),
+            piston_height=piston_height, cycle=bed.cycle + h,
+        )  # fmt: skip
         save_state(before.move_to(target), folder / "estimated.npz")
         save_state(after, folder / "relaxed.npz")
         notes = {"h": h, "attempt": attempt, "relaxation": record}
@@ -243,12 +240,9 @@ def jump(
         )
     moved = load_state(folder / "relaxed.npz")
     start = EngineStart(
-        bed.start.restart,
-        bed.start.time_step,
-        bed.start.piston_mesh + 1,
-        moved.piston_height,
+        bed.start.restart, bed.start.time_step, bed.start.piston_mesh + 1, moved.piston_height,
         moved=moved,
-    )
+    )  # fmt: skip
     return Bed(bed.cycle + h, start, bed.window, bed.healing)
 
 
@@ -362,13 +356,10 @@ def _watch(run: Run, bed: Bed, folder: Path) -> Callable[[], None]:
     def watch() -> None:
         here = run.engine.cycles_done(run.scene, bed.start, folder)
         run.progress.show_cycles(
-            done=bed.cycle + here,
-            total=procedure.total_cycles,
-            computed=computed + here,
-            settlement=settlement,
-            computed_here=run.computed_here + here,
+            done=bed.cycle + here, total=procedure.total_cycles, computed=computed + here,
+            settlement=settlement, computed_here=run.computed_here + here,
             to_compute=count_cycles_to_compute(run, bed.cycle + here),
-        )
+        )  # fmt: skip
 
     return watch
 

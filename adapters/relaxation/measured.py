@@ -159,14 +159,10 @@ def measure_relaxation(
     before, scene = bed.before, bed.scene
     move = np.linalg.norm(relaxed - bed.position, axis=1)
     return Relaxation(
-        position=relaxed,
-        method=method,
-        converged=converged,
+        position=relaxed, method=method, converged=converged,
         before=measure_bed(before.position, bed.carried),
         estimated=measure_bed(bed.position, scene.search(bed.position, 0.0)),
-        relaxed=measure_bed(relaxed, scene.search(relaxed, 0.0)),
-        evaluations=evaluations,
-        cpu_s=time.process_time() - started,
-        largest_move=float(move.max()),
+        relaxed=measure_bed(relaxed, scene.search(relaxed, 0.0)), evaluations=evaluations,
+        cpu_s=time.process_time() - started, largest_move=float(move.max()),
         median_move=float(np.median(move)),
-    )
+    )  # fmt: skip

@@ -154,18 +154,11 @@ def relax_by_move(
     network = before.search(position_before[order], GAP_FACTOR * scale)
     estimate = bed.position[order]
     moved, converged, evaluations = find_smallest_move(
-        estimate,
-        _bring_inside(after, estimate),
-        after,
-        network,
-        overlap_cap,
-        scale,
-        GAP_FACTOR * scale,
-        keep_height=keep_height,
-        tolerance=tolerance * scale,
+        estimate, _bring_inside(after, estimate), after, network, overlap_cap, scale,
+        GAP_FACTOR * scale, keep_height=keep_height, tolerance=tolerance * scale,
         accepted=min(overlap_cap, max(scale, network.overlap.max(initial=0.0))),
         evaluations_max=evaluations_max,
-    )
+    )  # fmt: skip
     position = np.empty_like(estimate)
     position[order] = moved
     return position, converged, evaluations

@@ -116,19 +116,10 @@ def find_smallest_move(
         right[-1] = height_share * float((anchor - estimate)[:, 2].sum())
         right += SMALLEST.slack * rows.multiplier
         products, _ = solve_multipliers(
-            rows.first,
-            rows.second,
-            near.normal,
-            height_share,
-            SMALLEST.slack,
-            np.append(rows.member, True),
-            right,
-            norm,
-            max(0.3 * tolerance, 0.1 * violation),
-            products_max,
-            n,
-            rows.multiplier,
-        )
+            rows.first, rows.second, near.normal, height_share, SMALLEST.slack,
+            np.append(rows.member, True), right, norm, max(0.3 * tolerance, 0.1 * violation),
+            products_max, n, rows.multiplier,
+        )  # fmt: skip
         evaluations += products
         move = np.empty((n, 3))
         fill_moves(rows.first, rows.second, near.normal, height_share, rows.multiplier, move)
@@ -149,13 +140,9 @@ def start_rows(network: Neighbours, overlap_cap: float, bound: float, n: int) ->
     key = _make_key(network.first, network.second, n)
     order = np.argsort(key)
     return _Rows(
-        key[order],
-        network.first[order],
-        network.second[order],
-        member[order],
-        np.where(member, network.overlap, bound)[order],
-        np.zeros(len(key) + 1),
-    )
+        key[order], network.first[order], network.second[order], member[order],
+        np.where(member, network.overlap, bound)[order], np.zeros(len(key) + 1),
+    )  # fmt: skip
 
 
 def renew_rows(rows: _Rows, near: Neighbours, gap: float, n: int) -> _Rows:

@@ -12,29 +12,20 @@ from adapters.procedure import BOUNDS, Record, Track, sum_cost
 from adapters.report.error import COORDINATION_BAR, HEIGHT_BAR, Comparison, JumpFigures
 
 PROCEDURE, NOTHING, FITTED, FULL = (
-    "this run",
-    "jump and move nothing",
-    "fit the curve, no bed",
-    "full run (control)",
-)
+    "this run", "jump and move nothing", "fit the curve, no bed", "full run (control)",
+)  # fmt: skip
 """Names of the rows of the error table."""
 FEW_GRAINS = 500
 """Fewer grains than this settle in bursts: one such bed cannot judge a law."""
 
 
 PURPOSES = {
-    "engine": ("engine: time steps", ".1f"),
-    "start_up": ("engine: start-up", ".1f"),
-    "parse": ("parse", ".2f"),
-    "fit": ("fit", ".2f"),
-    "relax": ("relax", ".2f"),
-    "other_python": ("other Python", ".2f"),
-    "failed_jumps": ("failed jumps, by the clock", ".1f"),
-    "total": ("total", ".1f"),
-    "preparation": ("preparation, not in the total", ".1f"),
-    "cycles_computed": ("load cycles computed", "d"),
-    "grain_steps": ("grain-steps", ".3g"),
-}
+    "engine": ("engine: time steps", ".1f"), "start_up": ("engine: start-up", ".1f"),
+    "parse": ("parse", ".2f"), "fit": ("fit", ".2f"), "relax": ("relax", ".2f"),
+    "other_python": ("other Python", ".2f"), "failed_jumps": ("failed jumps, by the clock", ".1f"),
+    "total": ("total", ".1f"), "preparation": ("preparation, not in the total", ".1f"),
+    "cycles_computed": ("load cycles computed", "d"), "grain_steps": ("grain-steps", ".3g"),
+}  # fmt: skip
 """What `split_cost` returns, as ``report.json`` has it, with its name and format on the page: CPU
 time from the start of loading [s] (start-up is reading, building neighbour lists, writing), cycles,
 and work that no machine changes, grains times time steps computed."""

@@ -22,12 +22,9 @@ def record_provenance(command: Sequence[str]) -> dict[str, Any]:
     Keys: ``commit``, ``versions`` (name -> version), ``machine``, ``command``, ``started`` (UTC).
     """
     return {
-        "commit": find_commit(),
-        "versions": list_versions(),
-        "machine": describe_machine(),
-        "command": shlex.join(command),
-        "started": datetime.now(UTC).isoformat(timespec="seconds"),
-    }
+        "commit": find_commit(), "versions": list_versions(), "machine": describe_machine(),
+        "command": shlex.join(command), "started": datetime.now(UTC).isoformat(timespec="seconds"),
+    }  # fmt: skip
 
 
 def find_commit() -> str:

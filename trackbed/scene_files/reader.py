@@ -146,12 +146,9 @@ class SceneText:
 
 
 def read_scene(
-    path: Path | str,
-    overrides: Sequence[str] = (),
-    *,
-    guide: Guide,
+    path: Path | str, overrides: Sequence[str] = (), *, guide: Guide,
     after_override: Callable[[dict[str, Any], str], None] | None = None,
-) -> SceneText:
+) -> SceneText:  # fmt: skip
     """Read a scene file; its tables are not checked yet.
 
     ``overrides`` such as ``simulation.duration=0.1``, ``load.0.force=[0, 0, -1]`` or

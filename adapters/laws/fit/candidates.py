@@ -170,9 +170,6 @@ def find_candidates(cycle: FloatArray, displacement: FloatArray, to_cycle: float
         miss |= {key: np.abs(past[key] - happened) for key in found if key in past}
         combined = np.median(np.stack(list(past.values())), axis=0) - happened
     return Candidates(
-        tuple(name for name, _ in found),
-        np.stack(list(found.values())),
-        np.stack([miss[key] for key in found]),
-        distance,
-        combined,
-    )
+        tuple(name for name, _ in found), np.stack(list(found.values())),
+        np.stack([miss[key] for key in found]), distance, combined,
+    )  # fmt: skip

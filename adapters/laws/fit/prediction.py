@@ -198,14 +198,10 @@ def _make_refusal(
     refusal: Refusal, law: str, parameters: dict[str, Any], said: dict[str, LawSaid]
 ) -> JumpRefused:
     return JumpRefused(
-        refusal.why,
-        where=f"law {law}",
-        remedy=refusal.remedy,
-        law=law,
-        regime=refusal.regime,
+        refusal.why, where=f"law {law}", remedy=refusal.remedy, law=law, regime=refusal.regime,
         parameters={name: value for name, value in parameters.items() if isfinite(value)},
         laws={name: asdict(one) for name, one in said.items()},
-    )
+    )  # fmt: skip
 
 
 def find_regime(series: Series, reach: float = 1.0) -> str | None:

@@ -46,13 +46,10 @@ def open_client(
         if scheduler == LOCAL:
             cores = len(os.sched_getaffinity(0))
             place: Any = distributed.LocalCluster(
-                n_workers=1,
-                threads_per_worker=min(workers or cores, members),
-                processes=False,
-                dashboard_address=None,
-                scheduler_kwargs={"dashboard_address": ANY_PORT},
+                n_workers=1, threads_per_worker=min(workers or cores, members), processes=False,
+                dashboard_address=None, scheduler_kwargs={"dashboard_address": ANY_PORT},
                 memory_limit=None,
-            )
+            )  # fmt: skip
             stack.enter_context(place)
         elif scheduler == SLURM:
             place = stack.enter_context(_open_slurm(config))

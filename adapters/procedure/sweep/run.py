@@ -69,18 +69,12 @@ def find_result(sweep: Sweep, member: Member, ended: Ended | None) -> Result:
     if done and (ended is None or ended.finished):
         state, exit_code, sentence = "finished", 0, ""
     return Result(
-        member=member.name,
-        seed=member.seed,
-        state=state,
-        exit_code=exit_code,
-        sentence=sentence,
-        cycle=here.cycle if here else 0,
-        cycles_computed=here.cycles_computed if here else 0,
+        member=member.name, seed=member.seed, state=state, exit_code=exit_code, sentence=sentence,
+        cycle=here.cycle if here else 0, cycles_computed=here.cycles_computed if here else 0,
         settlement_m=here.settlement_m if here else None,
-        speed_up=here.speed_up_so_far if here else None,
-        cpu_s=here.cpu_s if here else 0.0,
+        speed_up=here.speed_up_so_far if here else None, cpu_s=here.cpu_s if here else 0.0,
         run_folder=str(folder.relative_to(sweep.folder)),
-    )
+    )  # fmt: skip
 
 
 def run_sweep(sweep: Sweep, cluster: Cluster, progress: Progress) -> list[Result]:
