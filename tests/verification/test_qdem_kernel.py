@@ -189,6 +189,7 @@ def test_viscous_stress_of_arrays(law: Strain) -> None:
 
 @pytest.mark.long
 @pytest.mark.skipif(numba.config.NUMBA_NUM_THREADS < 2, reason="numba has one thread only")
+@pytest.mark.filterwarnings("ignore::qdem_fem.files.SceneWarning")  # its parts are meant
 @pytest.mark.parametrize("precision", ["float64", "float32"])
 def test_threads_do_not_change_a_bit(precision: Any) -> None:
     """The order of all sums is the layout's, so two threads and one give the same numbers."""

@@ -76,6 +76,7 @@ def test_cubes_come_to_rest_on_springs_that_bear_their_weight(rigid: bool, each:
         assert overlap == pytest.approx(weight.sum() / (8 * STIFFNESS), rel=2e-2)
 
 
+@pytest.mark.filterwarnings("ignore::qdem_fem.files.SceneWarning")  # its overlap is meant
 @pytest.mark.parametrize("surface", [False, pytest.param(True, marks=pytest.mark.long)])
 def test_grounded_is_what_stands_on_the_ground_over_others(surface: bool) -> None:
     """A cube that touches another is grounded with it: on the ground, or where gravity is held."""
