@@ -3,11 +3,7 @@
 from qdem_fem.bodies.assembly import EVERY, NOTHING, Assembly, Given
 from qdem_fem.bodies.conditions import COMPONENTS, Conditions, Held, NodalLoad, Roller, remove_held
 from qdem_fem.bodies.deformable import Body, Rigid
-from qdem_fem.bodies.discretisation import (
-    Discretisation,
-    estimate_bending,
-    estimate_discretisation,
-)
+from qdem_fem.bodies.discretisation import Discretisation, estimate_bending, estimate_discretisation
 from qdem_fem.bodies.mass_scaling import find_element_step, find_mass_scaling_factor
 from qdem_fem.bodies.rigid_mass import (
     RigidMass,

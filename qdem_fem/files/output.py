@@ -17,13 +17,7 @@ import numpy.typing as npt
 
 from qdem_fem.files.arrays import Floats
 from qdem_fem.files.errors import UsageError
-from trackbed.run_files import (
-    digest_file,
-    open_unlinked,
-    refuse_writing,
-    replace_file,
-    write_whole,
-)
+from trackbed.run_files import digest_file, open_unlinked, refuse_writing, replace_file, write_whole
 
 
 def write_bodies_vtu(path: Path, bodies: Sequence[Any]) -> None:
