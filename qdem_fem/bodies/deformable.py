@@ -44,9 +44,8 @@ class Body:
         if not isinstance(material, Material):
             raise MaterialError(
                 f"a {type(material).__name__} is no material",
-                where=name,
-                remedy="give Material(young, poisson, density)",
-            )
+                where=name, remedy="give Material(young, poisson, density)",
+            )  # fmt: skip
         if rigid not in (False, True, "lumped"):
             raise ConditionError(
                 f"rigid is {rigid!r}", where=name, remedy='give True, False or "lumped"'

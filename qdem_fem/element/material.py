@@ -56,9 +56,8 @@ class Material:
             named = ", ".join(f"{name} has {length}" for name, length in lengths.items())
             raise MaterialError(
                 f"arrays of different lengths: {named} values",
-                where="material",
-                remedy="give every array one value for each element",
-            )
+                where="material", remedy="give every array one value for each element",
+            )  # fmt: skip
         _check_laws(self)
 
     @property
@@ -141,9 +140,8 @@ def _check_real(name: str, value: Any) -> Value:
     if array.ndim != 1 or array.size == 0:
         raise MaterialError(
             f"an array of shape {array.shape} does not give one value for each element",
-            where=where,
-            remedy=remedy,
-        )
+            where=where, remedy=remedy,
+        )  # fmt: skip
     array = np.array(array, float)
     _refuse_where(~np.isfinite(array), name, array, "is not finite", remedy)
     array.flags.writeable = False

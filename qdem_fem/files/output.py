@@ -95,9 +95,8 @@ class Table:
                 if rows != count:
                     raise UsageError(
                         f"{count} rows up to {time:.6g} s were written, {rows} are there",
-                        where=str(self.path),
-                        remedy="start again: --force",
-                    )
+                        where=str(self.path), remedy="start again: --force",
+                    )  # fmt: skip
                 stream.seek(0)
                 if hashlib.sha256(stream.read(seal[0])).hexdigest() != seal[1]:
                     raise UsageError(

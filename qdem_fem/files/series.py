@@ -39,17 +39,15 @@ class Series:
             if bad.size:
                 raise ConditionError(
                     f"{name} number {bad[0]} is {array[bad[0]]}: {bad.size} are not finite",
-                    where="series",
-                    remedy="remove or mend the rows",
-                )
+                    where="series", remedy="remove or mend the rows",
+                )  # fmt: skip
         back = np.flatnonzero(np.diff(self.times) <= 0)
         if back.size:
             raise ConditionError(
                 f"the time does not increase from row {back[0]} to {back[0] + 1} "
                 f"({self.times[back[0]]} to {self.times[back[0] + 1]} s)",
-                where="series",
-                remedy="sort the rows by time; a jump needs two close times",
-            )
+                where="series", remedy="sort the rows by time; a jump needs two close times",
+            )  # fmt: skip
 
     def at(self, times: Floats) -> Floats:
         """Values at ``times`` (k,) [s]: (k,) or (k, c)."""

@@ -86,7 +86,6 @@ def make_grain_tetrahedra(nodes: Floats, corner_faces: Integers) -> TetMesh:
     if len(bad):
         raise MeshError(
             f"the surface is not seen from its centroid: {name_some('element', bad)} inside out",
-            where="grain",
-            remedy="draw another shape",
-        )
+            where="grain", remedy="draw another shape",
+        )  # fmt: skip
     return TetMesh(nodes, elements, node_sets={"surface": np.arange(4 * corners - 6)})

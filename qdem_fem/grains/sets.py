@@ -85,9 +85,8 @@ def make_grains(
     if count < 1 or seed < 0:
         raise MeshError(
             f"{count} grains of seed {seed}",
-            where="make_grains",
-            remedy="use a seed of 0 or more, and 1 grain or more",
-        )
+            where="make_grains", remedy="use a seed of 0 or more, and 1 grain or more",
+        )  # fmt: skip
     sizes = draw_sizes(grading, count, np.random.default_rng([seed, count]))
     forms = [draw(np.random.default_rng([seed, i, GRAINS_FORMAT]), recipe) for i in range(count)]
     own = [find_sieve_size(form.nodes) for form in forms]
@@ -135,7 +134,6 @@ def load_grains(path: str | os.PathLike[str]) -> GrainSet:
     ):
         raise MeshError(
             f"format {number}, nodes {nodes.shape}, faces {faces.shape} for {len(corners)} grains",
-            where=where,
-            remedy=remedy,
-        )
+            where=where, remedy=remedy,
+        )  # fmt: skip
     return GrainSet(corners, nodes, faces.astype(np.int64), *shape)

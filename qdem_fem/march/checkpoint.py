@@ -183,9 +183,8 @@ def _open_archive(content: bytes, where: str) -> tuple[dict[str, Any], Arrays]:
     if hashlib.sha256(body).hexdigest().encode() != seal:
         raise CheckpointError(
             f"this is no whole checkpoint ({len(content)} bytes, and their checksum is wrong)",
-            where=where,
-            remedy="take an earlier checkpoint, or start again",
-        )
+            where=where, remedy="take an earlier checkpoint, or start again",
+        )  # fmt: skip
     try:
         with np.load(io.BytesIO(content), allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}

@@ -125,9 +125,8 @@ class ConditionedBodies(State):
             name = body.name if isinstance(body, Body) else f"a {type(body).__name__}"
             raise ConditionError(
                 f"{name} is not a body of this simulation",
-                where="body",
-                remedy="the first argument is one of the bodies it was made of",
-            )
+                where="body", remedy="the first argument is one of the bodies it was made of",
+            )  # fmt: skip
         return start
 
     def _nodes(self, body: Body, nodes: Any, where: str) -> Integers:

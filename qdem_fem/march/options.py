@@ -57,9 +57,8 @@ def check_options(
     if safety > 1:
         raise ConditionError(
             f"{safety!r} of the critical step is not stable",
-            where="simulation, safety",
-            remedy="take at most 1, or give step= to see what happens",
-        )
+            where="simulation, safety", remedy="take at most 1, or give step= to see what happens",
+        )  # fmt: skip
     if threads is not None and threads != int(threads):
         raise ConditionError(f"{threads!r} is no number of threads", where="simulation, threads")
 
@@ -81,21 +80,18 @@ def check_contact(contact: Any, precision: str, device: str) -> None:
     if not isinstance(contact, Contact):
         raise ConditionError(
             f"a {type(contact).__name__} is no contact",
-            where="simulation, contact",
-            remedy="give a SphereContact or a SurfaceContact",
-        )
+            where="simulation, contact", remedy="give a SphereContact or a SurfaceContact",
+        )  # fmt: skip
     if precision != "float64":
         raise ConditionError(
             "contact is computed in double precision",
-            where="simulation, contact",
-            remedy='take precision="float64"',
-        )
+            where="simulation, contact", remedy='take precision="float64"',
+        )  # fmt: skip
     if device != "cpu" and not isinstance(contact, SphereContact):
         raise ConditionError(
             "contact of surfaces is computed on the processor",
-            where="simulation, contact",
-            remedy='take device="cpu", or a SphereContact',
-        )
+            where="simulation, contact", remedy='take device="cpu", or a SphereContact',
+        )  # fmt: skip
 
 
 def check_rigid(bodies: list[Body], precision: str, device: str) -> None:
@@ -104,6 +100,5 @@ def check_rigid(bodies: list[Body], precision: str, device: str) -> None:
     if rigid and (precision != "float64" or device != "cpu"):
         raise ConditionError(
             f"{rigid[0]} is rigid: such bodies are computed in double precision on the processor",
-            where="simulation, rigid",
-            remedy='take precision="float64" and device="cpu"',
-        )
+            where="simulation, rigid", remedy='take precision="float64" and device="cpu"',
+        )  # fmt: skip

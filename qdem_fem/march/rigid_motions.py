@@ -60,6 +60,5 @@ def check_held(simulation: State) -> None:
             raise ConditionError(
                 f"{body.name} has no static answer: {free} of the 6 rigid motions of the part "
                 f"with node {first - simulation.first_node[number]} are not held",
-                where="relax",
-                remedy="fix nodes or components until it can neither shift nor turn",
-            )
+                where="relax", remedy="fix nodes or components until it can neither shift nor turn",
+            )  # fmt: skip

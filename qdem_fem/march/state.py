@@ -57,9 +57,8 @@ class State(System):
         if not isfinite(step):
             raise ConditionError(
                 "every component of every node is held, or rigid: no motion limits the step",
-                where="simulation, step",
-                remedy="give step=",
-            )
+                where="simulation, step", remedy="give step=",
+            )  # fmt: skip
         return step
 
     @property

@@ -39,9 +39,8 @@ def raise_problems(problems: list[Problem], where: str) -> None:
         problems[0].what
         if len(problems) == 1
         else f"{len(problems)} problems with this mesh:{listed}",
-        where=where,
-        remedy="; ".join(dict.fromkeys(p.remedy for p in problems)),
-    )
+        where=where, remedy="; ".join(dict.fromkeys(p.remedy for p in problems)),
+    )  # fmt: skip
 
 
 def convert_array(raw: Any, what: str, kinds: str, of: str, remedy: str) -> Any:

@@ -49,9 +49,8 @@ def read_mesh_parts(source: Any, where: str) -> MeshParts:
         if len(source) != 2:
             raise MeshError(
                 f"a mesh of arrays is a pair (nodes, elements), not {len(source)} items",
-                where=where,
-                remedy=_ACCEPTED,
-            )
+                where=where, remedy=_ACCEPTED,
+            )  # fmt: skip
         return MeshParts(source[0], source[1])
     if hasattr(source, "points") and hasattr(source, "cells"):
         return _read_meshio(source, where)
@@ -75,9 +74,8 @@ def _read_skfem(mesh: Any, where: str) -> MeshParts:
     if shape != "ElementTetP1":
         raise MeshError(
             f"a {kind} is of higher order; QDEM has linear tetrahedra only",
-            where=where,
-            remedy="skfem.MeshTet.from_mesh(mesh) keeps the corners",
-        )
+            where=where, remedy="skfem.MeshTet.from_mesh(mesh) keeps the corners",
+        )  # fmt: skip
     node_sets: dict[str, Any] = {}
     try:
         for name, facets in (getattr(mesh, "boundaries", None) or {}).items():
@@ -85,9 +83,8 @@ def _read_skfem(mesh: Any, where: str) -> MeshParts:
     except (IndexError, TypeError, ValueError) as error:
         raise MeshError(
             f"the boundaries of the {kind} can not be read: {error}",
-            where=where,
-            remedy="name facets of the mesh only",
-        ) from error
+            where=where, remedy="name facets of the mesh only",
+        ) from error  # fmt: skip
     subdomains = getattr(mesh, "subdomains", None) or {}
     return MeshParts(np.asarray(mesh.p).T, np.asarray(mesh.t).T, node_sets, dict(subdomains))
 
@@ -108,9 +105,8 @@ def _read_meshio(mesh: Any, where: str) -> MeshParts:
         raise MeshError(
             f"the mesh holds elements of higher order ({', '.join(curved)}); "
             "QDEM has linear tetrahedra only",
-            where=where,
-            remedy=_KEEP_CORNERS,
-        )
+            where=where, remedy=_KEEP_CORNERS,
+        )  # fmt: skip
     blocks = [block.data for block in mesh.cells if block.type == "tetra"]
     if sum(len(block) for block in blocks) == 0:
         counts: Counter[str] = Counter()
@@ -128,9 +124,8 @@ def _read_meshio(mesh: Any, where: str) -> MeshParts:
     except (IndexError, TypeError, ValueError, AttributeError, KeyError) as error:
         raise MeshError(
             f"cells and sets of the meshio mesh do not fit together: {error}",
-            where=where,
-            remedy="make the mesh again with meshio.Mesh, which checks this",
-        ) from error
+            where=where, remedy="make the mesh again with meshio.Mesh, which checks this",
+        ) from error  # fmt: skip
     named = {name for name, entry in mesh.field_data.items() if np.shape(entry) == (2,)}
     if lost := named - {*node_sets, *element_sets}:
         warn_user(

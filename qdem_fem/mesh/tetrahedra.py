@@ -153,9 +153,8 @@ def find_gradients(nodes: Floats, elements: Integers) -> tuple[Floats, Floats]:
         raise MeshError(
             f"no positive volume: {name_some('element', bad)}; "
             f"element {bad[0]} has {volumes[bad[0]]:.3g} m^3",
-            where="mesh",
-            remedy="pass the mesh through read_mesh first",
-        )
+            where="mesh", remedy="pass the mesh through read_mesh first",
+        )  # fmt: skip
     return gradients, volumes
 
 

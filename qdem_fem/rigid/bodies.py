@@ -288,9 +288,8 @@ class RigidBodies:
         if self._every.turn[b, 1:][held].any():
             raise ConditionError(
                 "what is to hold it has turned already, and can not be brought back",
-                where=self.bodies[b].name,
-                remedy="hold a rigid body before it turns",
-            )
+                where=self.bodies[b].name, remedy="hold a rigid body before it turns",
+            )  # fmt: skip
         omega[held] = 0.0
         self._every.spin[b] = self._inertia_of(b) @ omega
         work[1] += self.kinetic_energy() - before

@@ -52,9 +52,8 @@ def find_hold(
     if abs(left - np.diag(mask)).max() > 1e-6 or turns == 2:
         raise ConditionError(
             "what is held leaves the rigid body a motion about its nodes, a hinge or a slope",
-            where=where,
-            remedy="hold components of all its nodes, or leave the body deformable",
-        )
+            where=where, remedy="hold components of all its nodes, or leave the body deformable",
+        )  # fmt: skip
     given, share = np.full(3, -1), np.zeros(3)
     for k in range(3):
         mine = component == k
@@ -62,9 +61,8 @@ def find_hold(
         if len(asked) > 1:
             raise ConditionError(
                 f"its nodes are to move apart along {'xyz'[k]}, and the body is rigid",
-                where=where,
-                remedy="prescribe one motion for all of them",
-            )
+                where=where, remedy="prescribe one motion for all of them",
+            )  # fmt: skip
         if not mask[k]:
             given[k], share[k] = asked.pop() if asked else (0, 0.0)
     turning = {0: STILL, 1: int(np.argmax(mask[3:])), 3: FREE}[int(turns)]

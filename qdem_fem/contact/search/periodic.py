@@ -78,9 +78,8 @@ def find_partners(
     if len(a) != len(b):
         raise ConditionError(
             f"{len(a)} nodes on one face of {name} and {len(b)} on the other",
-            where="periodic",
-            remedy="mesh both faces alike",
-        )
+            where="periodic", remedy="mesh both faces alike",
+        )  # fmt: skip
     shift = nodes[b].mean(axis=0) - nodes[a].mean(axis=0)
     distance, place = cKDTree(nodes[b]).query(nodes[a] + shift)
     size = np.ptp(nodes, axis=0).max()
@@ -89,9 +88,8 @@ def find_partners(
         raise ConditionError(
             f"node {a[worst]} of {name} has no partner: the nearest, {b[place[worst]]}, is "
             f"{distance[worst]:.3g} m from where it should be",
-            where="periodic",
-            remedy="mesh both faces alike, or give a larger tolerance",
-        )
+            where="periodic", remedy="mesh both faces alike, or give a larger tolerance",
+        )  # fmt: skip
     return a, b[place]
 
 
@@ -103,9 +101,8 @@ def check_joined(body: Body, master: Integers, side: PeriodicWidth, where: str) 
         raise ConditionError(
             f"faces of {body.name} are joined over {most:.4g} m along {side.axis}, where contact "
             f"repeats every {side.width:.4g} m",
-            where=where,
-            remedy="do not join it along this axis",
-        )
+            where=where, remedy="do not join it along this axis",
+        )  # fmt: skip
 
 
 def find_extents(along: Floats, first: Integers) -> Floats:
@@ -134,16 +131,14 @@ def check_extents(
         raise ConditionError(
             f"a width of {side.width:.4g} m is less than two reaches of a contact, of "
             f"{reach:.4g} m each",
-            where=where,
-            remedy="take a wider layer",
-        )
+            where=where, remedy="take a wider layer",
+        )  # fmt: skip
     left = side.width - reach - size
     if (left <= 0).any():
         at = int(np.argmin(left))
         raise ConditionError(
             f"{bodies[at].name} is {size[at]:.4g} m long along {side.axis}: with a reach of "
             f"contact of {reach:.4g} m it would touch its own image, {side.width:.4g} m from it",
-            where=where,
-            remedy="take a wider layer",
-        )
+            where=where, remedy="take a wider layer",
+        )  # fmt: skip
     return min(room, float(left.min()))

@@ -105,6 +105,5 @@ def check_inside(
         raise ContactTooDeep(
             f"{bodies[one].name} lies {way:.3g} m below the surface of {bodies[other].name}"
             f"{across}, where no contact sees it",
-            where=where,
-            remedy="begin with bodies that do not overlap",
-        )
+            where=where, remedy="begin with bodies that do not overlap",
+        )  # fmt: skip

@@ -37,9 +37,8 @@ try:
 except Exception as error:  # without CUDA's runtime numba-cuda raises errors of many kinds
     raise LibraryMissing(
         f"numba.cuda can not be imported ({' '.join(str(error).split())})",
-        where='device="cuda"',
-        remedy=NO_CUDA,
-    ) from error
+        where='device="cuda"', remedy=NO_CUDA,
+    ) from error  # fmt: skip
 
 THREADS_A_BLOCK = 128
 """Threads of a block."""

@@ -53,15 +53,13 @@ class Train:
             raise ConditionError(
                 f"axles {self.axle_distance} m, bogies {self.bogie_distance} m and cars "
                 f"{self.car_length} m apart do not nest",
-                where="train",
-                remedy="give axle_distance < bogie_distance < car_length",
-            )
+                where="train", remedy="give axle_distance < bogie_distance < car_length",
+            )  # fmt: skip
         if self.cars != int(self.cars) or not self.first_share < 1:
             raise ConditionError(
                 f"{self.cars} cars, share {self.first_share} of the load on one rail",
-                where="train",
-                remedy="give a whole number of cars and a share below 1",
-            )
+                where="train", remedy="give a whole number of cars and a share below 1",
+            )  # fmt: skip
 
     @property
     def wheel_loads(self) -> Floats:
