@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,12 +14,18 @@ from qdem_fem.march import split_motion
 from qdem_fem.tables import Scene
 from trackbed.plausible import Quantity, describe_implausible
 
-BENDING = 0.1
-"""Shortfall of a deflection [-] above which a dry run warns of a mesh."""
-TURNED = 0.05
-"""Share of a small strain [-] that may come of turning."""
-SINGLE = 2e-6
-"""Strain [-] that rounding leaves in bodies that turn in single precision, measured: 1 to 2e-6."""
+
+@dataclass(frozen=True)
+class DoubtNumbers:
+    """From where on the user is warned."""
+
+    bending: float = 0.1  # shortfall of a deflection, of which a dry run warns [-]
+    turned: float = 0.05  # share of a small strain that may be due to turning [-]
+    single: float = 2e-6
+    """Strain that rounding leaves in turning bodies in single precision, measured 1 to 2e-6 [-]."""
+
+
+DOUBT = DoubtNumbers()
 
 
 def warn_of_values(scene: Scene, bodies: dict[str, Any]) -> None:
@@ -56,7 +63,7 @@ def warn_of_bending(bodies: dict[str, Any]) -> None:
 
     No load is looked at, and no answer needed: whether a body bends is for the user to know."""
     for alike in sort_by_kind(bodies).values():
-        if not alike[0].rigid and (short := estimate_bending(alike[0])) > BENDING:
+        if not alike[0].rigid and (short := estimate_bending(alike[0])) > DOUBT.bending:
             warn_user(
                 f"if {alike[0].name} bends, it bends about {100 * short:.0f} % too little: linear "
                 "tetrahedra are too stiff; mesh it finer across"
@@ -75,15 +82,15 @@ def warn_of_strain(run: Any, moved: Floats) -> None:
         small, true = (MEASURES[name].compute_strain(gradient) for name in ("small", "svk"))
         volume = body.gradients[1]
         wrong, whole = (volume @ (one**2).sum(axis=(1, 2)) for one in (small - true, true))
-        if not MEASURES[run.strain].OBJECTIVE and wrong > TURNED**2 * whole:
+        if not MEASURES[run.strain].OBJECTIVE and wrong > DOUBT.turned**2 * whole:
             warn_user(
                 f"{body.name} turns, and strain = {run.strain!r} takes a turn for strain: of it "
                 f'{100 * np.sqrt(wrong / whole):.0f} % is wrong; take "finger"'
             )
         greatest = float(np.sqrt((true**2).sum(axis=(1, 2)).max()))
-        if run.precision == "float32" and free and greatest < SINGLE:
+        if run.precision == "float32" and free and greatest < DOUBT.single:
             warn_user(
                 f"the strain of {body.name}, {greatest:.2g} at most, is below what single "
-                f"precision holds of a body that turns, {SINGLE:g}, or "
-                f'{SINGLE * float(np.max(body.material.young)):.2g} Pa: precision = "float64"'
+                f"precision holds of a body that turns, {DOUBT.single:g}, or "
+                f'{DOUBT.single * float(np.max(body.material.young)):.2g} Pa: precision = "float64"'
             )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import time
+import zipfile
 from dataclasses import dataclass, field
 from math import ceil
 from pathlib import Path
@@ -12,10 +13,19 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from qdem_fem.files import EnergyLost, Interrupted, Table, read_table, write_bodies_vtu
+from qdem_fem.files import (
+    CheckpointError,
+    EnergyLost,
+    Floats,
+    Interrupted,
+    Table,
+    read_table,
+    write_bodies_vtu,
+)
 from qdem_fem.scene.doubts import warn_of_strain
 from qdem_fem.scene.energy_account import EnergyAccount
 from qdem_fem.tables import Prepared
+from trackbed.memory import read_arrays
 from trackbed.run_files import RESULT, note_signals, read_object, write_pvd, write_whole
 from trackbed.run_files import folder as run_folder
 
@@ -200,7 +210,7 @@ class _Record:
         names = [f"{name}_{axis}" for name in probes for axis in "xyz"]
         self.rows = Table(path / "probes.csv", ["time", *names])
         self.energies = Table(path / "energy.csv", ["time", *list_energies(self.run)])
-        self.peak, self.peak_energy = np.zeros((0, 3)), -1.0
+        self.peak, self.peak_energy = self.run.assembly.field("displacement"), -1.0
         """Displacement [m] where most elastic energy was [J]."""
 
     def begin(self) -> None:
@@ -221,9 +231,8 @@ class _Record:
         for table, count in zip((self.rows, self.energies), counts, strict=True):
             table.cut(now, count, *([seals[table.path.name]] if table.path.name in seals else []))
         self.account.add_rows(read_table(self.energies.path))
-        if (self.path / PEAK).exists():
-            with np.load(self.path / PEAK) as peak:
-                self.peak, self.peak_energy = peak["displacement"], float(peak["energy"])
+        if (self.path / PEAK).exists():  # an earlier version wrote none
+            self.peak, self.peak_energy = read_peak(self.path / PEAK, self.peak.shape)
         kept = {name for _, _, name in self.plan.list_field_files(self.run.steps_done)}
         for path in self.path.glob("fields_*.vtu"):
             if path.name not in kept:
@@ -285,11 +294,26 @@ class _Record:
         self.rows.sync()
         self.energies.sync()
         seals = {table.path.name: table.seal() for table in (self.rows, self.energies)}
-        self.run.save(checkpoint)
-        peak = io.BytesIO()
+        peak = io.BytesIO()  # before the checkpoint: what is ahead of it, the run finds again
         np.savez(peak, displacement=self.peak, energy=self.peak_energy)
         write_whole(self.path / PEAK, peak.getvalue())
+        self.run.save(checkpoint)
         write_whole(self.path / COST, json.dumps(self.done.cost | {SEALS: seals}) + "\n")
+
+
+def read_peak(path: Path, shape: tuple[int, ...]) -> tuple[Floats, float]:
+    """Displacement (n, 3) [m], as ``shape`` says, where most elastic energy was, and that [J].
+
+    Raises `CheckpointError` for a damaged file.
+    """
+    try:
+        kept = read_arrays(path)
+        return kept["displacement"].reshape(shape), float(kept["energy"])
+    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+        raise CheckpointError(
+            f"this is no record of the greatest strain ({error})", where=str(path),
+            remedy="remove it, which leaves out what came before, or compute again with --force",
+        ) from error  # fmt: skip
 
 
 def list_energies(run: Any) -> tuple[str, ...]:

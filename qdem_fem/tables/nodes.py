@@ -38,6 +38,8 @@ def make_body_mesh(table: Mesh, folder: Path, key: str) -> TetMesh:
     if table.box is None:
         mesh = read_mesh(folder / str(table.file))
         return replace(mesh, nodes=table.scale * mesh.nodes)
+    if table.scale != 1.0:
+        raise WrongKey(f"{key}.scale", "it is the unit of a file: give the box in metres")
     count = int(np.prod(table.box.cells))
     if count > CELLS_MOST:
         raise WrongKey(f"{key}.box.cells", f"{count} cells are too many; at most {CELLS_MOST}")

@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields
 from typing import Self
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from rigid_lcp.arrays import Bools, Floats, Ints
@@ -15,6 +16,12 @@ FEATURE_BITS, BODY_BITS = 10, 21
 LENGTH_TIE = 1e-9
 """Share of the smaller reach of two bodies [-] below which lengths are equal: then the body or the
 feature of the smaller number is taken, so that round-off never renames a contact."""
+
+
+@njit(cache=True)
+def pack_key(a: int, b: int, feature_a: int, feature_b: int) -> int:
+    """One number for a feature of a on a feature of b."""
+    return ((((a << BODY_BITS) | b) << FEATURE_BITS) | feature_a) << FEATURE_BITS | feature_b
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from rigid_lcp.arrays import Bools, Floats, Ints
-from rigid_lcp.contact.arrays import BODY_BITS, FEATURE_BITS, LENGTH_TIE, Contacts
+from rigid_lcp.contact.arrays import FEATURE_BITS, LENGTH_TIE, Contacts, pack_key
 from rigid_lcp.contact.near_pairs import (
     DISC,
     HALF_SPACE,
@@ -114,12 +114,6 @@ def detect_2d(
         bodies[:, 0], bodies[:, 1], numbers[:, 0:2], numbers[:, 2:4], numbers[:, 4], key,
         numbers[:, 5], numbers[:, 6], zero[0], zero[1], edges[0], edges[1],
     )  # fmt: skip
-
-
-@njit(cache=True)
-def pack_key(a: int, b: int, vertex: int, face: int) -> int:
-    """One number for a vertex of a on a face of b."""
-    return ((((a << BODY_BITS) | b) << FEATURE_BITS) | vertex) << FEATURE_BITS | face
 
 
 @njit(cache=True)

@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from rigid_lcp.arrays import Floats, Ints
-from rigid_lcp.contact.arrays import BODY_BITS, FEATURE_BITS, LENGTH_TIE, Contacts
+from rigid_lcp.contact.arrays import FEATURE_BITS, LENGTH_TIE, Contacts, pack_key
 from rigid_lcp.contact.manifold import (
     CANDIDATE_COLUMNS,
     CORNER_FACE,
@@ -176,12 +176,6 @@ def find_edge_directions(
         along = solids.vertex[second] - solids.vertex[first]
         directions[side, rows] = along / np.linalg.norm(along, axis=1)[:, None]
     return directions[0], directions[1]
-
-
-@njit(cache=True)
-def pack_key(a: int, b: int, feature_a: int, feature_b: int) -> int:
-    """One number for a feature of a on a feature of b; crossing edges count from `MOST_EDGES`."""
-    return ((((a << BODY_BITS) | b) << FEATURE_BITS) | feature_a) << FEATURE_BITS | feature_b
 
 
 @njit(cache=True)

@@ -224,6 +224,8 @@ class World:
             if loads is not None:
                 result[moving, 2] += force[moving, 2] / self.inertia[moving]
             return result
+        if loads is None and not gyroscopic:
+            return result
         inertia, spin = turn_inertia(self.inertia, motion.angle)[moving], motion.spin[moving]
         torque = np.zeros_like(spin)
         if gyroscopic:

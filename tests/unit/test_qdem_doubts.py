@@ -12,12 +12,13 @@ import pytest
 
 import qdem_fem as q
 from qdem_fem.bodies import Body
-from qdem_fem.files import EnergyLost, MeshError
+from qdem_fem.files import CheckpointError, EnergyLost, MeshError
 from qdem_fem.mesh import make_box_mesh, read_mesh
 from qdem_fem.scene.doubts import warn_of_strain
 from qdem_fem.scene.energy_account import EnergyAccount
-from qdem_fem.scene.run import _Record
-from qdem_fem.tables.keys import SeriesTable
+from qdem_fem.scene.run import _Record, read_peak
+from qdem_fem.tables.keys import BoxMesh, Mesh, SeriesTable
+from qdem_fem.tables.nodes import make_body_mesh
 from qdem_fem.tables.series import make_series
 from qdem_fem.tables.types import WrongKey
 
@@ -130,3 +131,29 @@ def test_a_gap_in_the_account_is_blamed_on_its_cause(overlap: float, cause: str)
     record = SimpleNamespace(account=account, audit=1e-3, run=SimpleNamespace(time=0, steps_done=0))
     with pytest.raises(EnergyLost, match=cause):
         _Record.check_audit(record)  # type: ignore[arg-type]
+
+
+def test_a_damaged_record_of_the_greatest_strain_is_refused(tmp_path: Path) -> None:
+    """Cut short, empty, of another mesh: a sentence that says what to do; a whole one is read."""
+    path, moved = tmp_path / "peak.npz", np.arange(6.0).reshape(2, 3)
+    np.savez(path, displacement=moved, energy=2.5)
+    found, energy = read_peak(path, (2, 3))
+    assert (found == moved).all()
+    assert energy == 2.5
+    with pytest.raises(CheckpointError, match="--force"):
+        read_peak(path, (3, 3))
+    for content in (path.read_bytes()[:100], b""):
+        path.write_bytes(content)
+        with pytest.raises(CheckpointError, match=r"peak\.npz: .*\n  -> remove it"):
+            read_peak(path, (2, 3))
+
+
+def test_a_mesh_in_millimetres_is_scaled(tmp_path: Path) -> None:
+    """Key ``scale``: metres in one unit of the file; of a box it is refused."""
+    meshio.Mesh(1e3 * bar().nodes, [("tetra", bar().elements)]).write(tmp_path / "mm.vtu")
+    mesh = make_body_mesh(Mesh(file="mm.vtu", scale=1e-3), tmp_path, "mesh")
+    assert mesh.nodes == pytest.approx(bar().nodes, abs=1e-15)
+    with pytest.raises(WrongKey, match="unit of a file"):
+        make_body_mesh(
+            Mesh(box=BoxMesh(size=(1, 1, 1), cells=(1, 1, 1)), scale=1e-3), tmp_path, "m"
+        )

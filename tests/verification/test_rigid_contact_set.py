@@ -59,11 +59,11 @@ def slide(kind: str, gap: float, dim: int, seed: int) -> Floats:
     scene = Scene(dim, [*[0.0] * (dim - 1), -GRAVITY])
     lay_floor(scene, kind, gap, rng)
     place = [start, *[0.013] * (dim - 2), 0.02 + height]
-    angle = turn * (seed % 2) * np.array([0.0, 0.0, 1.0]) / 2
+    half = turn * (seed % 2) / 2
     block = scene.add(
         Polygon.rectangle(0.06, 0.04) if dim == 2 else make_box(0.06, 0.05, 0.04), density=2700.0,
         position=place, velocity=[speed, *[0.1 * speed] * (dim - 2), 0.0], friction=0.2,
-        angle=0.0 if dim == 2 else [np.cos(np.linalg.norm(angle)), *angle],
+        angle=0.0 if dim == 2 else [np.cos(half), 0, 0, np.sin(half)],
     )  # fmt: skip
     force = np.zeros((len(scene.bodies), 3 * (dim - 1)))
     force[block, 0] = push * GRAVITY * scene.bodies[block].mass
