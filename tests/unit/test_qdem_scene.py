@@ -112,7 +112,7 @@ def test_commented_keys_of_the_specification_are_valid(tmp_path: Path) -> None:
     But for those that shut each other out, as a spin does where [[periodic]] joins the body.
     """
     text = re.sub(r"(?m)^# (?=\w+ = |\[)", "", CANTILEVER)
-    text = re.sub(r"(?m)^(file|tolerance|device|spin) = .*$", "", text)
+    text = re.sub(r"(?m)^(file|scale|tolerance|device|spin) = .*$", "", text)
     text = re.sub(r"\[body.regions.core\].*\nyoung = 30e9", "", text)
     text = text.replace('method = "static"', 'method = "dynamic"')
     text = text.replace("cells = [48, 6, 6]", SMALL)
