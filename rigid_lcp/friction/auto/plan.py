@@ -14,10 +14,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 
 from rigid_lcp.arrays import Floats
-from rigid_lcp.friction.attempts import PROXIMAL
 from rigid_lcp.friction.auto import paths as along
 from rigid_lcp.friction.auto import sweeps as by
 from rigid_lcp.friction.auto.trial import LIMITS, Trial
@@ -115,10 +113,7 @@ FIRST = (
     Stage("sweeps, dear", lambda t: not t.small and t.dear,
           lambda t: t.sweep(t.start, 6000, factorisations=0)),
     Stage("paths, dear", lambda t: not t.small and t.cold and t.dear, ALL_PATHS),
-    Stage("sweeps and points, small", lambda t: t.small,
-          partial(by.sweep_on, sweeps=1000, points=PROXIMAL.factorisations)),
-    Stage("sweeps and points", lambda t: not t.small and t.start is None,
-          partial(by.sweep_on, sweeps=1000, points=20)),
+    Stage("sweeps and points, small", lambda t: t.small, by.sweep_on),
     Stage("accept", lambda t: not t.small, Trial.accepts),
 )  # fmt: skip
 """What solves nearly all: what sticks, the convex path, Gauss-Seidel with momentum and proximal
@@ -130,7 +125,6 @@ LAST = (
     Stage("one turn", lambda t: t.gives_energy, by.turn_once),
     Stage("paths, late", lambda t: t.convex_useful and not t.smoothed, ALL_PATHS),
     Stage("turns from paths", lambda t: True, along.turn_from_paths),
-    Stage("points", lambda t: True, lambda t: by.run_points(t, 1500, max(5e9, t.effort))),
 )  # fmt: skip
 """What is dear and seldom needed, where nothing proves that there is no solution: some ten seconds
 of it solve large packings of little friction."""

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigid_lcp.arrays import Floats
-from rigid_lcp.friction.attempts import solve_proximal
+from rigid_lcp.friction.attempts import PROXIMAL, solve_proximal
 from rigid_lcp.friction.auto.trial import LIMITS, Trial
 from rigid_lcp.friction.problem import FrictionSolution
 
@@ -74,13 +74,14 @@ def sweep_briefly(trial: Trial) -> bool:
     return trial.best.solved
 
 
-def sweep_on(trial: Trial, sweeps: int, points: int) -> bool:
-    """Sweeps from the best point, and so many factorisations of points from their end.
+def sweep_on(trial: Trial) -> bool:
+    """Sweeps from the best point, and proximal points from their end.
 
     Where there is no solution forces grow without end here, and a proof is looked for at once.
     """
     until = max(trial.coarse, LIMITS.hand_over)
-    return trial.sweep(trial.best.r, sweeps, until=until, factorisations=points)
+    points = PROXIMAL.factorisations
+    return trial.sweep(trial.best.r, TURNS.sweeps, until=until, factorisations=points)
 
 
 def sweep_yielding(trial: Trial) -> bool:
@@ -118,12 +119,6 @@ def sweep_turn(trial: Trial, start: Floats) -> FrictionSolution:
     found = trial.run_sweeps(start, trial.tolerance, TURNS.sweeps, last=True)
     trial.sharpen()
     return found
-
-
-def run_points(trial: Trial, most: int, flops: float) -> bool:
-    """Extrapolated points from the best one (`Trial.drift`)."""
-    trial.extrapolate(most, flops)
-    return trial.best.solved
 
 
 def take_turns(trial: Trial, force: Floats, patience: int | None = None) -> bool:

@@ -203,13 +203,12 @@ class Trial:
         return self.best.solved or self.polish(found, factorisations)
 
     def extrapolate(
-        self, most: int, flops: float, start: FrictionSolution | None = None,
+        self, most: int, flops: float, start: FrictionSolution,
         patience: int = POINTS.factorisations,
     ) -> FrictionSolution:  # fmt: skip
-        """Extrapolated proximal points from ``start`` (the best if None), with so many
-        factorisations at most and at about such a cost."""
+        """Extrapolated proximal points from ``start``, with so many factorisations at most and at
+        about such a cost."""
         count = int(min(most, flops / self.factors.flops, self.affordable))
-        start = start or self.best
         if count < LIMITS.few_points:
             return start
         return self.attempt(

