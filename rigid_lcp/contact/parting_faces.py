@@ -6,7 +6,8 @@ next slab parts them by a millimetre and its top by nothing, and a contact with 
 block.  A step keeps a pair apart along one face only, so that one is taken along which
 
 1. a third body keeps them apart: a contact of the same normal whose gap is no greater (the slab on
-   which the block lies, or on which it lands and is in by as much), or else
+   which the block lies, or on which it lands and is in by as much; where two faces are such, as
+   of slabs that touch each other, rule 2 chooses between them), or else
 2. they will be the farthest apart, or the least deep, if they move on as they do.
 
 Both are exact for flush and level pieces, fixed or not.  Where two corners meet and nothing else is
@@ -114,8 +115,7 @@ def choose_face(
     0 where what parts it most stays.
     """
     chosen, number = -1, 0
-    if is_kept_apart(bodies, numbers, count, a, b, widest, widest_gap + tie):
-        return chosen, number
+    kept = is_kept_apart(bodies, numbers, count, a, b, widest, widest_gap + tie)
     later = find_gap_later(widest, vertices_a, vertices_b, centres, drifts)
     closing = later < -tie
     for side in range(2):
@@ -127,9 +127,11 @@ def choose_face(
             normal = faces[face] * (2.0 * side - 1.0)
             if gap < -depth or project(normal, widest) > PARALLEL:
                 continue
-            if count < 0 or is_kept_apart(bodies, numbers, count, a, b, normal, gap + tie):
+            supported = is_kept_apart(bodies, numbers, count, a, b, normal, gap + tie)
+            if count < 0 or (supported and not kept):
                 return side, face
             expected = find_gap_later(normal, vertices_a, vertices_b, centres, drifts)
-            if closing and gap >= -tie and expected > later + tie:
+            eligible = supported if kept else closing and gap >= -tie
+            if eligible and expected > later + tie:
                 chosen, number, later = side, face, expected
     return chosen, number

@@ -90,6 +90,24 @@ def test_a_block_slides_over_joints_as_over_one_slab(dim, kind, gap, starts):
         assert slide(kind, gap, dim, seed) == pytest.approx(alone, abs=1e-9), seed
 
 
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_block_slides_over_loose_slabs_that_touch_each_other(dim):
+    """Their own contacts have the normal of the end that it must not trip over."""
+    scene, flat, up = Scene(dim, [*[0] * (dim - 1), -GRAVITY]), [0.0] * (dim - 2), [0.0] * (dim - 1)
+    scene.add(HalfSpace([*up, 1.0], -SIDE), friction=1.0)
+    for k in range(4):
+        slab = Polygon.rectangle(SIDE, SIDE) if dim == 2 else make_box(SIDE, SIDE, SIDE)
+        scene.add(slab, density=2700.0, position=[SIDE * k, *flat, -SIDE / 2], friction=0.6)
+    block = scene.add(
+        Polygon.rectangle(0.06, 0.04) if dim == 2 else make_box(0.06, 0.05, 0.04), density=2700.0,
+        position=[0.01, *flat, 0.02], velocity=[2.0, *up], friction=0.2,
+    )  # fmt: skip
+    run = Simulation(scene, step=5e-4)
+    run.advance(0.05)
+    way = 2.0 * 0.05 - 0.2 * GRAVITY * 0.05**2 / 2
+    assert run.positions[block] == pytest.approx([0.01 + way, *flat, 0.02], abs=1e-9)
+
+
 @pytest.mark.parametrize("step_down", [1e-4, 5e-4, 2e-3])
 def test_a_block_slides_off_a_low_step_without_tripping(step_down):
     """The next slab lies lower by less than the way of a step: x = v t - mu g t^2 / 2 while the
