@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import radians, tan
 from typing import Literal
 
-Quantity = Literal["friction", "density", "young", "grain", "body"]
+Quantity = Literal["friction", "density", "young", "grain", "body", "settlement", "strain"]
 DEGREES = "an angle in degrees"
 
 
@@ -38,6 +38,8 @@ class PlausibleBounds:
         "Young's modulus", "Pa", 1e5, 2e12, (1e6, 1e12), (("GPa", 1e9), ("MPa", 1e6), ("kPa", 1e3))
     )
     grain: Bounds = Bounds("grain", "m", 0.0, 1.0, (1e-4, 1.0), (("mm", 1e-3), ("um", 1e-6)))
+    settlement: Bounds = Bounds("settlement", "m", 0.0, 1.0, (1e-5, 0.5), (("mm", 1e-3),))
+    strain: Bounds = Bounds("strain", "", 0.0, 1.0, (1e-5, 0.5), (("%", 0.01),))
     body: Bounds = Bounds("body", "m", 0.0, 100.0, (1e-3, 100.0), (("mm", 1e-3), ("um", 1e-6)))
 
 

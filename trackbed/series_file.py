@@ -45,10 +45,11 @@ TIMES = ("s", "ms", "us", "µs", "min", "h")
 BRACKETED = re.compile(r"(.*?),?\s*[\[(]\s*([^\])]*?)\s*[\])]\s*")
 """A name with a unit in brackets, known or not."""
 FACTOR = re.compile(
-    r"[x\u00d7*\u00b7/]\s*1[0e]|10\s*(\^|\*\*)|\b1e[+-]?\d|(?<![a-z])(thousand|million|tausend|mio)",
+    r"[x\u00d7*\u00b7/]\s*1[0e]|10\s*(\^|\*\*)|\b1e[+-]?\d|in\s+10{2,}\b|\b(log(10)?|lg|ln)\b|"
+    r"(?<![a-z])(thousand|million|tausend|tsd|mio|kcycle|tenth|hundredth)",
     re.IGNORECASE,
 )
-"""Signs in a column's name that its numbers are to be multiplied."""
+"""Signs in a column's name that its numbers are to be multiplied, or are logarithms."""
 MARKS = "' \u2019\u00a0\u2009\u202f"
 """Apostrophes and blanks, which mark thousands and nothing else."""
 GROUPS = re.compile(rf"([+-]?\d{{1,3}}(?:[{MARKS}]\d{{3}})+)(?=[.,]|$)(.*)")

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from adapters.cli.arguments import add_json, print_json
 from adapters.errors import UsageError
+from trackbed.plausible import Quantity, describe_implausible
 
 FARTHEST = 1e12
 """Load cycles that are asked for at most: a hundred thousand years of the busiest line."""
@@ -116,6 +117,10 @@ def run_fit(arguments: argparse.Namespace) -> int:
         raise
     if fall := refuse_fall(series.cycle + series.counted_from, series.settlement):
         print(f"warning: {fall.why}\n  -> {fall.remedy}", file=sys.stderr)
+    quantity: Quantity = "strain" if series.unit == "1" else "settlement"
+    most = float(abs(series.settlement).max()) if series.unit in ("m", "1") else 0.0
+    if said := describe_implausible(quantity, most, series.where):
+        print(f"warning: {said}", file=sys.stderr)
     fitted = found.to_json()
     if arguments.json:
         print_json(fitted)

@@ -124,6 +124,7 @@ def read_table_series(path: Path, names: Sequence[str] = (), unit: str | None = 
             "only rows of the kind computed are",
         )  # fmt: skip
     cycle, settlement = table.read_numbers(places, ("cycle", title))
+    _refuse_doubtful_cycles(table, places)
     if cycle.min() < 0:
         row = int(np.argmax(cycle < 0))
         raise UsageError(
@@ -195,6 +196,23 @@ def _check_counts(table: Table, place: int, named: Sequence[str]) -> None:
             f"the column {title} is in {unit}, and cycles are plain numbers",
             where=f"{table.path}:{table.header_line}",
             remedy=f"give cycles, or name what you count in full: --columns '{title}' ...",
+        )
+
+
+def _refuse_doubtful_cycles(table: Table, places: Sequence[int]) -> None:
+    """Refuse cycles such as 1.000 that may be one or a thousand: all decimals are three, and the
+    readings do not show (as 0.850 does) that every number of the table is written so."""
+    cycles, readings = ([row[place].strip() for row in table.rows] for place in places)
+    signs = "[.,]" if table.decimal_comma else "[.]"
+    broken = [row for row, cell in enumerate(cycles) if re.search(signs, cell)]
+    doubtful = all(re.fullmatch(rf"[1-9]\d{{0,2}}{signs}\d{{3}}", cycles[row]) for row in broken)
+    rounded = all(re.fullmatch(r"[+-]?\d+[.,]\d{3}", cell) for cell in readings)
+    if broken and doubtful and not (rounded and any(re.match("[+-]?0", r) for r in readings)):
+        cell = cycles[broken[0]]
+        raise UsageError(
+            f"'{cell}' may be {cell.replace(',', '.')} or {re.sub('[.,]', '', cell)} cycles",
+            where=table.where(broken[0], "cycle"),
+            remedy="write whole cycles without decimals and without marks for thousands",
         )
 
 

@@ -26,16 +26,16 @@ def write(path: Path, header: str, rows: str = ROWS) -> Path:
         "Cycles (x1000),settlement_mm", "Cycles [x 1000],settlement_mm",
         "Cycles (\u00d710^3),settlement_mm", "N [1e3],settlement_mm", "N (thousands),settlement_mm",
         "Cycles [k],settlement_mm", "Cycles [Mio],settlement_mm", "Cycle,Settlement (x10 mm)",
-        "Cycle,Settlement [0.01 mm]", "Cycle,strain [1e-6]",
+        "Cycle,Settlement [0.01 mm]", "Cycle,strain [1e-6]", "Cycle,Settlement [tenths mm]",
     ],
 )  # fmt: skip
 def test_factors_in_headers_are_refused(tmp_path: Path, header: str) -> None:
     """Numbers that a header multiplies: read as they are they are wrong by the factor."""
     with pytest.raises(UsageError, match=r":1: the numbers of the column .* have a factor"):
         read_series([write(tmp_path / "a.csv", header)])
-    names = header.split(",")
-    with pytest.raises(UsageError, match="have a factor"):
-        read_series([write(tmp_path / "a.csv", header)], columns=names)
+    for one in (header, "Cycles in 1000,strain", "kcycles,strain", "log10(N),strain"):
+        with pytest.raises(UsageError, match="have a factor"):
+            read_series([write(tmp_path / "a.csv", one)], columns=one.split(","))
 
 
 @pytest.mark.parametrize(
@@ -70,6 +70,27 @@ def test_thousands_beside_points(tmp_path: Path) -> None:
     assert series.cycle.tolist() == [1, 100, 1000, 100_000]
     with pytest.raises(UsageError, match="comma out of its place"):
         read_series([write(tmp_path / "a.csv", "N,settlement", '"1,00",1.10')])
+
+
+@pytest.mark.parametrize("sign", [".", ","])
+def test_cycles_that_may_be_one_or_a_thousand_are_refused(tmp_path: Path, sign: str) -> None:
+    """Marks of thousands read as decimal signs put cycle 1,000 before cycle 500."""
+    rows = f"500;800\n1{sign}000;850\n10{sign}000;1100"
+    with pytest.raises(UsageError, match=r"a.csv:3, .*'1.000' may be 1.000 or 1000 cycles"):
+        read_series([write(tmp_path / "a.csv", "Cycles;Settlement [um]", rows)])
+    rows = f"1{sign}000;0{sign}850\n10{sign}000;1{sign}100"  # every number has three decimals
+    series = read_series([write(tmp_path / "a.csv", "Cycles;Settlement [mm]", rows)])
+    assert series.cycle.tolist() == [1.0, 10.0]
+
+
+@pytest.mark.parametrize(
+    ("header", "meant"), [("N,settlement", "as mm it would be 0.0024"), ("N,strain", "as % it")]
+)
+def test_metres_that_are_hardly_meant_are_warned_of(tmp_path, capsys, header, meant) -> None:
+    path = write(tmp_path / "a.csv", header)
+    assert main(["fit", str(path)]) == 0
+    assert f"warning: {path}: a " in (said := capsys.readouterr().err)
+    assert meant in said
 
 
 def test_what_was_read_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

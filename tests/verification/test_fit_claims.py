@@ -132,3 +132,17 @@ def test_a_fall_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     outlier = np.log(cycle)
     outlier[row] -= 4
     assert find_fall(outlier) is find_fall(-np.log(cycle)) is None
+
+
+@pytest.mark.parametrize(("fail_at", "excluded"), [(1.0, True), (0.0045, False)])
+def test_whether_failure_is_excluded_is_said(tmp_path, capsys, fail_at, excluded):
+    """Of a series that has come to rest just below the bound or far below it, in JSON and words."""
+    cycle = read_cycles(10, 1e3)
+    path = tmp_path / "rest.csv"
+    table = np.column_stack([cycle, 0.004 * (1 - np.exp(-cycle / 100))])
+    np.savetxt(path, table, header="cycle,strain", comments="", delimiter=",")
+    words = ["fit", str(path), "--law", "auto", "--to-cycle", "1e4", "--fail-at", str(fail_at)]
+    assert main(words) == 0
+    assert ("is not excluded" in capsys.readouterr().out) is not excluded
+    assert main([*words, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["failure_excluded"] is excluded

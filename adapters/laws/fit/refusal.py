@@ -52,7 +52,7 @@ def _find_refusal(outlook: Outlook, series: int) -> Refusal | None:
     if not regime.jump_allowed:
         how = f"it goes as N^(beta - 1) with beta = {regime.exponent:.2f} ± {regime.deviation:.2f}"
         if regime.growth > 1:
-            how = f"it is {regime.growth:.2g} times its least before"
+            how = f"it is {regime.growth:.3g} times its least before"
         return Refusal(
             regime.name,
             f"up to cycle {last:.10g} {WHY_NOT[regime.name]}: {how}"
