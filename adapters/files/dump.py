@@ -87,6 +87,8 @@ class Frame:
         for axis, flag in enumerate(("ix", "iy", "iz")):
             if folded and flag in self.columns:
                 images[:, axis] = self.column(flag)
+            if not scaled and (unfolded := PLACES[0][axis]) in self.columns:
+                place[:, axis], images[:, axis] = self.column(unfolded), 0.0
         if not (scaled or images.any()):
             return place
         if not len(self.bounds):

@@ -188,7 +188,8 @@ class Reader:
             elif item.startswith("BOX BOUNDS"):
                 boundary, bounds = item.removeprefix("BOX BOUNDS").strip(), self.read_bounds()
             elif item in ("UNITS", "TIME"):
-                self.read_header_line()
+                if (text := self.read_header_line().strip()) != "si" and item == "UNITS":
+                    self.refuse(f"the units are {text!r}, not si", "run with 'units si'")
             elif label and self.step is not None and (item + " ").startswith(label + " "):
                 columns = tuple(item.removeprefix(label).split())
                 return self.check_header(Header(label, rows, columns, bounds, boundary))

@@ -12,6 +12,7 @@ import numpy as np
 
 from adapters.bed import FloatArray
 from adapters.errors import UsageError
+from adapters.files.dump import find_cell
 from adapters.files.settlement_table import SUFFIXES, Series, read_table_series
 from trackbed.run_verbs import find_kind
 
@@ -101,6 +102,7 @@ def read_dump_series(paths: Sequence[Path], steps_per_cycle: float | None = None
     steps: list[int] = []
     heights: list[float] = []
     grains: FloatArray | None = None
+    before = np.empty(0)
     for path in sorted(paths, key=_make_sort_key):
         for frame in read_frames(path):
             where = f"{path}, time step {frame.time_step}"
@@ -124,12 +126,27 @@ def read_dump_series(paths: Sequence[Path], steps_per_cycle: float | None = None
             steps.append(frame.time_step)
             plain = "z" in frame.columns and not {"iz", "zu"} & set(frame.columns)
             height = frame.column("z") if plain else frame.find_centres()[:, 2]
+            if plain and len(steps) > 1 and frame.boundary.split()[-1:] == ["pp"]:
+                _refuse_folded(
+                    identifiers, height - before, find_cell(frame.bounds)[1][2, 2], where
+                )
+            before = height
             heights.append(float(height.mean()))
     if steps_per_cycle is None:
         cycle = np.arange(len(steps), dtype=float)
     else:
         cycle = np.array(steps) / steps_per_cycle
     return Series(cycle, heights[0] - np.array(heights))
+
+
+def _refuse_folded(grains: FloatArray, rise: FloatArray, period: float, where: str) -> None:
+    """Refuse heights that were folded back into a period: a grain moved by half of it or more."""
+    through = np.flatnonzero(np.abs(rise) > 0.5 * period)
+    if len(through):
+        raise UsageError(
+            f"grain {grains[through[0]]:g} passed a periodic side in z, and its height is not "
+            "known", where=where, remedy="dump iz or zu beside z",
+        )  # fmt: skip
 
 
 def _is_table(path: Path) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import adapters.files.meshio_dump  # noqa: F401
-from adapters.errors import DumpError
+from adapters.errors import DumpError, UsageError
 from adapters.files import Frame, read_frames, read_series, write_dump
 from adapters.files.dump import find_cell
 from adapters.files.states import read_state_file
@@ -62,6 +62,28 @@ def test_places_are_the_same_however_written(tmp_path: Path, box: str) -> None:
             rows[:, 4] -= 0.005 if "s" in columns else 0.01
             write_text(path, f"id radius {columns}", rows, box, step=5)
             np.testing.assert_allclose(read_series([path]).settlement, [0.0, 0.01], atol=1e-12)
+
+
+def test_heights_that_are_folded_need_what_unfolds_them(tmp_path: Path) -> None:
+    """A grain that sinks through the bottom of a period comes back in at the top."""
+    path, sunk = tmp_path / "a.dump", 0.02
+    for step, z in ((0, -0.99), (1, -0.99 - sunk + 2.0)):
+        write_text(path, "id radius x y z", np.array([[1, 0.05, 0.5, 0.5, z]]), step=step)
+    with pytest.raises(UsageError, match="grain 1 passed a periodic side in z"):
+        read_series([path])
+    for columns, flags in (("iz", [0, -1]), ("zu", [-0.99, -0.99 - sunk])):
+        path = tmp_path / f"{columns}.dump"
+        for step, (z, flag) in enumerate(zip((-0.99, 0.99), flags, strict=True)):
+            row = np.array([[1, 0.05, 0.5, 0.5, z, flag]])
+            write_text(path, f"id radius x y z {columns}", row, step=step)
+        np.testing.assert_allclose(read_series([path]).settlement, [0.0, sunk], atol=1e-12)
+
+
+def test_other_units_than_si_are_refused(tmp_path: Path) -> None:
+    path = write_text(tmp_path / "a.dump", "id radius x y z", np.array([[1, 1, 1, 1, 1]]))
+    path.write_text("ITEM: UNITS\ncgs\n" + path.read_text())
+    with pytest.raises(DumpError, match="the units are 'cgs', not si"):
+        list(read_frames(path))
 
 
 def test_a_tilted_box_by_hand() -> None:
