@@ -125,6 +125,10 @@ def find_pairs(
     return measure_rows(position, radius, first, second, walls, side)
 
 
+FARTHEST = 1e100
+"""Centres and radii whose squares overflow are as good as infinite [m]."""
+
+
 def check_bed(position: FloatArray, radius: FloatArray) -> None:
     """Raise `UsageError` unless these are n finite centres [m] and n positive radii [m]."""
     if radius.ndim != 1 or position.shape != (len(radius), 3):
@@ -132,7 +136,7 @@ def check_bed(position: FloatArray, radius: FloatArray) -> None:
             f"positions {position.shape} and radii {radius.shape} do not belong together",
             remedy="give one centre (x, y, z) and one radius for each grain",
         )
-    bad = ~np.isfinite(position).all(axis=1) | ~np.isfinite(radius) | ~(radius > 0)
+    bad = ~(np.abs(position) < FARTHEST).all(axis=1) | ~((radius > 0) & (radius < FARTHEST))
     if bad.any():
         raise UsageError(
             f"{int(bad.sum())} of {len(radius)} grains have no finite centre or no positive radius",

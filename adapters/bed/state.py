@@ -81,10 +81,15 @@ def load_state(path: Path) -> State:
     """Read what `save_state` wrote; raises `UsageError` when ``path`` is no such file."""
     try:
         data = read_arrays(path)
-        height, cycle, step = data["scalars"]
+        height, cycle, step = map(float, data["scalars"])
+        cycle, step = int(cycle), int(step)
         contacts = Contacts(**{n[8:]: value for n, value in data.items() if n[:8] == "contact_"})
         walls = {name[5:]: value for name, value in data.items() if name.startswith("wall_")}
         grains = {name: data[name] for name in GRAIN_ARRAYS}
+        for name, one in grains.items():
+            shape = (len(grains["radius"]), 3)[: 2 - (name in ("identifier", "radius", "mass"))]
+            if one.dtype.kind not in "iuf" or one.shape != shape:
+                raise ValueError(f"{name} is {one.shape} of {one.dtype}, not {shape} of numbers")
     except Exception as error:  # numpy raises many kinds for a file that is not a whole npz
         raise UsageError(
             f"this is not a whole state file ({error})",
@@ -92,6 +97,6 @@ def load_state(path: Path) -> State:
             remedy="give a .npz written by trackbed, or a LIGGGHTS dump",
         ) from error
     return State(
-        **grains, contacts=contacts, wall_force=walls, piston_height=float(height),
-        cycle=int(cycle), time_step=int(step),
+        **grains, contacts=contacts, wall_force=walls, piston_height=height, cycle=cycle,
+        time_step=step,
     )  # fmt: skip
