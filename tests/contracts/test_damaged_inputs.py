@@ -180,10 +180,13 @@ READERS: dict[str, tuple[str, Callable[[Path], int]]] = {
     "settlement report": ("bed-run", run_words("report", "@")),
     "qdem status": ("qdem-run", run_words("status", "@")),
     "rigid report": ("rigid-run", run_words("report", "@")),
+    "qdem report": ("qdem-run", run_words("report", "@")),
     "settlement status": ("bed-run", run_words("status", "@")),
     "settlement resume": ("bed-run", run_words("resume", "@")),
-    "qdem export": ("qdem-run", run_words("export", "@", "--to", "csv", "--into", "@-out")),
-    "rigid resume": ("rigid-run", run_words("resume", "@")),
+    "qdem resume": ("qdem-run", run_words(
+        "qdem", "@/../qdem.toml", "--run-folder", "@", "--resume", "--no-pictures")),
+    "rigid resume": ("rigid-run", run_words(
+        "rigid", "@/../rigid.toml", "--run-folder", "@", "--resume", "--no-pictures")),
 }  # fmt: skip
 
 

@@ -112,8 +112,9 @@ def is_written(path: Path, name: str = ".lock") -> bool:
     for its instant, a writer that starts.
     """
     try:
-        with open_unlinked(path / name, "r") as stream:
-            holder = re.fullmatch(r"pid (\d+) on (.+)", stream.read().strip())
+        with open_unlinked(path / name, "rb") as stream:
+            owner = stream.read(200).decode(errors="replace").strip()
+            holder = re.fullmatch(r"pid (\d+) on (.+)", owner)
             here = holder is not None and holder[2] == socket.gethostname()
             if holder is not None and here and not Path(f"/proc/{holder[1]}").exists():
                 return False
