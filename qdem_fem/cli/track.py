@@ -11,7 +11,6 @@ from trackbed.plausible import describe_implausible
 
 SEAT_AREA = 0.13 * 0.17
 """Of a rail seat [m^2]: a foot of 130 mm on a pad of 170 mm."""
-WRITTEN = "grains are written as NumPy's .npz, whatever the name: name it so"
 
 
 def register(verb: str, parser: argparse.ArgumentParser) -> None:
@@ -66,15 +65,13 @@ def make_grain_file(arguments: argparse.Namespace) -> int:
     from qdem_fem.files import UsageError
     from qdem_fem.grains import BALLAST, Grading, GrainRecipe, make_grains, save_grains
 
-    _refuse_no_folder(arguments.out)
+    _refuse_name(arguments.out, ".npz")
     recipe = GrainRecipe(**_select_given(arguments, "sphericity", "roundness"))
     grading = BALLAST
     if arguments.sizes is not None:
         grading = Grading(np.array(arguments.sizes), np.array([0.0, 1.0]))
         if said := describe_implausible("grain", max(arguments.sizes), "--sizes"):
             raise UsageError(said)
-    if arguments.out.suffix != ".npz":
-        raise UsageError(f"{arguments.out} does not end with .npz", where="--out", remedy=WRITTEN)
     grains = make_grains(arguments.count, arguments.seed, recipe, grading, arguments.shape)
     save_grains(arguments.out, grains)
     print(f"{arguments.out}: {len(grains)} grains, {grains.tetrahedra.sum()} tetrahedra")
@@ -93,7 +90,7 @@ def make_train_file(arguments: argparse.Namespace) -> int:
         write_load_record,
     )
 
-    _refuse_no_folder(arguments.out)
+    _refuse_name(arguments.out, ".csv")
     train = Train(**_select_given(arguments, "cars", "speed", "axle_load", "first_share"))
     track, rough = Track(**_select_given(arguments, "modulus")), None
     if arguments.roughness is not None:
@@ -112,10 +109,14 @@ def _select_given(arguments: argparse.Namespace, *names: str) -> dict[str, Any]:
     return {key: getattr(arguments, key) for key in names if getattr(arguments, key) is not None}
 
 
-def _refuse_no_folder(out: Path) -> None:
-    """Raise `UsageError` where ``out`` can not be written, before minutes of work are lost."""
+def _refuse_name(out: Path, ending: str) -> None:
+    """Raise `UsageError` where ``out`` can not be written, before minutes of work are lost, or is
+    named as another kind of file."""
     from qdem_fem.files import UsageError
 
     if out.is_dir() or not out.parent.is_dir():
         why = "a folder" if out.is_dir() else "in a folder that is not there"
         raise UsageError(f"{out} is {why}", where="--out", remedy="name a file in a folder that is")
+    if out.suffix != ending:
+        remedy = f"it is written as {ending}, whatever the name: name it so"
+        raise UsageError(f"{out} does not end with {ending}", where="--out", remedy=remedy)

@@ -15,7 +15,7 @@ from unittest.mock import Mock
 import pytest
 
 from trackbed.errors import DiskFull, UsageError
-from trackbed.run_files.folder import RunFolder, lock_folder, refuse_links
+from trackbed.run_files.folder import RunFolder, is_written, lock_folder, refuse_links
 from trackbed.run_files.whole import append_text, replace_file, seal_file, write_whole
 
 ROOT = Path(__file__).parents[2]
@@ -264,3 +264,8 @@ def test_a_folder_that_was_replaced_is_noticed(tmp_path: Path) -> None:
         (folder.path / ".lock").touch()
         with pytest.raises(UsageError, match="removed or replaced"):
             folder.refuse_if_replaced()
+
+
+def test_a_lock_that_is_no_text_is_held_by_nobody(tmp_path: Path) -> None:
+    (tmp_path / ".lock").write_bytes(b"pid 1 on \xff")
+    assert not is_written(tmp_path)

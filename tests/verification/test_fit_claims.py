@@ -146,3 +146,5 @@ def test_whether_failure_is_excluded_is_said(tmp_path, capsys, fail_at, excluded
     assert ("is not excluded" in capsys.readouterr().out) is not excluded
     assert main([*words, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["failure_excluded"] is excluded
+    assert main([*words, "--json", "--to-cycle", "1.2e4"]) == 0  # more than ten times ahead
+    assert json.loads(capsys.readouterr().out)["failure_excluded"] is False

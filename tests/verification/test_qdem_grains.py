@@ -311,6 +311,12 @@ def test_command_makes_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert len(load_grains(tmp_path / "g.npz")) == 3
 
 
+@pytest.mark.parametrize(("verb", "name"), [("grains", "g.stl"), ("train", "t.xlsx")])
+def test_command_refuses_the_name_of_another_kind_of_file(tmp_path, capsys, verb, name):
+    assert main([verb, "--out", str(tmp_path / name)]) == 2
+    assert f"{name} does not end with ." in capsys.readouterr().err
+
+
 def test_command_makes_grains_between_two_sieves(tmp_path: Path) -> None:
     out = tmp_path / "g.npz"
     assert main(["grains", "--count", "4", "--sizes", "0.045", "0.055", "--out", str(out)]) == 0

@@ -182,7 +182,7 @@ def excludes_failure(
     if fail_at is None:
         return None
     good = regime is not None and regime not in WHY_NOT and reach <= CLAIM.reach * (1 + 1e-9)
-    return good and bool(max(map(abs, ends)) < fail_at)
+    return bool(good and max(map(abs, ends)) < fail_at)
 
 
 def name_regime(regime: Regime, cycle: FloatArray, reach: float) -> str | None:
