@@ -112,7 +112,9 @@ class Grains(Table):
     region_high: Vector
     """Corners of the region that the grid fills from below [m]; higher if it does not suffice."""
     density: Positive
-    corners: Annotated[list[int], Field(min_length=2, max_length=2)] = Field([5, 9])
+    corners: Annotated[list[Annotated[int, Field(le=1000)]], Field(min_length=2, max_length=2)] = (
+        Field([5, 9])
+    )
     """Fewest and most corners of a stone."""
     shape: Annotated[str, AfterValidator(check_shape)] = "irregular"
     """A file of `rigid_lcp.shapes` that draws stones."""

@@ -82,7 +82,7 @@ def test_seeds_count_from_the_scene(scene: Path, tmp_path: Path) -> None:
     assert seeds([], None) == [40]
     with pytest.raises(UsageError, match="--seeds sets"):
         seeds(["sample.seed=7,3"], 2)
-    with pytest.raises(UsageError, match="a seed at least"):
+    with pytest.raises(UsageError, match="1 to 10000 seeds"):
         seeds([], 0)
 
 

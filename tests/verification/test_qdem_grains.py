@@ -317,6 +317,11 @@ def test_command_refuses_the_name_of_another_kind_of_file(tmp_path, capsys, verb
     assert f"{name} does not end with ." in capsys.readouterr().err
 
 
+def test_command_refuses_more_grains_than_there_is_memory_for(tmp_path, capsys):
+    assert main(["grains", "--count", "1000000000", "--out", str(tmp_path / "g.npz")]) == 5
+    assert "1000000000 grains would need 5e+03 GB of memory" in capsys.readouterr().err
+
+
 def test_command_makes_grains_between_two_sieves(tmp_path: Path) -> None:
     out = tmp_path / "g.npz"
     assert main(["grains", "--count", "4", "--sizes", "0.045", "0.055", "--out", str(out)]) == 0

@@ -21,6 +21,7 @@ from adapters.scene import Scene, load_scene
 
 SEED = "sample.seed"
 """The key that ``--seeds`` counts up."""
+SEEDS_MOST = 10_000
 NAME_LONGEST = 120
 """Longest name of a member's folder [characters]; a longer one is cut, with a digest."""
 
@@ -139,8 +140,8 @@ def plan_sweep(
     the member.
     """
     axes = parse_axes(assignments)
-    if seeds is not None and seeds < 1:
-        raise UsageError(f"there must be a seed at least, not {seeds}", where="--seeds")
+    if seeds is not None and not 1 <= seeds <= SEEDS_MOST:
+        raise UsageError(f"there must be 1 to {SEEDS_MOST} seeds, not {seeds}", where="--seeds")
     if seeds is not None and SEED in axes:
         raise UsageError(f"--seeds sets {SEED}", where="--set", remedy="give one of the two")
     own_seeds = axes.pop(SEED, None)
