@@ -125,10 +125,6 @@ def find_pairs(
     return measure_rows(position, radius, first, second, walls, side)
 
 
-FARTHEST = 1e100
-"""Centres and radii whose squares overflow are as good as infinite [m]."""
-
-
 def check_bed(position: FloatArray, radius: FloatArray) -> None:
     """Raise `UsageError` unless these are n finite centres [m] and n positive radii [m]."""
     if radius.ndim != 1 or position.shape != (len(radius), 3):
@@ -136,7 +132,8 @@ def check_bed(position: FloatArray, radius: FloatArray) -> None:
             f"positions {position.shape} and radii {radius.shape} do not belong together",
             remedy="give one centre (x, y, z) and one radius for each grain",
         )
-    bad = ~(np.abs(position) < FARTHEST).all(axis=1) | ~((radius > 0) & (radius < FARTHEST))
+    # beyond 1e100 m squares overflow: as good as infinite
+    bad = ~(np.abs(position) < 1e100).all(axis=1) | ~((radius > 0) & (radius < 1e100))
     if bad.any():
         raise UsageError(
             f"{int(bad.sum())} of {len(radius)} grains have no finite centre or no positive radius",

@@ -25,8 +25,6 @@ from trackbed.memory import refuse_more_memory
 from trackbed.run_files import write_whole
 
 GRAINS_FORMAT = 1
-GRAIN_BYTES = 5000
-"""About what a grain takes while many are made, with its nodes and faces [B]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +88,8 @@ def make_grains(
             f"{count} grains of seed {seed}",
             where="make_grains", remedy="use a seed of 0 or more, and 1 grain or more",
         )  # fmt: skip
-    refuse_more_memory(GRAIN_BYTES * count, f"{count} grains", "make_grains", "make fewer")
+    # 5 kB a grain, about, with its nodes and faces while many are made
+    refuse_more_memory(5000.0 * count, f"{count} grains", "make_grains", "make fewer")
     sizes = draw_sizes(grading, count, np.random.default_rng([seed, count]))
     forms = [draw(np.random.default_rng([seed, i, GRAINS_FORMAT]), recipe) for i in range(count)]
     own = [find_sieve_size(form.nodes) for form in forms]

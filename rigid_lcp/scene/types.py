@@ -17,6 +17,7 @@ VECTORS = (
 )  # fmt: skip
 """Keys whose values have one number a dimension."""
 Restitution = Annotated[Real, Field(ge=0, le=1)]
+Corners = Annotated[int, Field(le=1000)]
 LEAST_OF_A_STEP = 1e-6
 """Shortest time between two frames in steps."""
 
@@ -112,9 +113,7 @@ class Grains(Table):
     region_high: Vector
     """Corners of the region that the grid fills from below [m]; higher if it does not suffice."""
     density: Positive
-    corners: Annotated[list[Annotated[int, Field(le=1000)]], Field(min_length=2, max_length=2)] = (
-        Field([5, 9])
-    )
+    corners: Annotated[list[Corners], Field(min_length=2, max_length=2)] = Field([5, 9])
     """Fewest and most corners of a stone."""
     shape: Annotated[str, AfterValidator(check_shape)] = "irregular"
     """A file of `rigid_lcp.shapes` that draws stones."""
