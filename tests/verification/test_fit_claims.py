@@ -11,7 +11,7 @@ import pytest
 from adapters.bed import FloatArray
 from adapters.errors import JumpRefused
 from adapters.laws import get_law
-from adapters.laws.fit.growth import find_fall, measure_growth
+from adapters.laws.fit.growth import find_fall, find_growth, measure_growth
 from adapters.laws.fit.prediction import Series, fit_auto, fit_series
 from trackbed.command import main
 
@@ -44,6 +44,30 @@ def test_a_rate_that_grew_is_refused_and_stays_so(per_decade: int, last: float) 
         assert raised.value.regime == "collapse"
     named = fit_series(series, get_law("log"), 1e4, fail_at=100.0)
     assert (named.regime, named.failure_excluded) == ("collapse", False)
+
+
+@pytest.mark.parametrize("last", [8e3, 1.5e4, 5e4, 5e5])
+@pytest.mark.parametrize("per_decade", [8, 20])
+def test_a_burst_that_has_calmed_is_refused_too(per_decade: int, last: float) -> None:
+    """ln(1 + N) with a burst of twenty times as much around cycle 6,000: no number of readings
+    behind it makes a prediction of the refusal; what came behind it is predicted by itself."""
+    cycle = read_cycles(per_decade, last)
+    settled = 1e-3 * np.log1p(cycle) + 0.02 / (1 + np.exp(-(cycle - 6000) / 800))
+    with pytest.raises(JumpRefused, match=r"rate|laws differ"):
+        fit_auto(Series(cycle, settled), 2 * last, fail_at=1.0)
+    named = fit_series(Series(cycle, settled), get_law("log"), 2 * last, fail_at=1.0)
+    assert (named.regime, named.failure_excluded) == ("collapse", False)
+    if last > 1e5:
+        behind = Series(cycle, settled).restart_after(1e4)
+        assert fit_auto(behind, 1.1 * behind.cycle[-1]).regime is not None
+
+
+@pytest.mark.parametrize("exponent", [0.2, 0.3, 0.45])
+def test_scatter_seldom_looks_like_a_burst(exponent: float) -> None:
+    """Readings that scatter by 1 %: at most 3 of 60 series seem to have grown at any time."""
+    random, cycle = np.random.default_rng(5), read_cycles(20, 1e4)
+    noisy = cycle**exponent * (1 + 0.01 * random.standard_normal((60, len(cycle))))
+    assert sum(find_growth(cycle, one) is not None for one in noisy) <= 3
 
 
 def test_growth_is_that_of_the_rate() -> None:

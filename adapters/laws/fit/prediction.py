@@ -14,7 +14,7 @@ from adapters.errors import JumpRefused, NotConverged, UsageError
 from adapters.files import Series, make_too_few_error, read_series
 from adapters.laws.fit.band import estimate_prediction_band
 from adapters.laws.fit.candidates import CANDIDATES, thin_rows
-from adapters.laws.fit.growth import find_fall
+from adapters.laws.fit.growth import find_fall, find_growth
 from adapters.laws.fit.outlook import JUDGED, TO_TELL, LawSaid, compare_laws, find_outlook
 from adapters.laws.fit.refusal import (
     Refusal,
@@ -22,8 +22,9 @@ from adapters.laws.fit.refusal import (
     find_refusals,
     predict_failure,
     refuse_fall,
+    refuse_growth,
 )
-from adapters.laws.fit.regime import SHAKEDOWN, WHY_NOT, Regime, find_regimes
+from adapters.laws.fit.regime import COLLAPSE, SHAKEDOWN, WHY_NOT, Regime, find_regimes
 from adapters.laws.form import Law
 
 __all__ = ["Prediction", "Series", "fit_auto", "fit_series", "read_series"]
@@ -158,7 +159,10 @@ def fit_auto(
     refusal = find_failure(cycle + begin, settlement, fail_at)
     if refusal is None and isfinite(prediction):
         refusal = predict_failure(prediction, fail_at, to_cycle + begin)
-    refusal = refusal or refuse_fall(cycle + begin, settlement) or find_refusals(found)[0]
+    refusal = refusal or refuse_fall(cycle + begin, settlement)
+    if found.regime[0].jump_allowed and to_cycle > cycle[-1]:
+        refusal = refusal or refuse_growth(cycle, settlement, begin)
+    refusal = refusal or find_refusals(found)[0]
     said = compare_laws(found, refused=refusal is not None)
     if refusal:
         raise _make_refusal(refusal, "auto", parameters, said)
@@ -212,7 +216,8 @@ def find_regime(series: Series, reach: float = 1.0) -> str | None:
         return None
     cycle = series.cycle[rows]
     (regime,) = find_regimes(*thin_rows(cycle, series.settlement[rows, None]))
-    return name_regime(regime, cycle, reach)
+    grown = regime.jump_allowed and find_growth(cycle, series.settlement[rows])
+    return COLLAPSE if grown else name_regime(regime, cycle, reach)
 
 
 def _check_target(

@@ -8,7 +8,7 @@ import numpy as np
 
 from adapters.bed import FloatArray
 from adapters.errors import NotConverged
-from adapters.laws.fit.growth import find_fall
+from adapters.laws.fit.growth import find_fall, find_growth
 from adapters.laws.fit.outlook import JUDGED, Outlook
 from adapters.laws.fit.regime import COLLAPSE, WHY_NOT
 
@@ -90,6 +90,21 @@ def refuse_fall(cycle: FloatArray, settlement: FloatArray) -> Refusal | None:
         f"the settlement falls by {size:.3g} between cycles {before:.10g} and {behind:.10g}, as "
         "where the track was tamped or the gauge set back: no law goes through that",
         f"take what came behind it: --load-change {behind:.10g}",
+    )
+
+
+def refuse_growth(cycle: FloatArray, settlement: FloatArray, begin: float) -> Refusal | None:
+    """Why nothing is said of a series (k,) at cycles (k,), counted from the user's cycle ``begin``,
+    whose rate had grown: no slow law goes through that, however many readings come behind it."""
+    if (grown := find_growth(cycle, settlement)) is None:
+        return None
+    row, ratio = grown
+    end = cycle[row] + begin
+    return Refusal(
+        COLLAPSE,
+        f"up to cycle {end:.10g} the rate grew to {ratio:.3g} times its least, and no slow law "
+        "describes what comes before and behind that",
+        f"take what came behind it, once it has calmed: --load-change {end:.10g}",
     )
 
 
