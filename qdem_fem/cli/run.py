@@ -86,7 +86,7 @@ def _run(
 
             assert isinstance(prepared, TrackPrepared)
             summary["track"] = list_track_facts(path, prepared.load)
-            summary["bed"] = prepared.stand
+            summary["bed"] = prepared.trial
             more = draw_track_pictures(path, prepared.load)
         write_report(folder, manifest, summary, None if arguments.no_pictures else done, more)
         write_whole(path / RESULT, json.dumps(summary, indent=1) + "\n")

@@ -206,7 +206,7 @@ def _format_energy(summary: dict[str, Any]) -> str:
 
 
 def _format_bed(summary: dict[str, Any]) -> Iterator[str]:
-    """How the prepared bed of a track stands."""
+    """What the prepared bed of a track bears."""
     if words := summary.get("bed", {}).get("words"):
         yield make_section("The prepared bed", make_paragraph(f"{escape(words.capitalize())}."))
 

@@ -21,7 +21,7 @@ millimetre a second, for ever.
 
 Only the last stage says what the state is worth; the others say where grains begin.  What each
 leaves is a file, from which the next goes on, and any number of runs: other loads, other
-frictions.
+frictions.  `qdem_fem.track.bearing` runs the bed in and tries what it bears.
 """
 
 from __future__ import annotations
@@ -84,8 +84,10 @@ class Bed:
     """Pairs and springs, as `Contacts.pack_state` gives them; empty before the last stage."""
     rests: dict[str, dict[str, float]]
     """`qdem_fem.march.kinetic_damping.Rest` of each stage done, and its ``cpu_s``."""
-    stands: dict[str, dict[str, Any]] = field(default_factory=dict)
-    """`qdem_fem.track.stand.Stand` by the friction and time that it was let go with."""
+    pulses: list[dict[str, float]] = field(default_factory=list)
+    """`qdem_fem.track.bearing.Pulse` of each that ran it in."""
+    trials: dict[str, dict[str, float]] = field(default_factory=dict)
+    """`qdem_fem.track.bearing.Pulse` by the friction and force of a run."""
 
     @property
     def positions(self) -> list[Floats]:
@@ -276,7 +278,8 @@ def enter_bed(run: Simulation, bed: Bed) -> None:
 def write_bed(path: Path, recipe: BedRecipe, bed: Bed) -> None:
     """Write a bed, atomically."""
     stream = BytesIO()
-    state = {"stage": bed.stage, "rests": bed.rests, "stands": bed.stands}
+    state: dict[str, Any] = {"stage": bed.stage, "rests": bed.rests}
+    state |= {"pulses": bed.pulses, "trials": bed.trials}
     head = {"recipe": recipe.format_json(), **state}
     np.savez_compressed(
         stream, head=json.dumps(head), nodes=np.concatenate(bed.nodes),
@@ -296,7 +299,7 @@ def read_bed(path: Path, recipe: BedRecipe) -> Bed:
         counts, nodes = arrays.pop("counts"), arrays.pop("nodes")
         displacement = arrays.pop("displacement")
         stage, rests = head["stage"], head["rests"]
-        stands = head["stands"]
+        pulses, trials = head.get("pulses", []), head.get("trials", {})  # none in older files
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
         raise CheckpointError(f"no bed ({error})", where=str(path), remedy=remedy) from error
     for once in ("centre_height", "end_height"):  # of the sleeper, once; both its height
@@ -308,4 +311,4 @@ def read_bed(path: Path, recipe: BedRecipe) -> Bed:
             where=str(path), remedy=remedy,
         )  # fmt: skip
     parts = np.split(nodes, np.cumsum(counts)[:-1])
-    return Bed(stage, parts, displacement, arrays, rests, stands)
+    return Bed(stage, parts, displacement, arrays, rests, pulses, trials)

@@ -31,7 +31,7 @@ from qdem_fem.tables import (
     find_output_faults,
     list_named_files,
 )
-from qdem_fem.track.bed import Bed, list_stages_ahead, prepare_bed
+from qdem_fem.track.bed import Bed, list_stages_ahead, prepare_bed, read_bed
 from qdem_fem.track.bodies import TrackBox
 from qdem_fem.track.recipe import SLEEPER, BedRecipe, name_bodies
 from qdem_fem.track.sleeper_mesh import SleeperShape
@@ -74,13 +74,19 @@ class TrackPrepared(Prepared):
     bed_file: Path
     loads: tuple[Series, ...]
     """On each rail seat [N], (k, 3)."""
-    stand: dict[str, Any] = field(default_factory=dict)
-    """`qdem_fem.track.stand.Stand` of the bed, and its ``words``; filled by `enter_track`."""
+    trial: dict[str, Any] = field(default_factory=dict)
+    """`qdem_fem.track.bearing.Pulse` that the bed bears, the ``pulses`` that ran it in, and its
+    ``words``; filled by `enter_track`."""
 
     @property
     def load(self) -> Series:
         """On the first rail seat."""
         return self.loads[0]
+
+    @property
+    def greatest(self) -> float:
+        """Greatest force down on a rail seat [N]."""
+        return max(float(-load.values[:, 2].min()) for load in self.loads)
 
 
 def check_track(text: SceneText) -> TrackPrepared:
@@ -194,33 +200,38 @@ def choose_contact(prepared: TrackPrepared) -> SphereContact:
 
 def preview_bed(prepared: TrackPrepared) -> dict[str, Any]:
     """What a run has to do before its bed stands; empty where that is in its file."""
-    ahead, recipe = list_stages_ahead(prepared.recipe, prepared.bed_file), prepared.recipe
-    if not ahead:
+    from qdem_fem.track.bearing import name_trial
+
+    recipe, path, scene = prepared.recipe, prepared.bed_file, prepared.scene
+    assert isinstance(scene, TrackScene)
+    ahead = [f"stage {name}" for name in list_stages_ahead(recipe, path)]
+    trial = name_trial(choose_contact(prepared), prepared.greatest, scene.track.rigid)
+    if not ahead and trial in read_bed(path, recipe).trials:
         return {}
+    ahead.append("slow pulses")
     words = (
-        f"{recipe.below + recipe.beside} grains, to be prepared first (stages {ahead[0]} to "
-        f"{ahead[-1]}), half a second to two of processor time a grain; kept in "
-        f"{prepared.bed_file}"
+        f"{recipe.below + recipe.beside} grains, to be prepared first ({ahead[0]} to {ahead[-1]}), "
+        f"half a second to two of processor time a grain; kept in {path}"
     )
-    return {"grains": recipe.below + recipe.beside, "stages_ahead": list(ahead), "words": words}
+    return {"grains": recipe.below + recipe.beside, "stages_ahead": ahead, "words": words}
 
 
 def enter_track(prepared: TrackPrepared) -> tuple[Any, dict[str, Any]]:
     """The simulation of a track in its prepared state, and its bodies by name.
 
-    Fills the meshes, the probes and the stand of ``prepared``.  Raises `NotConverged` for a bed
-    that finds no equilibrium or creeps.
+    Fills the meshes, the probes and the trial of ``prepared``.  Raises `NotConverged` for a bed
+    that finds no equilibrium or does not bear its sleeper.
     """
-    from qdem_fem.track.stand import begin_bed, judge_bed
+    from qdem_fem.track.bearing import begin_bed, judge_bed, list_seats, press_bed
 
     scene, recipe = prepared.scene, prepared.recipe
     assert isinstance(scene, TrackScene)
     table, track = scene.simulation, scene.track
-    bed = prepare_bed(recipe, prepared.bed_file, table.threads, _Report())
-    contact = choose_contact(prepared)
-    stand = judge_bed(
-        recipe, bed, prepared.bed_file, contact, track.stand, track.creep, table.threads,
-        track.rigid,
+    path, contact, force = prepared.bed_file, choose_contact(prepared), prepared.greatest
+    bed = prepare_bed(recipe, path, table.threads, _Report())
+    bed = press_bed(recipe, bed, path, contact, force, track.stays, table.threads)
+    trial = judge_bed(
+        recipe, bed, path, contact, force, track.stays, table.threads, track.rigid
     )  # fmt: skip
     run, bodies = begin_bed(
         recipe, bed, contact, track.rigid, strain=table.strain, step=table.step,
@@ -228,11 +239,11 @@ def enter_track(prepared: TrackPrepared) -> tuple[Any, dict[str, Any]]:
         device=table.device,
     )  # fmt: skip
     sleeper = bodies[SLEEPER]
-    sets = sleeper.mesh.node_sets
-    seats = [sets[name] for name in sorted(sets) if name.startswith("seat")]
-    for seat, load in zip(seats, prepared.loads, strict=True):
+    for seat, load in zip(list_seats(sleeper), prepared.loads, strict=True):
         run.load(sleeper, seat, load)
-    prepared.stand.update(asdict(stand), creep=stand.creep, words=stand.describe())
+    count = len(bed.pulses)
+    words = f"run in by {count} slow pulse{'s' * (count > 1)}; {trial.describe()}"
+    prepared.trial.update(asdict(trial), pulses=bed.pulses, words=words)
     prepared.meshes.update({name: body.mesh for name, body in bodies.items()})
     prepared.probes.update(find_watched_points(recipe, bed, bodies))
     return run, bodies

@@ -114,10 +114,9 @@ class TrackTable(Table):
     kinetic: Share = 0.01
     loose: Share = 0.02
     """Greatest shares of `qdem_fem.march.kinetic_damping.Rest` that are equilibrium."""
-    stand: Positive = 5e-4
-    """How long the bed is let go without its load, to see whether it stands [s]."""
-    creep: Positive = 0.01
-    """Greatest work of sliders in that time over the energy of springs and elements."""
+    stays: Positive = 0.2
+    """Greatest share of the sleeper's way under a slow pulse of the load's greatest force that may
+    be left at rest, down or aside: four fifths spring back."""
     patience: Positive = 5.0
     """Simulated time after which a stage of the preparation is given up [s]."""
     pressure: SeriesTable | None = None

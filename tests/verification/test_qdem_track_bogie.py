@@ -12,8 +12,8 @@ from qdem_fem.cli.track import SEAT_AREA
 from qdem_fem.files.errors import SceneError
 from qdem_fem.files.output import read_table
 from qdem_fem.scene.checks import load_scene
+from qdem_fem.track import bearing
 from qdem_fem.track import enter as track_scene
-from qdem_fem.track import stand as track_stand
 from qdem_fem.track.bogie import RISE, make_bogie_series
 from qdem_fem.track.enter import TrackPrepared
 from qdem_fem.track.loads.rail import QUIET, Track, find_seat_share
@@ -208,8 +208,9 @@ def test_device_of_a_scene_is_of_its_run(tmp_path: Path, monkeypatch: pytest.Mon
         raise Begun(options)
 
     monkeypatch.setattr(track_scene, "prepare_bed", lambda *_: None)
-    monkeypatch.setattr(track_stand, "judge_bed", lambda *_: None)
-    monkeypatch.setattr(track_stand, "begin_bed", begin)
+    for name in ("press_bed", "judge_bed"):
+        monkeypatch.setattr(bearing, name, lambda *_: None)
+    monkeypatch.setattr(bearing, "begin_bed", begin)
     load_of(tmp_path, "lead = 1.0")
     prepared = load_scene(tmp_path / "scene.toml", ("simulation.device=cuda",))
     assert isinstance(prepared, TrackPrepared)

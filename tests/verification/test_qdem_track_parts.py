@@ -17,8 +17,10 @@ from qdem_fem.files.errors import SceneError
 from qdem_fem.march.kinetic_damping import Rest
 from qdem_fem.mesh.tetrahedra import TetMesh
 from qdem_fem.scene.checks import load_scene
+from qdem_fem.track import bearing
 from qdem_fem.track import bed as track_bed
 from qdem_fem.track import enter as track_scene
+from qdem_fem.track.bearing import Pulse
 from qdem_fem.track.bed import Bed, guide_sleeper
 from qdem_fem.track.bodies import TrackBox, place_grains
 from qdem_fem.track.enter import TrackPrepared, enter_track
@@ -135,6 +137,8 @@ def test_each_rail_seat_takes_its_own_pressure(
     nodes.append(layout.sleeper(0.5).nodes)
     bed = Bed("rest", nodes, np.zeros((sum(map(len, nodes)), 3)), {}, {})
     monkeypatch.setattr(track_scene, "prepare_bed", lambda *given: bed)
+    monkeypatch.setattr(bearing, "press_bed", lambda *given: bed)
+    monkeypatch.setattr(bearing, "judge_bed", lambda *given: Pulse(0.5, 1.0, 1.0, 0.0, 0.0))
     run, bodies = enter_track(prepared)
     now = np.array([0.0])
     force = [(one.weights * one.driver.sample(now)[0]).sum(axis=0) for one in run.conditions.loads]
@@ -145,6 +149,7 @@ def test_each_rail_seat_takes_its_own_pressure(
         for load in run.conditions.loads
     ]
     assert seat == pytest.approx([0.434, 1.566][:seats])
+    assert prepared.greatest == pytest.approx(22.1e3 * seats)
     run.advance(20 * run.step)  # no grain touches yet: momentum is what loads and weight gave
     mass = run.assembly.mass[run.first_node[-2] :]
     momentum = (mass * sleeper.velocity[:, 2]).sum()

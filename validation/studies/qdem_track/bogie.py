@@ -57,12 +57,14 @@ def find_settlement(time: Floats, down: Floats, ends: Floats) -> list[dict[str, 
     return found
 
 
-def measure_packing(folder: Path, seed: int, friction: float) -> dict[str, Any]:
-    """One run of a packing: points, and smoothed spectra of load, sleeper and a grain."""
+def measure_packing(folder: Path, bed: Path, seed: int, friction: float) -> dict[str, Any]:
+    """One run of a packing from the ``bed``, made where it is missing: what it bears, points, and
+    smoothed spectra of load, sleeper and a grain."""
     path = folder / SCENE.name
     path.write_text(SCENE.read_text(encoding="utf-8"), encoding="utf-8")
     prepared = load_scene(path, [
-        f"track.seed={seed}", f"track.bed=bed-{seed}.npz", f"contact.friction={friction}"
+        f"track.seed={seed}", f"track.bed={bed}", f"contact.friction={friction}",
+        "simulation.threads=1",
     ])  # fmt: skip
     assert isinstance(prepared, TrackPrepared)
     assert isinstance(prepared.scene, TrackScene)
@@ -75,12 +77,13 @@ def measure_packing(folder: Path, seed: int, friction: float) -> dict[str, Any]:
         aside, up = (rows[f"{name}_{axis}"] - rows[f"{name}_{axis}"][0] for axis in "yz")
         last = find_settlement(rows["time"], -up, ends)
         points[name] = {
-            "greatest": max(one["greatest"] for one in last), "end": last[-1]["end"],
+            "first": last[0]["greatest"], "greatest": max(one["greatest"] for one in last),
+            "end": last[-1]["end"],
             "lateral": float(np.abs(aside).max()),
             "lateral_over_vertical": float(np.abs(aside).max() / np.abs(up).max()),
         }  # fmt: skip
     return {
-        "seed": seed, "friction": friction, "points": points,
+        "seed": seed, "friction": friction, "points": points, "trial": prepared.trial,
         "imbalance": trial.energy["relative_imbalance"], "cpu_s": trial.cpu, "step": trial.step,
         "curves": find_spectra(prepared, rows),
     }  # fmt: skip

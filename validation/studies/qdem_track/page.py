@@ -11,7 +11,7 @@ import numpy as np
 from validation.bench.qdem.checks import describe_checks, describe_origin, draw_figure
 from validation.studies.qdem_track.bars import check_bars
 from validation.studies.qdem_track.bogie import APART, FRICTIONS, POINTS
-from validation.study import Row, estimate_mean, format_table
+from validation.study import Row, format_table
 
 TWENTY = {
     "unbalanced force over mean contact force, at rest": "equilibrium, unbalanced",
@@ -29,15 +29,9 @@ LEVERS = {
     "springs of 0.1 of Table 1's": "springs times 0.1",
     "springs of 0.01": "springs times 0.01",
 }
-MEASURES = {"greatest": "greatest settlement", "end": "behind both axles",
+TRIED = ("way under the slow pulse", "sunk at rest", "aside at rest")
+MEASURES = {"first": "greatest at axle 1", "greatest": "greatest", "end": "behind both axles",
             "lateral": "greatest lateral motion"}  # fmt: skip
-PAPER_SCALE = {
-    name: name
-    for name in (
-        "grains", "elements", "step", "processor time of a step",
-        "million element-steps a processor second", "preparation",
-    )
-}  # fmt: skip
 
 
 def describe(rows: Sequence[Row]) -> dict[str, str]:
@@ -52,32 +46,37 @@ def describe(rows: Sequence[Row]) -> dict[str, str]:
     return {
         "twenty": describe_checks(checks["twenty"], TWENTY),
         "levers": format_table(["what", "step", "processor time", "error of settlement"], levers),
-        "packings": describe_packings(parts["packings"]),
-        "scale": describe_checks(checks["paper scale"], PAPER_SCALE),
+        "packings": describe_packings([row["run"] for row in rows if "run" in row]),
         "made": describe_origin(rows),
     }
 
 
-def describe_packings(row: Row) -> str:
-    """Means over packings and their intervals of 95 %, a line a point and friction [um]."""
-    lines = []
-    for point in POINTS:
-        for friction in FRICTIONS:
-            found = [run["points"][point] for run in row["runs"] if run["friction"] == friction]
-            cells = [point, f"{friction:g}"]
-            for key in MEASURES:
-                mean, half = estimate_mean([1e6 * one[key] for one in found])
-                cells.append(f"{mean:.3g} ± {half:.2g}")
-            ratio = np.mean([one["lateral_over_vertical"] for one in found])
-            lines.append([*cells, f"{ratio:.2g}"])
-    return format_table(
-        ["300 grains [µm]", "friction", *MEASURES.values(), "lateral over vertical"], lines
-    )
+def describe_packings(runs: Sequence[dict[str, Any]]) -> str:
+    """Each run's bed and sleeper, then its watched grains, a line each [um]."""
+    sleepers, grains = [], []
+    for run in runs:
+        head, trial = [str(run["seed"]), f"{run['friction']:g}"], run["trial"]
+        one = run["points"]["sleeper"]
+        lengths = [trial["way"], trial["sunk"], trial["aside"], *(one[key] for key in MEASURES)]
+        sleepers.append(
+            [*head, str(len(trial["pulses"])), *(f"{1e6 * length:.3g}" for length in lengths)]
+        )
+        for name in POINTS[:-1]:
+            one = run["points"][name]
+            cells = [*(f"{1e6 * one[key]:.3g}" for key in MEASURES)]
+            grains.append([*head, name, *cells, f"{one['lateral_over_vertical']:.2g}"])
+    tables = [
+        format_table(["packing", "friction", "pulses", *TRIED, *MEASURES.values()], sleepers),
+        format_table(
+            ["packing", "friction", "grain", *MEASURES.values(), "lateral over vertical"], grains
+        ),
+    ]
+    return "\n\n".join(tables)
 
 
 def draw(rows: Sequence[Row], picture: Path) -> None:
     """Spectra of load, sleeper and a grain, a line a packing, at the friction of Table 1."""
-    runs = [run for row in rows for run in row.get("runs", ()) if run["friction"] == FRICTIONS[0]]
+    runs = [row["run"] for row in rows if row.get("run", {}).get("friction") == FRICTIONS[0]]
 
     def draw_panels(figure: Any) -> None:
         shown = {"load": "load [N s]", "S2": "acceleration of the sleeper, S2 [m/s]",

@@ -1,0 +1,171 @@
+"""Whether a prepared bed bears its sleeper under one axle: slow pulses, and what they leave.
+
+Kinetic damping stops what moves, so a bed whose contacts lie at Coulomb's limit passes for one at
+rest, and gives way when it is loaded.  It is run in by slow pulses of the greatest force on a rail
+seat (`press_bed`), as track is by trains, and has to bear one more with the friction of the run,
+which may be another than the one it was prepared with (`judge_bed`).
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from qdem_fem.bodies import Body, Rigid
+from qdem_fem.contact.spheres import SphereContact
+from qdem_fem.files import Integers, NotConverged, Series, StepWarning
+from qdem_fem.march import Simulation, find_rest
+from qdem_fem.track.bed import Bed, enter_bed, guide_sleeper, write_bed
+from qdem_fem.track.bogie import DOWN
+from qdem_fem.track.recipe import SLEEPER, BedRecipe, make_bed_bodies, make_bed_grains
+
+
+@dataclass(frozen=True)
+class PulseNumbers:
+    """Slow pulses."""
+
+    lasts: float = 0.01  # up and down as a cosine [s]: five periods of the sleeper on its grains
+    most: int = 20  # of a preparation [-]
+
+
+PULSES = PulseNumbers()
+
+
+@dataclass(frozen=True)
+class Pulse:
+    """What a slow pulse did to the sleeper."""
+
+    friction: float
+    force: float
+    """On each rail seat, the greatest [N]."""
+    way: float
+    """Down, under that force [m]."""
+    sunk: float
+    """What is left of it at rest [m]."""
+    aside: float
+    """Horizontally, at rest [m]."""
+
+    @property
+    def stays(self) -> float:
+        """The greater of what is left, down, up or aside, over the way under the force [-]."""
+        return max(abs(self.sunk), self.aside) / self.way if self.way > 0 else np.inf
+
+    def describe(self) -> str:
+        """In a sentence's words."""
+        return (
+            f"with friction {self.friction:g} a slow pulse of {self.force:.4g} N on a rail seat "
+            f"moves the sleeper {1e6 * self.way:.3g} µm down and leaves it "
+            f"{1e6 * self.sunk:.3g} µm down and {1e6 * self.aside:.3g} µm aside"
+        )
+
+
+def begin_bed(
+    recipe: BedRecipe, bed: Bed, contact: SphereContact, rigid: Rigid = False, **options: Any
+) -> tuple[Simulation, dict[str, Body]]:
+    """A simulation that begins in a prepared bed, and its bodies by name; ``options``: its own.
+
+    Where grains are ``rigid`` they keep the shape that they have at rest, and the sleeper its
+    strain: no force is another.
+    """
+    nodes = [*bed.positions[:-1], bed.nodes[-1]] if rigid else bed.nodes
+    bodies = make_bed_bodies(
+        recipe, make_bed_grains(recipe), nodes, rigid=rigid, sleeper_rigid=False
+    )
+    run = Simulation(list(bodies.values()), gravity=recipe.gravity, contact=contact, **options)
+    guide_sleeper(run, bodies[SLEEPER], upright=False)
+    enter_bed(run, bed)
+    return run, bodies
+
+
+def list_seats(sleeper: Body) -> list[Integers]:
+    """Nodes of each rail seat."""
+    sets = sleeper.mesh.node_sets
+    return [sets[name] for name in sorted(sets) if name.startswith("seat")]
+
+
+def press_sleeper(run: Simulation, recipe: BedRecipe, force: float) -> Pulse:
+    """Load the rail seats slowly up to ``force`` [N] each and back, then bring all to rest.
+
+    Raises `NotConverged` where that finds no equilibrium; warnings of the step are left to the run.
+    """
+    sleeper, turn = run.bodies[-1], np.linspace(0, 2 * np.pi, 41)
+    times = run.time + PULSES.lasts * turn / (2 * np.pi)
+    load = Series(times, np.outer(force * (1 - np.cos(turn)) / 2, DOWN))
+    for seat in list_seats(sleeper):
+        run.load(sleeper, seat, load)
+    before = sleeper.displacement.mean(axis=0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", StepWarning)
+        run.advance(PULSES.lasts / 2)
+        way = before[2] - sleeper.displacement[:, 2].mean()
+        run.advance(PULSES.lasts / 2)
+        find_rest(
+            run, recipe.unbalanced, recipe.kinetic, recipe.loose, recipe.patience,
+            each=not recipe.periodic,
+        )  # fmt: skip
+    x, y, z = sleeper.displacement.mean(axis=0) - before
+    assert run.contact is not None
+    return Pulse(run.contact.friction, force, float(way), -float(z), float(np.hypot(x, y)))
+
+
+def press_bed(
+    recipe: BedRecipe, bed: Bed, path: Path, contact: SphereContact, force: float, stays: float,
+    threads: int | None = None,
+) -> Bed:  # fmt: skip
+    """Run a bed in, with the friction of its preparation, until a pulse leaves at most ``stays``.
+
+    The file ``path`` keeps what each pulse leaves.  A bed that was run in with another force is
+    left as it is.  Raises `NotConverged` after `PULSES.most` of them.
+    """
+    contact = replace(contact, friction=recipe.friction)
+    while not bed.pulses or (last := Pulse(**bed.pulses[-1])).stays > stays:
+        if len(bed.pulses) >= PULSES.most:
+            raise NotConverged(
+                f"{PULSES.most} slow pulses do not run the bed in: {last.describe()} "
+                f"({stays:g} of the way asked)", where=str(path),
+                remedy="remove it and take another track.seed or more ballast beside the sleeper "
+                "(track.beside), or allow more (track.stays)",
+            )  # fmt: skip
+        run, _ = begin_bed(recipe, bed, contact, threads=threads)
+        pulse = press_sleeper(run, recipe, force)
+        assert run.contacts is not None
+        bed = replace(
+            bed, displacement=run.assembly.field("displacement"),
+            contact=run.contacts.pack_state(), pulses=[*bed.pulses, asdict(pulse)],
+        )  # fmt: skip
+        write_bed(path, recipe, bed)
+    return bed
+
+
+def name_trial(contact: SphereContact, force: float, rigid: Rigid) -> str:
+    """Under which name a bed's file keeps what a pulse of ``force`` [N] leaves in a run."""
+    kind = ", grains rigid" + (" (lumped)" if rigid == "lumped" else "") if rigid else ""
+    return f"friction {contact.friction:g}, {force:.4g} N{kind}"
+
+
+def judge_bed(
+    recipe: BedRecipe, bed: Bed, path: Path, contact: SphereContact, force: float, stays: float,
+    threads: int | None = None, rigid: Rigid = False,
+) -> Pulse:  # fmt: skip
+    """What a pulse leaves in a run from the bed in the file ``path``, which keeps the answer.
+
+    Raises `NotConverged` for a bed that finds no rest behind it, or leaves more than ``stays``.
+    """
+    key = name_trial(contact, force, rigid)
+    if key not in bed.trials:
+        run, _ = begin_bed(recipe, bed, contact, rigid, threads=threads)
+        trial = asdict(press_sleeper(run, recipe, force))
+        bed = replace(bed, trials={**bed.trials, key: trial})
+        write_bed(path, recipe, bed)
+    pulse = Pulse(**bed.trials[key])
+    if not pulse.stays <= stays:
+        raise NotConverged(
+            f"the bed does not bear its sleeper: {pulse.describe()} ({stays:g} of the way asked)",
+            where=str(path), remedy="remove it, and it is run in with this load; prepare it with "
+            "less friction than the run has (track.prepared_friction), or allow more (track.stays)",
+        )  # fmt: skip
+    return pulse
