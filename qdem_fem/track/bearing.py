@@ -1,9 +1,10 @@
 """Whether a prepared bed bears its sleeper under one axle: slow pulses, and what they leave.
 
 Kinetic damping stops what moves, so a bed whose contacts lie at Coulomb's limit passes for one at
-rest, and gives way when it is loaded.  It is run in by slow pulses of the greatest force on a rail
-seat (`press_bed`), as track is by trains, and has to bear one more with the friction of the run,
-which may be another than the one it was prepared with (`judge_bed`).
+rest.  Loaded and let go, it throws up its grains, as nothing but friction and the viscosity of the
+grains takes their motion, and the sleeper comes down elsewhere.  Slow pulses of the greatest force
+on a rail seat, with the friction of the run, tell this (`press_sleeper`) and run the bed in, as
+trains do (`run_in`).
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ class PulseNumbers:
     """Slow pulses."""
 
     lasts: float = 0.01  # up and down as a cosine [s]: five periods of the sleeper on its grains
-    most: int = 20  # of a preparation [-]
+    most: int = 10  # that run a bed in [-]: as many as its preparation costs, and more
 
 
 PULSES = PulseNumbers()
@@ -52,6 +53,8 @@ class Pulse:
     @property
     def stays(self) -> float:
         """The greater of what is left, down, up or aside, over the way under the force [-]."""
+        if self.force == 0:
+            return 0.0
         return max(abs(self.sunk), self.aside) / self.way if self.way > 0 else np.inf
 
     def describe(self) -> str:
@@ -112,60 +115,41 @@ def press_sleeper(run: Simulation, recipe: BedRecipe, force: float) -> Pulse:
     return Pulse(run.contact.friction, force, float(way), -float(z), float(np.hypot(x, y)))
 
 
-def press_bed(
+def run_in(
     recipe: BedRecipe, bed: Bed, path: Path, contact: SphereContact, force: float, stays: float,
-    threads: int | None = None,
-) -> Bed:  # fmt: skip
-    """Run a bed in, with the friction of its preparation, until a pulse leaves at most ``stays``.
+    threads: int | None = None, rigid: Rigid = False,
+) -> tuple[Bed, Pulse]:  # fmt: skip
+    """Press a bed until it bears: until a pulse of ``force`` [N] leaves at most ``stays``.
 
-    The file ``path`` keeps what each pulse leaves.  A bed that was run in with another force is
-    left as it is.  Raises `NotConverged` after `PULSES.most` of them.
+    The bed that bears, and that pulse, which is no part of it.  The file ``path`` keeps what each
+    pulse found and left.  Raises `NotConverged` behind `PULSES.most` pulses that leave more.
     """
-    contact = replace(contact, friction=recipe.friction)
-    while not bed.pulses or (last := Pulse(**bed.pulses[-1])).stays > stays:
+    name = name_trial(contact, force, rigid)
+    while not (name in bed.trials and Pulse(**bed.trials[name]).stays <= stays):
         if len(bed.pulses) >= PULSES.most:
             raise NotConverged(
-                f"{PULSES.most} slow pulses do not run the bed in: {last.describe()} "
-                f"({stays:g} of the way asked)", where=str(path),
-                remedy="remove it and take another track.seed or more ballast beside the sleeper "
-                "(track.beside), or allow more (track.stays)",
+                "the bed does not bear its sleeper, nor do slow pulses run it in: behind "
+                f"{len(bed.pulses)} of them {Pulse(**bed.pulses[-1]).describe()} ({stays:g} of "
+                "the way asked)", where=str(path),
+                remedy="remove it, and take another track.seed, more ballast beside the sleeper "
+                "(track.beside) or less load, or allow more (track.stays)",
             )  # fmt: skip
-        run, _ = begin_bed(recipe, bed, contact, threads=threads)
+        run, _ = begin_bed(recipe, bed, contact, rigid, threads=threads)
         pulse = press_sleeper(run, recipe, force)
-        assert run.contacts is not None
-        bed = replace(
-            bed, displacement=run.assembly.field("displacement"),
-            contact=run.contacts.pack_state(), pulses=[*bed.pulses, asdict(pulse)],
-        )  # fmt: skip
+        if pulse.stays <= stays:
+            bed = replace(bed, trials={**bed.trials, name: asdict(pulse)})
+        else:
+            assert run.contacts is not None
+            there = [body.nodes + body.displacement for body in run.bodies]
+            bed = replace(
+                bed, displacement=np.concatenate(there) - np.concatenate(bed.nodes), trials={},
+                contact=run.contacts.pack_state(), pulses=[*bed.pulses, asdict(pulse)],
+            )  # fmt: skip
         write_bed(path, recipe, bed)
-    return bed
+    return bed, Pulse(**bed.trials[name])
 
 
 def name_trial(contact: SphereContact, force: float, rigid: Rigid) -> str:
-    """Under which name a bed's file keeps what a pulse of ``force`` [N] leaves in a run."""
+    """Under which name a bed's file keeps the pulse that it bears in a run."""
     kind = ", grains rigid" + (" (lumped)" if rigid == "lumped" else "") if rigid else ""
     return f"friction {contact.friction:g}, {force:.4g} N{kind}"
-
-
-def judge_bed(
-    recipe: BedRecipe, bed: Bed, path: Path, contact: SphereContact, force: float, stays: float,
-    threads: int | None = None, rigid: Rigid = False,
-) -> Pulse:  # fmt: skip
-    """What a pulse leaves in a run from the bed in the file ``path``, which keeps the answer.
-
-    Raises `NotConverged` for a bed that finds no rest behind it, or leaves more than ``stays``.
-    """
-    key = name_trial(contact, force, rigid)
-    if key not in bed.trials:
-        run, _ = begin_bed(recipe, bed, contact, rigid, threads=threads)
-        trial = asdict(press_sleeper(run, recipe, force))
-        bed = replace(bed, trials={**bed.trials, key: trial})
-        write_bed(path, recipe, bed)
-    pulse = Pulse(**bed.trials[key])
-    if not pulse.stays <= stays:
-        raise NotConverged(
-            f"the bed does not bear its sleeper: {pulse.describe()} ({stays:g} of the way asked)",
-            where=str(path), remedy="remove it, and it is run in with this load; prepare it with "
-            "less friction than the run has (track.prepared_friction), or allow more (track.stays)",
-        )  # fmt: skip
-    return pulse

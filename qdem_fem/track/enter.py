@@ -86,7 +86,7 @@ class TrackPrepared(Prepared):
     @property
     def greatest(self) -> float:
         """Greatest force down on a rail seat [N]."""
-        return max(float(-load.values[:, 2].min()) for load in self.loads)
+        return max(0.0, *(float(-load.values[:, 2].min()) for load in self.loads))
 
 
 def check_track(text: SceneText) -> TrackPrepared:
@@ -222,15 +222,14 @@ def enter_track(prepared: TrackPrepared) -> tuple[Any, dict[str, Any]]:
     Fills the meshes, the probes and the trial of ``prepared``.  Raises `NotConverged` for a bed
     that finds no equilibrium or does not bear its sleeper.
     """
-    from qdem_fem.track.bearing import begin_bed, judge_bed, list_seats, press_bed
+    from qdem_fem.track.bearing import begin_bed, list_seats, run_in
 
     scene, recipe = prepared.scene, prepared.recipe
     assert isinstance(scene, TrackScene)
     table, track = scene.simulation, scene.track
     path, contact, force = prepared.bed_file, choose_contact(prepared), prepared.greatest
     bed = prepare_bed(recipe, path, table.threads, _Report())
-    bed = press_bed(recipe, bed, path, contact, force, track.stays, table.threads)
-    trial = judge_bed(
+    bed, trial = run_in(
         recipe, bed, path, contact, force, track.stays, table.threads, track.rigid
     )  # fmt: skip
     run, bodies = begin_bed(
@@ -241,8 +240,7 @@ def enter_track(prepared: TrackPrepared) -> tuple[Any, dict[str, Any]]:
     sleeper = bodies[SLEEPER]
     for seat, load in zip(list_seats(sleeper), prepared.loads, strict=True):
         run.load(sleeper, seat, load)
-    count = len(bed.pulses)
-    words = f"run in by {count} slow pulse{'s' * (count > 1)}; {trial.describe()}"
+    words = f"slow pulses that ran it in: {len(bed.pulses)}; {trial.describe()}"
     prepared.trial.update(asdict(trial), pulses=bed.pulses, words=words)
     prepared.meshes.update({name: body.mesh for name, body in bodies.items()})
     prepared.probes.update(find_watched_points(recipe, bed, bodies))

@@ -26,6 +26,9 @@ from validation.studies.qdem_track.trials import run_scene
 SCENE = Path(__file__).parents[3] / "trackbed" / "scenes" / "track-small.toml"
 SEEDS, FRICTIONS = (1, 2, 3), (0.577, 1.73)
 POINTS = (*GRAINS, "sleeper")
+QUICKER = ("simulation.mass_scaling=1.2e-6", "track.bogie.rest=0.01", "simulation.duration=0.2")
+"""Half the cost: a step of 0.34 for 0.21 us, for which grains are 14 % heavier in the mean, and
+less time without load behind the bogie."""
 APART = 8.0
 """Of the frequencies kept in the record [Hz]."""
 
@@ -64,7 +67,7 @@ def measure_packing(folder: Path, bed: Path, seed: int, friction: float) -> dict
     path.write_text(SCENE.read_text(encoding="utf-8"), encoding="utf-8")
     prepared = load_scene(path, [
         f"track.seed={seed}", f"track.bed={bed}", f"contact.friction={friction}",
-        "simulation.threads=1",
+        "simulation.threads=1", *QUICKER,
     ])  # fmt: skip
     assert isinstance(prepared, TrackPrepared)
     assert isinstance(prepared.scene, TrackScene)
