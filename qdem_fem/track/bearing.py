@@ -71,8 +71,9 @@ def begin_bed(
 ) -> tuple[Simulation, dict[str, Body]]:
     """A simulation that begins in a prepared bed, and its bodies by name; ``options``: its own.
 
-    Where grains are ``rigid`` they keep the shape that they have at rest, and the sleeper its
-    strain: no force is another.
+    Rails hold the seats along the track: free, a sleeper tilts under a load that stays upright and
+    walks aside.  Where grains are ``rigid`` they keep the shape that they have at rest, and the
+    sleeper its strain: no force is another.
     """
     nodes = [*bed.positions[:-1], bed.nodes[-1]] if rigid else bed.nodes
     bodies = make_bed_bodies(
@@ -80,6 +81,8 @@ def begin_bed(
     )
     run = Simulation(list(bodies.values()), gravity=recipe.gravity, contact=contact, **options)
     guide_sleeper(run, bodies[SLEEPER], upright=False)
+    for seat in list_seats(bodies[SLEEPER]):
+        run.fix(bodies[SLEEPER], seat, "y")
     enter_bed(run, bed)
     return run, bodies
 

@@ -204,14 +204,15 @@ def preview_bed(prepared: TrackPrepared) -> dict[str, Any]:
 
     recipe, path, scene = prepared.recipe, prepared.bed_file, prepared.scene
     assert isinstance(scene, TrackScene)
-    ahead = [f"stage {name}" for name in list_stages_ahead(recipe, path)]
+    ahead = list(list_stages_ahead(recipe, path))
     trial = name_trial(choose_contact(prepared), prepared.greatest, scene.track.rigid)
     if not ahead and trial in read_bed(path, recipe).trials:
         return {}
     ahead.append("slow pulses")
+    stages = f"stages {ahead[0]} to {ahead[-2]}, then slow pulses" if ahead[:-1] else "slow pulses"
     words = (
-        f"{recipe.below + recipe.beside} grains, to be prepared first ({ahead[0]} to {ahead[-1]}), "
-        f"half a second to two of processor time a grain; kept in {path}"
+        f"{recipe.below + recipe.beside} grains, to be prepared first ({stages}), half a second to "
+        f"two of processor time a grain, and as much for each pulse; kept in {path}"
     )
     return {"grains": recipe.below + recipe.beside, "stages_ahead": ahead, "words": words}
 

@@ -416,7 +416,7 @@ def test_a_dry_run_prepares_no_bed(tmp_path: Path, capsys: pytest.CaptureFixture
     count = prepared.recipe.below + prepared.recipe.beside
     assert main(["qdem", str(path), "--dry-run"]) == 0
     shown = capsys.readouterr().out
-    assert "to be prepared first (stage bed to slow pulses)" in shown
+    assert "to be prepared first (stages bed to rest, then slow pulses)" in shown
     assert f"the bed: {count} grains" in shown
     assert main(["qdem", str(path), "--dry-run", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["bed"]["grains"] == count

@@ -208,8 +208,7 @@ def test_device_of_a_scene_is_of_its_run(tmp_path: Path, monkeypatch: pytest.Mon
         raise Begun(options)
 
     monkeypatch.setattr(track_scene, "prepare_bed", lambda *_: None)
-    for name in ("press_bed", "judge_bed"):
-        monkeypatch.setattr(bearing, name, lambda *_: None)
+    monkeypatch.setattr(bearing, "run_in", lambda *_: (None, None))
     monkeypatch.setattr(bearing, "begin_bed", begin)
     load_of(tmp_path, "lead = 1.0")
     prepared = load_scene(tmp_path / "scene.toml", ("simulation.device=cuda",))

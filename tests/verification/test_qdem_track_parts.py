@@ -137,8 +137,7 @@ def test_each_rail_seat_takes_its_own_pressure(
     nodes.append(layout.sleeper(0.5).nodes)
     bed = Bed("rest", nodes, np.zeros((sum(map(len, nodes)), 3)), {}, {})
     monkeypatch.setattr(track_scene, "prepare_bed", lambda *given: bed)
-    monkeypatch.setattr(bearing, "press_bed", lambda *given: bed)
-    monkeypatch.setattr(bearing, "judge_bed", lambda *given: Pulse(0.5, 1.0, 1.0, 0.0, 0.0))
+    monkeypatch.setattr(bearing, "run_in", lambda *given: (bed, Pulse(0.5, 1.0, 1.0, 0.0, 0.0)))
     run, bodies = enter_track(prepared)
     now = np.array([0.0])
     force = [(one.weights * one.driver.sample(now)[0]).sum(axis=0) for one in run.conditions.loads]
