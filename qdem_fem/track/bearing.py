@@ -80,10 +80,11 @@ def begin_bed(
         recipe, make_bed_grains(recipe), nodes, rigid=rigid, sleeper_rigid=False
     )
     run = Simulation(list(bodies.values()), gravity=recipe.gravity, contact=contact, **options)
-    guide_sleeper(run, bodies[SLEEPER], upright=False)
-    for seat in list_seats(bodies[SLEEPER]):
-        run.fix(bodies[SLEEPER], seat, "y")
+    sleeper = bodies[SLEEPER]
+    guide_sleeper(run, sleeper, upright=False)
     enter_bed(run, bed)
+    for seat in list_seats(sleeper):
+        run.prescribe(sleeper, seat, "y", 1.0, profile=sleeper.displacement[:, 1])
     return run, bodies
 
 

@@ -58,7 +58,7 @@ class TrackScene(Scene):
             text for text in super().list_left_out() if not text.startswith(("viscosity", "any"))
         ]
         missing += ["deformation of grains, said to be rigid"] * bool(track.rigid)
-        missing += ["rail, pads and all other sleepers: a force acts on the rail seat"]
+        missing += ["rail, pads, other sleepers: a force acts on a rail seat held along the track"]
         duration = self.simulation.duration or 0.0
         if track.bogie is not None and track.bogie.passing > duration:
             passing = f"it takes {track.bogie.passing:.4g} s, this run {duration:.4g} s"
