@@ -26,9 +26,12 @@ from validation.studies.qdem_track.trials import run_scene
 SCENE = Path(__file__).parents[3] / "trackbed" / "scenes" / "track-small.toml"
 SEEDS, FRICTIONS = (1, 2, 3), (0.577, 1.73)
 POINTS = (*GRAINS, "sleeper")
-QUICKER = ("simulation.mass_scaling=1.2e-6", "track.bogie.rest=0.01", "simulation.duration=0.2")
-"""Half the cost: a step of 0.34 for 0.21 us, for which grains are 14 % heavier in the mean, and
-less time without load behind the bogie."""
+QUICKER = (
+    "simulation.mass_scaling=1.2e-6", "track.bogie.lead=1.0", "track.bogie.rest=0.01",
+    "simulation.duration=0.138",
+)  # fmt: skip
+"""A third of the cost: a step of 0.34 for 0.21 us, for which grains are 14 % heavier in the mean,
+and a bogie that begins 1 m before the sleeper and ends as far behind it, for 2 m."""
 APART = 8.0
 """Of the frequencies kept in the record [Hz]."""
 
