@@ -1,15 +1,12 @@
 """Whether a prepared bed bears its sleeper under one axle: slow pulses, and what they leave.
 
-Kinetic damping stops what moves, so a bed whose contacts lie at Coulomb's limit passes for one at
-rest.  Loaded and let go, it throws up its grains, as nothing but friction and the viscosity of the
-grains takes their motion, and the sleeper comes down elsewhere.  Slow pulses of the greatest force
-on a rail seat, with the friction of the run, tell this (`press_sleeper`) and run the bed in, as
-trains do (`run_in`).
+Kinetic damping stops what moves, so a bed passes for one at rest and may all the same give way when
+its sleeper is loaded and let go.  Slow pulses of the greatest force on a rail seat, with the
+friction of the run, find this (`press_sleeper`) and run the bed in, as trains do (`run_in`).
 """
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +15,7 @@ import numpy as np
 
 from qdem_fem.bodies import Body, Rigid
 from qdem_fem.contact.spheres import SphereContact
-from qdem_fem.files import Integers, NotConverged, Series, StepWarning
+from qdem_fem.files import Integers, NotConverged, Series
 from qdem_fem.march import Simulation, find_rest
 from qdem_fem.track.bed import Bed, enter_bed, guide_sleeper, write_bed
 from qdem_fem.track.bogie import DOWN
@@ -30,7 +27,7 @@ class PulseNumbers:
     """Slow pulses."""
 
     lasts: float = 0.01  # up and down as a cosine [s]: five periods of the sleeper on its grains
-    most: int = 10  # that run a bed in [-]: as many as its preparation costs, and more
+    most: int = 10  # that run a bed in [-]: each costs about as much as its preparation
 
 
 PULSES = PulseNumbers()
@@ -41,14 +38,10 @@ class Pulse:
     """What a slow pulse did to the sleeper."""
 
     friction: float
-    force: float
-    """On each rail seat, the greatest [N]."""
-    way: float
-    """Down, under that force [m]."""
-    sunk: float
-    """What is left of it at rest [m]."""
-    aside: float
-    """Horizontally, at rest [m]."""
+    force: float  # on each rail seat, the greatest [N]
+    way: float  # down, under that force [m]
+    sunk: float  # what is left of it at rest [m]
+    aside: float  # horizontally, at rest [m]
 
     @property
     def stays(self) -> float:
@@ -97,7 +90,7 @@ def list_seats(sleeper: Body) -> list[Integers]:
 def press_sleeper(run: Simulation, recipe: BedRecipe, force: float) -> Pulse:
     """Load the rail seats slowly up to ``force`` [N] each and back, then bring all to rest.
 
-    Raises `NotConverged` where that finds no equilibrium; warnings of the step are left to the run.
+    Raises `NotConverged` where that finds no equilibrium.
     """
     sleeper, turn = run.bodies[-1], np.linspace(0, 2 * np.pi, 41)
     times = run.time + PULSES.lasts * turn / (2 * np.pi)
@@ -105,15 +98,11 @@ def press_sleeper(run: Simulation, recipe: BedRecipe, force: float) -> Pulse:
     for seat in list_seats(sleeper):
         run.load(sleeper, seat, load)
     before = sleeper.displacement.mean(axis=0)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", StepWarning)
-        run.advance(PULSES.lasts / 2)
-        way = before[2] - sleeper.displacement[:, 2].mean()
-        run.advance(PULSES.lasts / 2)
-        find_rest(
-            run, recipe.unbalanced, recipe.kinetic, recipe.loose, recipe.patience,
-            each=not recipe.periodic,
-        )  # fmt: skip
+    run.advance(PULSES.lasts / 2)
+    way = before[2] - sleeper.displacement[:, 2].mean()
+    run.advance(PULSES.lasts / 2)
+    shares = recipe.unbalanced, recipe.kinetic, recipe.loose
+    find_rest(run, *shares, recipe.patience, each=not recipe.periodic)
     x, y, z = sleeper.displacement.mean(axis=0) - before
     assert run.contact is not None
     return Pulse(run.contact.friction, force, float(way), -float(z), float(np.hypot(x, y)))

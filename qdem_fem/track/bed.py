@@ -302,8 +302,6 @@ def read_bed(path: Path, recipe: BedRecipe) -> Bed:
         pulses, trials = head.get("pulses", []), head.get("trials", {})  # none in older files
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
         raise CheckpointError(f"no bed ({error})", where=str(path), remedy=remedy) from error
-    for once in ("centre_height", "end_height"):  # of the sleeper, once; both its height
-        there["shape"].pop(once, None)
     if there != here:
         other = [name for name in here if there.get(name) != here[name]]
         raise CheckpointError(

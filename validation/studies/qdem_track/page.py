@@ -10,7 +10,7 @@ import numpy as np
 
 from validation.bench.qdem.checks import describe_checks, describe_origin, draw_figure
 from validation.studies.qdem_track.bars import check_bars
-from validation.studies.qdem_track.bogie import APART, FRICTIONS, POINTS
+from validation.studies.qdem_track.bogie import APART, FRICTIONS, POINTS, SEEDS
 from validation.study import Row, format_table
 
 TWENTY = {
@@ -29,7 +29,7 @@ LEVERS = {
     "springs of 0.1 of Table 1's": "springs times 0.1",
     "springs of 0.01": "springs times 0.01",
 }
-TRIED = ("way under the slow pulse", "sunk at rest", "aside at rest")
+TRIED = ("way", "left down", "left aside")
 MEASURES = {"first": "greatest at axle 1", "greatest": "greatest", "end": "behind both axles",
             "lateral": "greatest lateral motion"}  # fmt: skip
 
@@ -52,7 +52,7 @@ def describe(rows: Sequence[Row]) -> dict[str, str]:
 
 
 def describe_packings(runs: Sequence[dict[str, Any]]) -> str:
-    """Each run's bed and sleeper, then its watched grains, a line each [um]."""
+    """How many runs there are; bed and sleeper of each, and its watched grains [um]."""
     sleepers, grains = [], []
     for run in runs:
         head, trial = [str(run["seed"]), f"{run['friction']:g}"], run["trial"]
@@ -63,15 +63,21 @@ def describe_packings(runs: Sequence[dict[str, Any]]) -> str:
         )
         for name in POINTS[:-1]:
             one = run["points"][name]
-            cells = [*(f"{1e6 * one[key]:.3g}" for key in MEASURES)]
+            cells = [f"{1e6 * one[key]:.3g}" for key in MEASURES]
             grains.append([*head, name, *cells, f"{one['lateral_over_vertical']:.2g}"])
-    tables = [
-        format_table(["packing", "friction", "pulses", *TRIED, *MEASURES.values()], sleepers),
-        format_table(
-            ["packing", "friction", "grain", *MEASURES.values(), "lateral over vertical"], grains
-        ),
+    head = ["packing", "friction"]
+    made = [
+        f"{len(runs)} of {len(SEEDS) * len(FRICTIONS)} runs are measured so far; each is a part of "
+        "the study, and a kill loses one:",
+        "`python -m validation.study qdem-track run --only 'packing 1 at 0.577'`",
     ]
-    return "\n\n".join(tables)
+    tables = [
+        "All lengths in µm:",
+        format_table([*head, "pulses before", *TRIED, *MEASURES.values()], sleepers),
+        format_table([*head, "grain", *MEASURES.values(), "lateral over vertical"], grains),
+        "![spectra](qdem-track.png)",
+    ]
+    return "\n\n".join(["\n".join(made), *tables * bool(runs)])
 
 
 def draw(rows: Sequence[Row], picture: Path) -> None:
@@ -87,6 +93,7 @@ def draw(rows: Sequence[Row], picture: Path) -> None:
                 at = APART * np.arange(len(size))
                 axes.semilogy(at, size, lw=0.9, label=f"packing {run['seed']}")
             axes.set(xlabel="frequency [Hz]", title=words)
-        figure.axes[0].legend(fontsize=7)
+        if runs:
+            figure.axes[0].legend(fontsize=7)
 
     draw_figure((12, 3.6), draw_panels, picture)
