@@ -27,14 +27,14 @@ from qdem_fem.scene.run import RunFolder, run_dynamic
 from qdem_fem.track.bed import Bed, read_bed, scatter, write_bed
 from qdem_fem.track.bodies import TrackBox, make_loose_lattice, make_sleeper_slice, place_grains
 from qdem_fem.track.bogie import RISE, make_bogie_series
-from qdem_fem.track.enter import TrackPrepared
+from qdem_fem.track.enter import TrackPrepared, choose_contact
 from qdem_fem.track.loads.rail import Track, find_seat_share
 from qdem_fem.track.loads.train import Train
 from qdem_fem.track.recipe import BedRecipe, make_bed_grains
 from qdem_fem.track.sleeper_mesh import SleeperShape
 from qdem_fem.track.table import BogieTable, TrackTable
 from trackbed.command import main
-from validation.bench.track_trials import SCENE
+from validation.bench.track_trials import SCENE, load_track
 
 GRAVITY = (0.0, 0.0, -9.81)
 STONE = Material(1e8, 0.2, 2700.0, shear_viscosity=100.0)
@@ -405,6 +405,13 @@ def test_a_wrong_track_is_refused_with_a_sentence(
     path.write_text(SCENE.replace(*change), encoding="utf-8")
     with pytest.raises(SceneError, match=said.replace("{", r"\{").replace("...", r"\.\.\.")):
         load_scene(path)
+
+
+def test_skin_and_friction_of_a_scene_are_the_runs(tmp_path: Path) -> None:
+    prepared = load_track(tmp_path, "contact.skin=1.5e-3", "contact.friction=0.4")
+    contact = choose_contact(prepared)
+    assert (contact.skin, contact.friction) == (1.5e-3, 0.4)
+    assert prepared.recipe.friction == 0.577
 
 
 def test_a_dry_run_prepares_no_bed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
