@@ -19,6 +19,12 @@ TWENTY = {
     "the same, friction 1.73": "friction 1.73: missing",
     "greatest settlement, friction 1.73 over 0.577": "friction 1.73 over 0.577: settlement",
     "greatest lateral motion, the same": "friction 1.73 over 0.577: lateral",
+    "way of the sleeper under a slow pulse": "held: way",
+    "left of it, down": "held: left down",
+    "left, aside": "held: left aside",
+    "where nothing holds the sleeper: way": "free: way",
+    "and left, down": "free: left down",
+    "and left, aside": "free: left aside",
     "resumed run less uninterrupted one": "resumed run",
     "processor seconds a simulated second": "friction 0.577: processor",
 }

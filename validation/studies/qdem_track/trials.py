@@ -1,4 +1,4 @@
-"""Tracks of 20 grains under one blow: two frictions, resumption, levers of cost."""
+"""Tracks of 20 grains under one blow: two frictions, rails, resumption, levers of cost."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ from qdem_fem.report.track import list_track_facts
 from qdem_fem.scene.build import make_simulation
 from qdem_fem.scene.energy_account import list_energy_facts
 from qdem_fem.scene.run import RunFolder, run_dynamic
-from qdem_fem.track.bed import prepare_bed
-from qdem_fem.track.enter import TrackPrepared
+from qdem_fem.track.bearing import begin_bed, press_sleeper
+from qdem_fem.track.bed import prepare_bed, read_bed
+from qdem_fem.track.enter import TrackPrepared, choose_contact
 from validation.bench.qdem.checks import report
 from validation.bench.track_trials import load_track
 from validation.case import Check
@@ -94,6 +95,23 @@ def check_blows(folder: Path) -> tuple[list[Check], Trial]:
         name = f"friction 1.73 over 0.577: {key.replace('_', ', ')}"
         checks.append(Check(name, ratio, "< 1", ratio < 1))
     return checks, trials[0]
+
+
+def check_rails(folder: Path) -> list[Check]:
+    """What a slow pulse leaves where rails hold the seats along the track, or nothing does."""
+    prepared, checks = load_track(folder, SEED), []
+    recipe, file = prepared.recipe, prepared.bed_file
+    for name, held in (("held", True), ("free", False)):
+        run, _ = begin_bed(recipe, read_bed(file, recipe), choose_contact(prepared), threads=1)
+        for one in [] if held else [one for one in run.conditions.held if one.components == (1,)]:
+            run.remove(one)
+        pulse = press_sleeper(run, recipe, prepared.greatest)
+        checks += [
+            report(f"{name}: way under a slow pulse", pulse.way, "m"),
+            report(f"{name}: left down", pulse.sunk, "m"),
+            report(f"{name}: left aside", pulse.aside, "m"),
+        ]
+    return checks
 
 
 def check_max(name: str, value: float, bar: float, unit: str = "") -> Check:
