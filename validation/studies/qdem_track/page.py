@@ -20,11 +20,11 @@ TWENTY = {
     "greatest settlement, friction 1.73 over 0.577": "friction 1.73 over 0.577: settlement",
     "greatest lateral motion, the same": "friction 1.73 over 0.577: lateral",
     "way of the sleeper under a slow pulse": "held: way",
-    "left of it, down": "held: left down",
-    "left, aside": "held: left aside",
+    "left of it, down": "held: sunk",
+    "left, aside": "held: aside",
     "where nothing holds the sleeper: way": "free: way",
-    "and left, down": "free: left down",
-    "and left, aside": "free: left aside",
+    "and left, down": "free: sunk",
+    "and left, aside": "free: aside",
     "resumed run less uninterrupted one": "resumed run",
     "processor seconds a simulated second": "friction 0.577: processor",
 }
@@ -72,18 +72,13 @@ def describe_packings(runs: Sequence[dict[str, Any]]) -> str:
             cells = [f"{1e6 * one[key]:.3g}" for key in MEASURES]
             grains.append([*head, name, *cells, f"{one['lateral_over_vertical']:.2g}"])
     head = ["packing", "friction"]
-    made = [
-        f"{len(runs)} of {len(SEEDS) * len(FRICTIONS)} runs are measured so far; each is a part of "
-        "the study, and a kill loses one:",
-        "`python -m validation.study qdem-track run --only 'packing 1 at 0.577'`",
-    ]
     tables = [
-        "All lengths in µm:",
         format_table([*head, "pulses before", *TRIED, *MEASURES.values()], sleepers),
         format_table([*head, "grain", *MEASURES.values(), "lateral over vertical"], grains),
         "![spectra](qdem-track.png)",
     ]
-    return "\n\n".join(["\n".join(made), *tables * bool(runs)])
+    counted = f"{len(runs)} of {len(SEEDS) * len(FRICTIONS)} runs are measured so far [µm]."
+    return "\n\n".join([counted, *tables * bool(runs)])
 
 
 def draw(rows: Sequence[Row], picture: Path) -> None:

@@ -11,12 +11,7 @@ from pathlib import Path
 from qdem_fem.files.errors import StepWarning
 from validation.bench.qdem.checks import make_row
 from validation.studies.qdem_track.bogie import FRICTIONS, SEEDS, measure_packing
-from validation.studies.qdem_track.trials import (
-    check_blows,
-    check_levers,
-    check_rails,
-    check_resume,
-)
+from validation.studies.qdem_track.trials import check_blows, check_levers, check_resume
 from validation.study import Row
 
 
@@ -26,7 +21,6 @@ def run_twenty() -> Row:
         warnings.simplefilter("ignore", StepWarning)  # contact makes the step short: known here
         folder = Path(name)
         checks, reference = check_blows(folder)
-        checks += check_rails(folder)
         checks += [check_resume(folder), *check_levers(folder, reference)]
     return make_row(checks)
 

@@ -71,7 +71,7 @@ def run_scene(prepared: TrackPrepared, folder: Path) -> Trial:
 
 
 def check_blows(folder: Path) -> tuple[list[Check], Trial]:
-    """Equilibrium, and both frictions of the paper from the same bed."""
+    """Equilibrium, both frictions of the paper from the same bed, and rails."""
     trials = [
         run_scene(load_track(folder, SEED, f"contact.friction={f}"), folder / f"friction-{f}")
         for f in FRICTIONS
@@ -94,7 +94,7 @@ def check_blows(folder: Path) -> tuple[list[Check], Trial]:
         ratio = trials[1].facts["sleeper"][key] / trials[0].facts["sleeper"][key]
         name = f"friction 1.73 over 0.577: {key.replace('_', ', ')}"
         checks.append(Check(name, ratio, "< 1", ratio < 1))
-    return checks, trials[0]
+    return [*checks, *check_rails(folder)], trials[0]
 
 
 def check_rails(folder: Path) -> list[Check]:
@@ -106,11 +106,8 @@ def check_rails(folder: Path) -> list[Check]:
         for one in [] if held else [one for one in run.conditions.held if one.components == (1,)]:
             run.remove(one)
         pulse = press_sleeper(run, recipe, prepared.greatest)
-        checks += [
-            report(f"{name}: way under a slow pulse", pulse.way, "m"),
-            report(f"{name}: left down", pulse.sunk, "m"),
-            report(f"{name}: left aside", pulse.aside, "m"),
-        ]
+        lengths = ("way", "sunk", "aside")
+        checks += [report(f"{name}: {key}", getattr(pulse, key), "m") for key in lengths]
     return checks
 
 
