@@ -77,7 +77,7 @@ def describe_packings(runs: Sequence[dict[str, Any]]) -> str:
         format_table([*head, "grain", *MEASURES.values(), "lateral over vertical"], grains),
         "![spectra](qdem-track.png)",
     ]
-    counted = f"{len(runs)} of {len(SEEDS) * len(FRICTIONS)} runs are measured so far [µm]."
+    counted = f"Runs measured so far: {len(runs)} of {len(SEEDS) * len(FRICTIONS)}.  Lengths in µm:"
     return "\n\n".join([counted, *tables * bool(runs)])
 
 
