@@ -75,8 +75,8 @@ def _preview_run(file: SceneFile) -> dict[str, Any]:
 def _run(file: SceneFile, arguments: argparse.Namespace) -> dict[str, Any]:
     """The whole run with its report; its summary."""
     from rigid_lcp.report import write_report
-    from rigid_lcp.scene import RESULT, RunFolder, make_simulation, run_scene, summarise_run
-    from trackbed.run_files import raise_on_signals, record_provenance, write_whole
+    from rigid_lcp.scene import RunFolder, make_simulation, run_scene, summarise_run
+    from trackbed.run_files import raise_on_signals, record_provenance, write_result
 
     path = place_run(arguments)
     folder = RunFolder(path)
@@ -95,7 +95,7 @@ def _run(file: SceneFile, arguments: argparse.Namespace) -> dict[str, Any]:
         run_scene(file, run, folder, resume=goes_on, progress=_make_progress())
         summary = summarise_run(file, scene, run, folder)
         write_report(folder, scene, manifest, summary, draw=not arguments.no_pictures)
-        write_whole(path / RESULT, json.dumps(summary, indent=1) + "\n")
+        write_result(path, summary)
     return summary | {"folder": str(path)}
 
 

@@ -10,6 +10,7 @@ import argparse
 import json
 import os
 import shlex
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +21,7 @@ from trackbed.run_files import (
     MANIFEST,
     RESULT,
     is_written,
+    list_changed_tables,
     read_object,
     refuse_format,
     refuse_links,
@@ -100,6 +102,7 @@ def describe_run(path: Path, kind: Kind) -> dict[str, Any]:
     said = {
         "run_folder": str(path), "kind": kind.verb, "title": manifest["scene"].get("title", ""),
         "state": state, "saved_states": states,
+        "damaged": ", ".join(list_changed_tables(path, summary)),
     }  # fmt: skip
     said |= {key: summary[key] for key in ("time", "steps") if key in summary}
     next_step = {
@@ -142,6 +145,8 @@ def _show_report(arguments: argparse.Namespace, kind: Kind) -> int:
             f"this {kind.verb} run is {said['state']}, and its report is written at its end",
             where=str(arguments.run_folder), remedy=f"first: {said['next']}",
         )  # fmt: skip
+    if said["damaged"]:
+        print(f"warning: changed since the run was finished: {said['damaged']}", file=sys.stderr)
     show_page(path, arguments.open)
     return 0
 

@@ -59,7 +59,7 @@ def _run(
         summarise_run,
         write_report,
     )
-    from trackbed.run_files import RESULT, record_provenance, write_whole
+    from trackbed.run_files import record_provenance, write_result
 
     folder = RunFolder(path)
     manifest = {
@@ -89,7 +89,7 @@ def _run(
             summary["bed"] = prepared.trial
             more = draw_track_pictures(path, prepared.load)
         write_report(folder, manifest, summary, None if arguments.no_pictures else done, more)
-        write_whole(path / RESULT, json.dumps(summary, indent=1) + "\n")
+        write_result(path, summary)
     return summary | {"folder": str(path)}
 
 

@@ -28,7 +28,6 @@ from __future__ import annotations
 
 import json
 import time
-import zipfile
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from io import BytesIO
@@ -44,6 +43,7 @@ from qdem_fem.grains import GrainSet
 from qdem_fem.march import Damping, Rest, find_rest, read_checkpoint, write_checkpoint
 from qdem_fem.track.bodies import GAP, place_grains
 from qdem_fem.track.recipe import SLEEPER, BedRecipe, make_bed_bodies, make_bed_grains
+from trackbed.errors import OutOfMemory
 from trackbed.memory import read_arrays
 from trackbed.run_files import write_whole
 
@@ -300,7 +300,12 @@ def read_bed(path: Path, recipe: BedRecipe) -> Bed:
         displacement = arrays.pop("displacement")
         stage, rests = head["stage"], head["rests"]
         pulses, trials = head.get("pulses", []), head.get("trials", {})  # none in older files
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        shapes = (nodes.shape, displacement.shape, counts.dtype.kind, stage in STAGES)
+        if shapes != (*2 * ((int(counts.sum()), 3),), "i", True) or not np.isfinite(nodes).all():
+            raise ValueError("its arrays do not belong together")
+    except OutOfMemory:
+        raise
+    except Exception as error:  # numpy raises many kinds for a damaged file
         raise CheckpointError(f"no bed ({error})", where=str(path), remedy=remedy) from error
     if there != here:
         other = [name for name in here if there.get(name) != here[name]]

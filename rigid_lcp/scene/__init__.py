@@ -11,11 +11,11 @@ from rigid_lcp.scene.run import (
     summarise_run,
     write_history,
 )
-from rigid_lcp.scene.run_folder import RESULT, RunFolder, read_frame, rebuild_frame_scene
+from rigid_lcp.scene.run_folder import RunFolder, read_frame, rebuild_frame_scene
 from rigid_lcp.scene.simulation import Simulation
 
 __all__ = [
-    "RESULT", "RunFolder", "SceneFile", "Simulation", "count_unknowns", "list_doubts",
+    "RunFolder", "SceneFile", "Simulation", "count_unknowns", "list_doubts",
     "list_left_out", "load_scene", "make_simulation", "plan_steps", "read_frame", "read_history",
     "rebuild_frame_scene", "run_scene", "summarise_run", "write_history",
 ]  # fmt: skip

@@ -22,8 +22,10 @@ from adapters.files.states import write_state_file
 from qdem_fem.grains import make_grains, save_grains
 from qdem_fem.grains.sets import load_grains
 from qdem_fem.mesh import read_mesh
+from qdem_fem.track.bed import Bed, read_bed, write_bed
 from rigid_lcp.friction.files.formats import read_problem
 from tests.small_bed import small_bed
+from tests.verification.test_qdem_track import RECIPE
 from trackbed.command import main
 from trackbed.errors import EXIT_CODES, TrackbedError
 
@@ -138,6 +140,9 @@ def write_inputs(folder: Path) -> None:
     cycles = [1, 2, 5, 10, 20, 50, 100]
     rows = "".join(f"{n};{1.1 + 0.4 * np.log(n):.3f}\n".replace(".", ",") for n in cycles)
     (folder / "series.csv").write_text(f"Prüfung 7\ncycle;Settlement [mm]\n{rows}")
+    moved, springs = np.zeros((9, 3)), {"contact_slid": np.zeros(3)}
+    nodes = [np.zeros((4, 3)), np.ones((5, 3))]
+    write_bed(folder / "track.npz", RECIPE, Bed("rest", nodes, moved, springs, {}))
     save_grains(folder / "grains.npz", make_grains(2, seed=1))
     np.savez(folder / "problem.npz", W=np.eye(4), q=rng.normal(size=4), mu=np.full(2, 0.5))
     (folder / "problem.dat").write_text("2\n1\n0\n2\n2\n2\t2\n1 0 0 1\n-1 .5\n.3\n")
@@ -174,6 +179,7 @@ READERS: dict[str, tuple[str, Callable[[Path], int]]] = {
     "dumps": ("frames.dump", run_words("fit", "@", "--to-cycle", "9")),
     "state": ("state.npz", run_words("relax", "@", "--scene", "@/../bed.toml", "--out", "@.dump")),
     "grains": ("grains.npz", read_by(load_grains)),
+    "track bed": ("track.npz", read_by(lambda path: read_bed(path, RECIPE))),
     **{name: (name, read_by(read_mesh)) for name in
        ("beam.msh", "four.msh", "beam.vtu", "skin.stl", "skin.obj")},
     **{name: (name, read_by(read_problem)) for name in ("problem.npz", "problem.dat")},

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from trackbed.command import main
-from trackbed.run_files.folder import lock_folder
+from trackbed.run_files.folder import lock_folder, write_result
 from trackbed.run_verbs import find_kind
 
 STARTED = "trackbed VERB a.toml --set 'x=[1, 2]' --force"
@@ -47,6 +47,29 @@ def test_status_tells_how_far_a_run_is(
     told_to_people = capsys.readouterr().out
     assert "state                       finished\n" in told_to_people
     assert "steps                       3\n" in told_to_people
+
+
+@pytest.mark.parametrize("kind", SCENES)
+def test_a_changed_table_of_a_finished_run_is_named(
+    kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By status and report, whether a digit was changed or the file is gone; a result that names
+    what is no table, or other folders' files, is no harm."""
+    folder = folder_of(kind, tmp_path / "run")
+    table = folder / "energy.csv"
+    table.write_text("time,total\n0,1.5\n")
+    (folder / "report.html").touch()
+    write_result(folder, {"time": 0.5})
+    for change, said in ((None, ""), ("time,total\n0,1.4\n", "energy.csv"), ("", "energy.csv")):
+        if change is not None:
+            table.write_text(change) if change else table.unlink()
+        assert main(["status", str(folder), "--json"]) == 0
+        assert json.loads(capsys.readouterr().out)["damaged"] == said
+        assert main(["report", str(folder)]) == 0
+        assert ("changed since the run was finished" in capsys.readouterr().err) == bool(said)
+    for digests in ("[1]", '{"../../etc/passwd": 3}'):
+        (folder / "result.json").write_text('{"digests": ' + digests + "}")
+        assert main(["status", str(folder)]) == 0
 
 
 @pytest.mark.parametrize("kind", SCENES)

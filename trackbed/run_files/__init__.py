@@ -6,10 +6,12 @@ from trackbed.run_files.folder import (
     MANIFEST,
     RESULT,
     is_written,
+    list_changed_tables,
     list_differences,
     lock_folder,
     refuse_format,
     refuse_links,
+    write_result,
 )
 from trackbed.run_files.provenance import record_provenance
 from trackbed.run_files.signals import note_interrupts, note_signals, raise_on_signals
@@ -29,8 +31,9 @@ from trackbed.run_files.whole import (
 
 __all__ = [
     "MANIFEST", "RESULT", "add_run_arguments", "append_text", "digest_file", "folder",
-    "is_written", "list_differences", "lock_folder", "note_interrupts", "note_signals",
-    "open_unlinked", "place_run", "raise_on_signals", "read_object", "record_provenance",
-    "refuse_both", "refuse_format", "refuse_links", "refuse_writing", "replace_file", "seal_file",
-    "sync_folder", "time_step", "write_pvd", "write_whole",
+    "is_written", "list_changed_tables", "list_differences", "lock_folder", "note_interrupts",
+    "note_signals", "open_unlinked", "place_run", "raise_on_signals", "read_object",
+    "record_provenance", "refuse_both", "refuse_format", "refuse_links", "refuse_writing",
+    "replace_file", "seal_file", "sync_folder", "time_step", "write_pvd", "write_result",
+    "write_whole",
 ]  # fmt: skip

@@ -18,9 +18,17 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from trackbed.errors import UsageError
-from trackbed.run_files.whole import open_unlinked, read_object, refuse_writing, write_whole
+from trackbed.run_files.whole import (
+    digest_file,
+    open_unlinked,
+    read_object,
+    refuse_writing,
+    write_whole,
+)
 
 MANIFEST, RESULT = "manifest.json", "result.json"
+TABLES = "*.csv"
+"""Files of a finished run whose digests its result keeps."""
 FORMAT = 1
 """Of run folders; a manifest without one has the first."""
 
@@ -264,3 +272,17 @@ def list_differences(key: str, old: Any, new: Any, free: tuple[str, ...] = ()) -
 def _shorten(value: Any) -> str:
     text = "nothing" if value is None else json.dumps(value)
     return text if len(text) <= 60 else text[:57] + "..."
+
+
+def write_result(path: Path, summary: dict[str, Any]) -> None:
+    """Write the ``summary`` of a finished run in a folder, with digests of its tables."""
+    digests = {one.name: digest_file(one) for one in sorted(path.glob(TABLES))}
+    write_whole(path / RESULT, json.dumps(summary | {"digests": digests}, indent=1) + "\n")
+
+
+def list_changed_tables(path: Path, summary: dict[str, Any]) -> list[str]:
+    """Tables of the run in ``path`` that are not as they were when its ``summary`` was written."""
+    known = summary.get("digests")
+    now = {one.name: digest_file(one) for one in path.glob(TABLES) if one.is_file()}
+    kept = known.items() if isinstance(known, dict) else ()
+    return [str(name) for name, digest in kept if now.get(name) != digest]
