@@ -16,6 +16,7 @@ from typing import Any
 from adapters.errors import UsageError
 from trackbed.scene_files.reader import suggest_word
 from validation import cases
+from validation.age import describe_age
 from validation.study import find_record, import_part, list_studies, read_record
 
 UNBARRED = ("reported", "measured", "finite")
@@ -104,6 +105,11 @@ def judge_study(name: str, quick: bool) -> list[Check]:
     """Bars of a study from its record; there is nothing to make quicker."""
     checks: list[Check] = import_part(name, "bars").check_bars(read_record(find_record(name)))
     return checks
+
+
+def describe_case_age(name: str) -> str:
+    """Which parts of a study's record are older than their code; empty for what measures now."""
+    return describe_age(name, read_record(find_record(name))) if name in list_studies() else ""
 
 
 def load_report(name: str) -> Callable[[Path, Sequence[Check], dict[str, Any]], None] | None:

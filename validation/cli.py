@@ -32,6 +32,7 @@ def validate_command(arguments: argparse.Namespace) -> int:
     from validation.case import (
         Check,
         build_record,
+        describe_case_age,
         list_cases,
         load_case,
         load_report,
@@ -58,6 +59,8 @@ def validate_command(arguments: argparse.Namespace) -> int:
     if failure is not None:
         raise failure
     print(tabulate_checks(checks))
+    if age := describe_case_age(name):
+        print(age)
     report, page = load_report(name), find_report_path(name, path)
     if report is not None and page is not None:
         report(page, checks, origin)

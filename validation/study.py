@@ -2,7 +2,8 @@
 
 A study is a folder ``validation/studies/NAME`` that reads like an experiment:
 
-- ``__init__.py``: the question, the answer and the design, fixed before the run;
+- ``__init__.py``: the question, the answer and the design, fixed before the run, and ``ROOMS``,
+  the code that it measures (`validation.age`);
 - ``run.py``: ``PARTS``, each measured by a function that returns a row of the record;
 - ``bars.py``: ``check_bars(rows) -> list[Check]``, the record's figures against their bars;
 - ``page.py``: ``describe(rows) -> dict[str, str]``, the text for each mark of ``page.md``, and
@@ -32,6 +33,7 @@ from scipy.stats import t as student
 
 from trackbed.run_files.provenance import record_provenance as provenance
 from trackbed.run_files.whole import write_whole
+from validation.age import describe_age, digest_rooms, excuse_page
 
 if TYPE_CHECKING:
     from validation.case import Check
@@ -72,7 +74,7 @@ def measure_parts(
         row = {"part": part, **parts[part]()}
         row["cpu_s"] = round(time.process_time() - started, 1)
         command = ["python", "-m", "validation.study", name, "run", "--only", part]
-        row["origin"] = provenance(command)
+        row |= {"origin": provenance(command), "code": digest_rooms(name)}
         known = {old["part"]: old for old in (read_record(path) if path.exists() else [])}
         known[part] = row
         ordered = [
@@ -147,12 +149,19 @@ def describe_commits(commits: Iterable[str]) -> str:
     return words + (f" and {len(counted) - 3} more" if len(counted) > 3 else "")
 
 
-def write_page(name: str) -> None:
-    """Write ``docs/NAME.md`` and its figure from the record of the study."""
-    rows, page = read_record(find_record(name)), import_part(name, "page")
+def make_page(name: str, rows: Sequence[Row]) -> str:
+    """The text of ``docs/NAME.md`` from the record of the study."""
     template = find_record(name).with_name("page.md").read_text(encoding="utf-8")
-    DOCS.joinpath(f"{name}.md").write_text(fill_page(template, page.describe(rows)), "utf-8")
-    page.draw(rows, DOCS / f"{name}.png")
+    return excuse_page(name, fill_page(template, import_part(name, "page").describe(rows)))
+
+
+def write_page(name: str) -> None:
+    """Write ``docs/NAME.md`` and its figure; print which parts are older than their code."""
+    rows = read_record(find_record(name))
+    DOCS.joinpath(f"{name}.md").write_text(make_page(name, rows), "utf-8")
+    import_part(name, "page").draw(rows, DOCS / f"{name}.png")
+    if age := describe_age(name, rows):
+        print(age)
 
 
 def main(words: Sequence[str] | None = None) -> None:

@@ -12,22 +12,18 @@ import pytest
 
 from adapters.bed import contact_law as law
 from tests import yade_few_grains
-from tests.tangential_rules import LOOPS, force_incremental, force_rescaled, force_secant, work
-from validation.bench import few_grains, few_grains_lammps
-from validation.bench.few_grains import (
-    PLACE,
-    RADIUS,
-    Track,
-    TrackRun,
+from tests.driven_contacts import (
     collide,
     drive_contact,
     find_grain_mass,
     find_shear_modulus,
     limit_force,
-    load_table_1,
     mirror_tangential,
     slide_on_mirror,
 )
+from tests.tangential_rules import LOOPS, force_incremental, force_rescaled, force_secant, work
+from validation.bench import few_grains, few_grains_lammps
+from validation.bench.few_grains import PLACE, RADIUS, Track, TrackRun, load_table_1
 
 LIGGGHTS = pytest.param(few_grains.run_grains, marks=pytest.mark.engine("liggghts"), id="liggghts")
 LAMMPS = pytest.param(few_grains_lammps.run_grains, marks=pytest.mark.engine("lammps"), id="lammps")

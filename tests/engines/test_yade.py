@@ -19,9 +19,10 @@ from adapters.files.window import Window, read_state, read_window
 from adapters.scene.file import load_scene
 from adapters.scene.tables import Scene
 from tests import engine_sample
+from tests.driven_contacts import collide, find_grain_mass
 from tests.yade_few_grains import track_run
 from trackbed.scenes import read_template
-from validation.bench.few_grains import RADIUS, Track, collide, find_grain_mass, load_table_1
+from validation.bench.few_grains import RADIUS, Track, load_table_1
 
 pytestmark = pytest.mark.engine("yade")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from validation.study import DOCS, fill_page, find_record, import_part, list_studies, read_record
+from validation.study import DOCS, find_record, import_part, list_studies, make_page, read_record
 
 pytestmark = pytest.mark.studies
 
@@ -12,9 +12,7 @@ pytestmark = pytest.mark.studies
 @pytest.mark.parametrize("name", list_studies())
 def test_page_and_bars(name: str) -> None:
     rows = read_record(find_record(name))
-    template = find_record(name).with_name("page.md").read_text(encoding="utf-8")
-    page = fill_page(template, import_part(name, "page").describe(rows))
-    assert DOCS.joinpath(f"{name}.md").read_text(encoding="utf-8") == page
+    assert DOCS.joinpath(f"{name}.md").read_text(encoding="utf-8") == make_page(name, rows)
     checks = import_part(name, "bars").check_bars(rows)
     assert [check.name for check in checks if not (check.holds or check.known)] == []
 

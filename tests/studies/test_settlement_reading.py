@@ -25,7 +25,7 @@ pytestmark = pytest.mark.studies
 
 def row(method: str, seed: int, settlement: float, **more: Any) -> dict[str, Any]:
     """A run on the coarse bed: 400 cycles of 10 steps for 40 CPU s, if ``more`` says no other."""
-    state = dict.fromkeys(("coordination_number", "elastic_deflection", "piston_stiffness"), 1.0)
+    state = dict.fromkeys(("coordination_number", "elastic_deflection"), 1.0)
     given: dict[str, Any] = {"computed": 400, "steps_per_cycle": 10, "cost": {"engine": 40.0}}
     return {
         "bed": "coarse", "method": method, "seed": seed, "settlement": settlement, "state": state,

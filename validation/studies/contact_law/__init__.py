@@ -16,3 +16,5 @@ asked under that law; under the scene's law the excess is reported, with its cau
 Driven contacts, closed loops and mirror planes are tested in
 ``tests/engines/test_contact_law_engine.py``.
 """
+
+ROOMS = "adapters: bed.contact_law engines"

@@ -25,3 +25,5 @@ is in balance as it is.  Every engine starts from the same places under its own 
 step; the cost of a step is the difference of two runs of different length, so that start-up does
 not count; a run is refused unless all grains are left, finite and at rest at its end.
 """
+
+ROOMS = "adapters: bed engines procedure.stages"

@@ -14,3 +14,5 @@ before: median error 8 %, 90th percentile 20 %, the 90 % band holds the truth in
 families 95 % refused, of the slow ones 10 % at most.  Real series are read from the folder
 TRACKBED_DATA: ``TRACKBED_DATA=FOLDER python -m validation.study laws run`` (some minutes).
 """
+
+ROOMS = "adapters: laws"

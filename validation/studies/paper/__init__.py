@@ -13,3 +13,5 @@ moved, and what a run that began 1e-10 m apart moved.  The cell: the paper gives
 equal grains at the corners of a cube around one that the estimate moves 1.8 mm into a corner.  The
 runs are read from TRACKBED_DATA: ``TRACKBED_DATA=FOLDER python -m validation.study paper run``.
 """
+
+ROOMS = "adapters: bed laws relaxation"

@@ -11,3 +11,5 @@ the greatest, contact at most 30 % of a step with spheres.
 
 Answer: docs/qdem-contact.md.
 """
+
+ROOMS = "qdem_fem: bodies contact element kernel march"

@@ -13,3 +13,5 @@ MKL on 488,400 elements (`race`), beside the bandwidth of the machine.
 
 Answer: docs/qdem-cost.md.
 """
+
+ROOMS = "qdem_fem: bodies element kernel march"

@@ -8,3 +8,5 @@ turned over, separate parts, loose nodes and left-handed elements are tests
 
 Answer: docs/qdem-hard-cases.md.
 """
+
+ROOMS = "qdem_fem: bodies element kernel march"

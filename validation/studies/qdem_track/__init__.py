@@ -12,3 +12,5 @@ twice its way under the slow pulse of the same force.
 
 Answer: docs/qdem-track.md.
 """
+
+ROOMS = "qdem_fem: bodies contact element kernel march track"

@@ -11,3 +11,5 @@ is conserved (energy, momentum, creep by closed forms) is in
 
 Answer: docs/qdem-validation.md.
 """
+
+ROOMS = "qdem_fem: bodies element kernel march"

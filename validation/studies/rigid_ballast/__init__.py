@@ -13,3 +13,5 @@ method, bed by bed; a finest level is judged by the other.  Error: mean over the
 difference to the reference over the reference's mean, with Student's interval of paired beds.
 In space: ten samples of ``sleeper-3d.toml``, rigid grains at three steps, six cycles.
 """
+
+ROOMS = "rigid_lcp: collision contact friction motion shapes"

@@ -8,3 +8,5 @@ are cheaper by the step and off by their models' softness and tolerances.
 Design, fixed before the runs: every engine is built from one description of the scene, starts from
 the same state, takes steps of 1 ms unless said, and is judged by the same number against one bar.
 """
+
+ROOMS = "rigid_lcp: collision contact friction motion shapes"

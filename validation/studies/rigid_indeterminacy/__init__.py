@@ -10,3 +10,5 @@ Design: every scene by the direct limit, by the relaxation of section 8, by spri
 time by a program of its own (`springs`) and by LIGGGHTS where the grains are discs.  Error: the
 greatest difference of a contact force from the direct limit over the weight of all grains.
 """
+
+ROOMS = "rigid_lcp: friction unique"

@@ -12,3 +12,5 @@ of one thread.  Rivals: Siconos, Clarabel with ``|u_T|`` frozen, Clarabel and th
 Newton, OSQP where there is no friction (`peers`).  Unseen problems follow from a seed that no
 setting was chosen by (`validation.bench.rigid.examination`).
 """
+
+ROOMS = "rigid_lcp: friction sparse"

@@ -21,3 +21,5 @@ files and states are not kept: ``python -m validation.study settlement run --onl
 every cycle"`` computes a run again from its rain (two CPU hours; a coarse one 25 minutes), in the
 folder that TRACKBED_VALIDATION names; a run that was killed goes on there.
 """
+
+ROOMS = "adapters: bed engines jumps laws moves procedure relaxation"

@@ -11,7 +11,7 @@ import numpy as np
 from adapters.bed.state import FloatArray
 from adapters.procedure.history import sum_cost
 from validation.studies.settlement.bars import check_bars
-from validation.studies.settlement.beds import COARSE, EVERY, KINDS, LAWS, Kind, list_methods
+from validation.studies.settlement.beds import EVERY, KINDS, LAWS, Kind, list_methods
 from validation.studies.settlement.reading import (
     find_cost,
     find_errors,
@@ -127,7 +127,6 @@ def describe(rows: Sequence[Row]) -> dict[str, str]:
         "REFERENCE": tabulate_reference(rows),
         "WAYS": tabulate_ways(rows),
         "REFUSED": list_refused(rows),
-        "STIFFNESS": format_error(find_errors(rows, COARSE, "tolerance 0.1", "piston stiffness")),
         "BARS": summarise_bars(check_bars(rows)),
         "SPENT": f"{spent / 3600:.0f}",
         "ORIGIN": f"{engines}; {machines}; commits "

@@ -19,7 +19,6 @@ FIGURES: dict[str, Callable[[Row], float]] = {
     "settlement": lambda row: float(row["settlement"]),
     "coordination number": lambda row: float(row["state"]["coordination_number"]),
     "elastic deflection": lambda row: float(row["state"]["elastic_deflection"]),
-    "piston stiffness": lambda row: float(row["state"]["piston_stiffness"]),
 }
 """Figures of a run at the cycle of comparison; settlement is the mean grain's since k_i."""
 

@@ -13,12 +13,11 @@ from typing import Any
 import numpy as np
 
 from adapters.bed.sample import measure_relative_density
-from adapters.bed.state import FloatArray
 from adapters.engines.contract import EngineStart
 from adapters.engines.liggghts import LiggghtsEngine
 from adapters.errors import SceneError, TrackbedError
 from adapters.files.run_folder import RunFolder
-from adapters.files.window import PistonTrack, load_window
+from adapters.files.window import load_window
 from adapters.laws import get_law
 from adapters.laws.fit.outlook import find_outlook
 from adapters.procedure.progress import Progress
@@ -45,13 +44,13 @@ ROWS = 60
 """Of the table kept of a full run."""
 COLUMNS = {
     "cycle": "d", "settlement": ".7g", "piston_height": ".9g", "coordination_number": ".7g",
-    "relative_density": ".7g", "elastic_deflection": ".5g", "piston_stiffness": ".5g",
+    "relative_density": ".7g", "elastic_deflection": ".5g",
     "kinetic_translational": ".4g", "kinetic_rotational": ".4g", "force_error": ".4g",
     "maximum_overlap": ".4g", "cpu_s": ".3g",
 }  # fmt: skip
 """Columns of a full run's table in SI units, and the digits kept of them.  Settlement is that of
 the grains' mean height since the rain, ``cpu_s`` the engine's, mean of a window."""
-STATE = ("coordination_number", "elastic_deflection", "piston_stiffness", "force_error")
+STATE = ("coordination_number", "elastic_deflection", "force_error")
 
 
 class Changed(LiggghtsEngine):
@@ -143,7 +142,7 @@ def measure_run(run: Run, kind: Kind, whole: bool) -> Row:
     last cycle; ``state``: means of `STATE` over it; ``profile`` of relative density; ``computed``
     cycles, ``cost`` CPU time [s] by purpose, ``lost`` how many tries failed.
     """
-    found = tabulate_cycles(run, kind)
+    found = tabulate_cycles(run)
     cost: dict[str, float] = {}
     for outcome in run.folder.outcomes():
         if kind.k_i <= outcome.first_cycle < kind.last:
@@ -171,21 +170,15 @@ def measure_run(run: Run, kind: Kind, whole: bool) -> Row:
     return row | {"table": thin_table(found)} if whole else row
 
 
-def tabulate_cycles(run: Run, kind: Kind) -> dict[int, dict[str, float]]:
-    """`COLUMNS` of every computed cycle; those of the packing have its own time step."""
+def tabulate_cycles(run: Run) -> dict[int, dict[str, float]]:
+    """`COLUMNS` of every computed cycle."""
     found: dict[int, dict[str, float]] = {}
-    packing_steps = kind.scene(1).steps_per_cycle
     for name in run.folder.stage_names():
         outcome = run.folder.outcome(name)
         if outcome is None or not name.startswith("window"):
             continue
-        window = load_window(run.folder.path / name / "states.npz")
-        begun = outcome.last_cycle <= kind.k_i
-        steps = packing_steps if begun else run.scene.steps_per_cycle
-        stiffness = measure_stiffness(window.piston, steps)
         share = outcome.cost["engine"] / len(outcome.rows)
-        for row, slope in zip(outcome.rows, stiffness, strict=True):
-            found[row["cycle"]] = row | {"piston_stiffness": float(slope), "cpu_s": share}
+        found |= {row["cycle"]: row | {"cpu_s": share} for row in outcome.rows}
     return found
 
 
@@ -227,25 +220,6 @@ def thin_table(found: Mapping[int, Mapping[str, float]]) -> dict[str, list[float
     }
 
 
-def measure_stiffness(track: PistonTrack, steps_per_cycle: int) -> FloatArray:
-    """Unloading stiffness dF/dz of the bed under the piston in each cycle [N/m], shape (c,).
-
-    Slope by least squares of the contact force over the piston's height, over the samples behind
-    the greatest target force in which the target is at least half of it; nan for fewer than two.
-    """
-    cycle = track.cycles(steps_per_cycle)
-    slopes = []
-    for number in range(int(cycle.max()) + 1):
-        rows = np.flatnonzero(cycle == number)
-        target = track.target_force[rows]
-        peak = int(target.argmax())
-        rows = rows[peak:][target[peak:] >= target[peak] / 2]
-        height = track.height[rows] - track.height[rows].mean()
-        square = float(height @ height)
-        slopes.append(-float(height @ track.contact_force[rows]) / square if square else np.nan)
-    return np.array(slopes)
-
-
 def fit_law(kind: Kind, law: str, cycles: int, seed: int, member: int) -> Row:
     """Settlement at the last cycle by a law fitted to a full run's first cycles: no bed is left.
 
@@ -254,7 +228,7 @@ def fit_law(kind: Kind, law: str, cycles: int, seed: int, member: int) -> Row:
     law's value, fitted to the ``cycles`` behind k_i.
     """
     run, _ = run_to_end(kind, None, seed, member)
-    found = tabulate_cycles(run, kind)
+    found = tabulate_cycles(run)
     first, end = (1 if law == "auto" else kind.k_i + 1), kind.k_i + cycles
     cycle = np.arange(first, end + 1, dtype=float)
     path = np.array([found[int(one)]["settlement"] for one in cycle])

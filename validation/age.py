@@ -1,0 +1,86 @@
+"""Which parts of a study's record are older than the code that they measure.
+
+A study names that code in ``ROOMS`` of its ``__init__.py``, as ``"adapters: bed laws.fit"``.  A row
+keeps a digest of each room (or module) as it was when the row was measured; docstrings, comments
+and layout are in no digest.  ``older.toml`` lists studies that cannot be measured again now, and
+why.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import tomllib
+from collections.abc import Iterable, Mapping
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[1]
+
+
+def list_content(node: object) -> object:
+    """What runs of a syntax tree, as nested lists; the same for every version of Python."""
+    if isinstance(node, list):
+        return [list_content(one) for one in node if not is_docstring(one)]
+    if not isinstance(node, ast.AST):
+        return repr(node)
+    fields = [
+        [name, list_content(value)]
+        for name, value in ast.iter_fields(node)
+        if value not in (None, [])
+    ]
+    return [type(node).__name__, *fields]
+
+
+def is_docstring(node: object) -> bool:
+    """Whether a statement is a string alone."""
+    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+
+
+@cache
+def digest_room(room: str) -> str:
+    """Twelve digits that change with the code of a package, rooms inside counted, or a module."""
+    path = ROOT.joinpath(*room.split("."))
+    files = sorted(path.rglob("*.py")) if path.is_dir() else [path.with_suffix(".py")]
+    content = [list_content(ast.parse(file.read_text(encoding="utf-8"))) for file in files]
+    return hashlib.sha256(repr(content).encode()).hexdigest()[:12]
+
+
+def digest_rooms(name: str) -> dict[str, str]:
+    """Digest of each room that the study ``name`` measures."""
+    study = import_module(f"validation.studies.{name.replace('-', '_')}")
+    story, _, rooms = study.ROOMS.partition(": ")
+    return {one: digest_room(one) for one in (f"{story}.{room}" for room in rooms.split())}
+
+
+def describe_age(name: str, rows: Iterable[Mapping[str, Any]]) -> str:
+    """Which rows are older than which rooms, a line for each set of rooms; empty if none is."""
+    now = digest_rooms(name)
+    older: dict[str, list[str]] = {}
+    for row in rows:
+        known = row.get("code", {})
+        changed = ", ".join(room for room in now if known.get(room) != now[room])
+        older.setdefault(changed, []).append(row["part"])
+    return "\n".join(
+        f"{name}: older than {rooms}: {', '.join(parts[:5])}"
+        + (f" and {len(parts) - 5} more parts" if len(parts) > 5 else "")
+        for rooms, parts in older.items()
+        if rooms
+    )
+
+
+def list_excuses() -> dict[str, str]:
+    """Studies that cannot be measured again now, and why."""
+    text = Path(__file__).with_name("older.toml").read_text(encoding="utf-8")
+    excuses: dict[str, str] = tomllib.loads(text)
+    return excuses
+
+
+def excuse_page(name: str, page: str) -> str:
+    """A page that says below its title why it is older than its code, where that is known."""
+    if (excuse := list_excuses().get(name)) is None:
+        return page
+    title, _, rest = page.partition("\n")
+    return f"{title}\n\n**Older than the code that it measures**: {excuse}\n{rest}"
