@@ -111,7 +111,7 @@ def describe_origin(rows: Sequence[Row]) -> str:
     dates = sorted({origin["started"][:10] for origin in origins})
     days = " to ".join(dict.fromkeys((dates[0], dates[-1])))
     hours = sum(row.get("cpu_s") or 0.0 for row in rows) / 3600
-    spent = f", {hours:.1f} h of processor time" if hours else ""
+    spent = f", {hours:.2g} h of processor time" if hours else ""
     return f"{days}, {', '.join(machines)}{spent}."
 
 
