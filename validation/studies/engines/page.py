@@ -141,7 +141,6 @@ def describe(rows: Sequence[Row]) -> dict[str, str]:
         "RESOLUTION": describe_resolution(runs),
         "TABLE_SPEED": tabulate_speed(rows),
         "CYCLE_MINUTES": f"{37_200 * 1e6 / fastest / 128 / 60:.1f}",
-        "RAIN_HOURS": f"{2e12 / fastest / 128 / 3600:.1f}",
         "BARS": summarise_bars(check_bars(rows)),
         "RUNS": describe_runs(rows),
         "ORIGIN": f"{rows[0]['origin']['machine']}; "
