@@ -280,7 +280,7 @@ def watch(case: str, answer: str, build: Callable[[], Simulation], steps: int) -
         return found["gained"], steps
 
     yield judge(case, answer, "energy gained over the first", "<= 1e-12", BOTH[0], go)
-    yield judge(case, answer, "overlap over the smallest body", "<= 1e-8", BOTH[0],
+    yield judge(case, answer, "overlap over the smallest body", "<= 1e-9", BOTH[0],
                 lambda: (found["overlap"], steps))  # fmt: skip
 
 
