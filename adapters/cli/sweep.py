@@ -82,7 +82,7 @@ def run_sweep_command(arguments: argparse.Namespace) -> int:
         last = [
             {
                 "settings": dict(band.settings), "seeds": band.seeds, "cycle": int(band.cycle[-1]),
-                "mean_m": float(band.mean[-1]), "band_m": band.half_at_end,
+                "loaded_body_m": float(band.mean[-1]), "band_m": band.half_at_end,
             }
             for band in bands
         ]  # fmt: skip

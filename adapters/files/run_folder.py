@@ -35,12 +35,16 @@ from trackbed.run_files import (
     write_whole,
 )
 
-COLUMNS = (
-    "cycle", "settlement", "kind", "coordination_number", "relative_density", "piston_height",
-    "elastic_deflection", "force_error", "maximum_overlap", "kinetic_translational",
-    "kinetic_rotational",
-)  # fmt: skip
-"""Columns of ``settlement.csv``: SI units; kind is ``computed``, ``healing`` or ``jumped``."""
+COLUMNS = {
+    "cycle": "cycle", "loaded_body_settlement": "loaded_body", "stiffness": "stiffness",
+    "elastic_deflection": "elastic_deflection", "mean_grain_settlement": "settlement",
+    **{name: name for name in (
+        "kind", "coordination_number", "relative_density", "piston_height", "force_error",
+        "maximum_overlap", "kinetic_translational", "kinetic_rotational",
+    )},
+}  # fmt: skip
+"""Columns of ``settlement.csv`` and their names in `Outcome.rows`: SI units, settlement since the
+preparation; kind is ``computed``, ``healing`` or ``jumped``."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +55,7 @@ class Outcome:
     first_cycle: int  # cycles done before the stage
     last_cycle: int  # and after it
     rows: list[dict[str, Any]]
-    """One row of ``settlement.csv`` for each cycle end, by the names in `COLUMNS`."""
+    """One row of ``settlement.csv`` for each cycle end, by the names that `COLUMNS` gives."""
     cost: dict[str, float]
     """CPU time by purpose [s]: engine, start_up (part of engine), parse, fit, relax, other."""
     checks: dict[str, float] = field(default_factory=dict)  # figures the validators judged
@@ -184,7 +188,7 @@ class RunFolder:
             if self._listing is not None:
                 self._listing.finished.pop(name, None)
             return None
-        cells = ([row.get(column) for column in COLUMNS] for row in outcome.rows)
+        cells = ([row.get(key) for key in COLUMNS.values()] for row in outcome.rows)
         rows = (",".join("" if cell is None else str(cell) for cell in row) for row in cells)
         self._known[name] = files, verify, outcome, "".join(f"{row}\n" for row in rows)
         return outcome

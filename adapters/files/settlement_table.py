@@ -73,7 +73,9 @@ NO_UNITS = ("", "-", "1", "cycle", "cycles", "n", "no", "no.", "#", "count")
 """What stands behind the name of a column of cycles without being a unit."""
 HEIGHT = re.compile(r"height|level|elevation|höhe|hoehe")
 """Names of columns that are no settlement."""
-SETTLEMENT_NAMES = {"settlement": "m", "strain": "1", "axial strain": "1"}
+SETTLEMENT_NAMES = {
+    "settlement": "m", "loaded_body_settlement": "m", "strain": "1", "axial strain": "1",
+}  # fmt: skip
 """Columns that are found without being named, and their unit where neither header nor user gives
 one; of other columns, and of a table without a header, it is then not known."""
 KINDS = ("computed", "healing", "jumped")

@@ -48,6 +48,15 @@ class PistonTrack:
         heights = [self.height[cycle == c] for c in range(cycle.max() + 1)]
         return np.array([height[-1] - height.min() for height in heights])
 
+    def stiffness(self, steps_per_cycle: int) -> FloatArray:
+        """Secant stiffness under the piston in each cycle [N/m]: greatest less last force that the
+        load asks for, over the elastic deflection; nan where the bed did not give way."""
+        cycle = self.cycles(steps_per_cycle)
+        forces = [self.target_force[cycle == c] for c in range(cycle.max() + 1)]
+        swing = np.array([force.max() - force[-1] for force in forces])
+        deflection = self.elastic_deflection(steps_per_cycle)
+        return np.divide(swing, deflection, np.full_like(swing, np.nan), where=deflection > 0)
+
 
 @dataclass(frozen=True)
 class Window:

@@ -27,7 +27,9 @@ class History:
 
     cycle: IntArray
     kind: tuple[str, ...]  # ``computed``, ``healing`` or ``jumped``
-    settlement: FloatArray  # mean settlement of the grains since the preparation [m]
+    loaded_body: FloatArray  # permanent settlement of the loaded body since the preparation [m]
+    stiffness: FloatArray  # secant stiffness under the whole loaded body [N/m]
+    settlement: FloatArray  # that of the mean grain since the preparation [m]
     coordination_number: FloatArray  # contacts with other grains, mean over all grains
     elastic_deflection: FloatArray  # rise of the piston on unloading [m]
     cpu_s: FloatArray  # CPU time from the start of loading to the row [s]
@@ -48,18 +50,21 @@ class History:
         """Which rows the engine computed, shape (r,)."""
         return np.array([kind != "jumped" for kind in self.kind], bool)
 
-    def gain(self, first: int, last: int) -> float:
-        """Settlement between two cycles [m], 0 for the preparation; nan unless both are there."""
+    def gain(self, first: int, last: int, of: str = "settlement") -> float:
+        """Settlement ``of`` a column between two cycles [m], 0 for the preparation; nan unless both
+        are there."""
         if not {first, last} <= {0, *self.cycle.tolist()}:
             return nan
-        start, end = (self.settlement[self.row(n)] if n else 0.0 for n in (first, last))
+        start, end = (getattr(self, of)[self.row(n)] if n else 0.0 for n in (first, last))
         return float(end - start)
 
-    def gain_error(self, settlement: float, before: int, cycle: int) -> float:
+    def gain_error(
+        self, settlement: float, before: int, cycle: int, of: str = "settlement"
+    ) -> float:
         """Error of a ``settlement`` [m] at ``cycle`` over what was gained since ``before``; its own
         zero, the piston at rest by chance, is no measure.  nan where nothing was gained."""
-        gained = self.gain(before, cycle)
-        return (settlement - self.gain(0, cycle)) / abs(gained) if gained else nan
+        gained = self.gain(before, cycle, of)
+        return (settlement - self.gain(0, cycle, of)) / abs(gained) if gained else nan
 
     def late_mean(self, name: str, cycle: int) -> float:
         """Mean of a column over the computed rows among the last `AVERAGED` cycles to ``cycle``."""
@@ -99,6 +104,9 @@ def make_history(outcomes: Sequence[Outcome], lost: Sequence[tuple[int, float]] 
         column.name: np.array([_read_number(row.get(column.name)) for row in rows])
         for column in fields(History)[2:-1]
     }
+    if not np.isfinite(columns["loaded_body"]).all():  # stages of 0.2 know heights only
+        heights = np.array([_read_number(row.get("piston_height")) for row in rows])
+        columns["loaded_body"] = heights[0] - heights
     return History(
         cycle=np.array([row["cycle"] for row in rows], np.int64),
         kind=tuple(row["kind"] for row in rows),

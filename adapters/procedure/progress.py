@@ -30,7 +30,7 @@ class Progress:
     ) -> None:  # fmt: skip
         """How far the run is.
 
-        ``done`` and ``computed`` cycles of ``total``; mean ``settlement`` [m];
+        ``done`` and ``computed`` cycles of ``total``; ``settlement`` of the loaded body [m];
         ``computed_here`` by this process, ``to_compute`` still.
         """
         now = time.monotonic()

@@ -97,6 +97,8 @@ class Run:
     """Where no jump is allowed: True computes every cycle, False refuses."""
     clock: Clock = field(default_factory=Clock)
     computed_here: int = 0
+    loaded_start: float = np.nan
+    """Height of the loaded body before the first cycle [m]."""
     computed_before: int | None = None
     """Cycles that earlier processes computed; None before they are counted."""
 
@@ -151,7 +153,7 @@ def prepare(run: Run) -> Bed:
         cost = run.clock.end_lap(done.cpu_s, done.start_up_s)
         _finish(run, folder, Outcome(name, 0, 0, [], cost, notes=notes))
     state = load_state(run.folder.path / name / "state.npz")
-    top = find_top_under(state.position, state.radius, scene.piston_reach)
+    run.loaded_start = top = find_top_under(state.position, state.radius, scene.piston_reach)
     restart = run.folder.path / name / "end.restart"
     return Bed(0, EngineStart(restart, state.time_step, 0, top, first=True))
 
@@ -288,11 +290,15 @@ def make_settlement_rows(run: Run, window: Window, healing: int) -> list[dict[st
     """One row of ``settlement.csv`` for each cycle of a window."""
     steps = run.scene.steps_per_cycle
     errors = window.piston.force_error(steps)
-    deflections = window.piston.elastic_deflection(steps)
+    deflections, stiffness = (
+        window.piston.elastic_deflection(steps), window.piston.stiffness(steps)
+    )  # fmt: skip
+    whole = 2 ** len(run.scene.sample.symmetry)  # of a quarter, say, that the scene computes
     rows = []
     for c in range(1, len(window) + 1):
         row = _make_row(run, window.state(c), "healing" if c <= healing else "computed")
         row["elastic_deflection"] = float(deflections[c - 1])
+        row["stiffness"] = whole * float(stiffness[c - 1])
         row["force_error"] = float(errors[c - 1])
         rows.append(row)
     return rows
@@ -306,6 +312,7 @@ def _make_row(run: Run, state: State, kind: str) -> dict[str, Any]:
     inertia = 0.4 * state.mass * state.radius**2
     return {
         "cycle": state.cycle,
+        "loaded_body": run.loaded_start - state.piston_height,
         "settlement": preparation.notes["mean_height"] - float(state.position[:, 2].mean()),
         "kind": kind,
         "coordination_number": bed.coordination_number,
@@ -338,7 +345,8 @@ def _finish(run: Run, folder: Path, outcome: Outcome) -> Path:
     if outcome.rows:
         row = outcome.rows[-1]
         run.progress.print_line(
-            f"{folder.name}: cycle {row['cycle']}, settlement {1e6 * row['settlement']:.2f} um"
+            f"{folder.name}: cycle {row['cycle']}, settlement of the loaded body "
+            f"{1e6 * row['loaded_body']:.2f} um, of the mean grain {1e6 * row['settlement']:.2f} um"
         )
     return place
 
@@ -351,13 +359,13 @@ def _watch(run: Run, bed: Bed, folder: Path) -> Callable[[], None]:
         windows = (o for o in outcomes if o.stage == "window")
         run.computed_before = sum(o.last_cycle - o.first_cycle for o in windows)
     computed = run.computed_before + run.computed_here
-    settlement = next((o.rows[-1]["settlement"] for o in reversed(outcomes) if o.rows), None)
+    sunk = [run.loaded_start - o.rows[-1]["piston_height"] for o in outcomes if o.rows]
 
     def watch() -> None:
         here = run.engine.cycles_done(run.scene, bed.start, folder)
         run.progress.show_cycles(
             done=bed.cycle + here, total=procedure.total_cycles, computed=computed + here,
-            settlement=settlement, computed_here=run.computed_here + here,
+            settlement=sunk[-1] if sunk else None, computed_here=run.computed_here + here,
             to_compute=count_cycles_to_compute(run, bed.cycle + here),
         )  # fmt: skip
 

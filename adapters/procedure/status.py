@@ -33,12 +33,20 @@ class Status:
     cycles_jumped: int
     jumps: int
     failed_jumps: int
-    settlement_m: float | None
+    loaded_body_m: float | None
+    """Permanent settlement of the loaded body since the preparation, at the load's trough."""
+    stiffness_n_per_m: float | None
+    """Secant stiffness under the whole loaded body in the last cycles computed."""
+    elastic_deflection_m: float | None
+    """Rise of the loaded body on unloading, in the same cycles."""
+    mean_grain_m: float | None
+    """Settlement of the mean grain since the preparation."""
     speed_up_so_far: float | None
     """CPU time of the full run beside it over its own, as in the report; None without one."""
     cpu_s: float  # CPU time of all finished stages, preparation included [s]
     band_m: tuple[float, float] | None
-    """Of a run with a tolerance: a full run would be between them with probability 0.9."""
+    """Of a run with a tolerance: the mean grain of a full run would be between them with
+    probability 0.9."""
     control_cycle: int | None  # cycles the full run beside it has done; None without one
     damaged: str
     """Stages, which count for nothing then, and records that are not as the run left them."""
@@ -77,7 +85,10 @@ def judge_progress(record: Record) -> Status:
         cycles_jumped=cycle - computed,
         jumps=len(record.run.jumps),
         failed_jumps=len(record.run.failed_jumps),
-        settlement_m=float(history.settlement[-1]) if cycle else None,
+        loaded_body_m=float(history.loaded_body[-1]) if cycle else None,
+        stiffness_n_per_m=_read_late(history, "stiffness"),
+        elastic_deflection_m=_read_late(history, "elastic_deflection"),
+        mean_grain_m=float(history.settlement[-1]) if cycle else None,
         speed_up_so_far=float(ratio) if isfinite(ratio) else None,
         cpu_s=sum(sum_cost(outcome.cost) for outcome in record.run.outcomes),
         band_m=None if band is None else (band.low, band.high),
@@ -92,14 +103,27 @@ def describe_result(record: Record) -> list[str]:
     history = record.run.history
     if not len(history.cycle):
         return []
-    cycle, settled = int(history.cycle[-1]), float(history.settlement[-1])
+    cycle, sunk = int(history.cycle[-1]), float(history.loaded_body[-1])
     computed = history.count_computed(cycle)
     how = "all of them" if computed == cycle else f"{computed} of them"
-    said = [f"The bed settled {_format_millimetres(settled)} in {cycle} cycles, {how} computed."]
+    said = [
+        f"The loaded body settled {_format_millimetres(sunk)} in {cycle} cycles, {how} computed; "
+        f"the mean grain {_format_millimetres(float(history.settlement[-1]))}."
+    ]
+    deflection, stiffness = (
+        history.late_mean(name, cycle) for name in ("elastic_deflection", "stiffness")
+    )
+    if isfinite(deflection) and isfinite(stiffness):
+        said.append(
+            f"Under the load it gives way by {_format_millimetres(deflection)}, a stiffness of "
+            f"{1e-6 * stiffness:#.3g} kN/mm."
+        )
     band = estimate_band_of_run(record.run)
     if band is not None:
         ends = f"{_format_millimetres(band.low)} to {_format_millimetres(band.high)}"
-        said.append(f"With probability {BAND_PROBABILITY:g} a full run settles {ends}.")
+        said.append(
+            f"With probability {BAND_PROBABILITY:g} the mean grain of a full run settles {ends}."
+        )
     at = find_comparable_cycle(record)
     if record.control is not None and at and record.run.jumps:
         first = list_jumped_spans(record.run.outcomes)[0][0]
@@ -109,22 +133,33 @@ def describe_result(record: Record) -> list[str]:
 
 def compare_with_full(own: History, full: History, cycle: int, first: int = 0) -> str:
     """The sentence on the full run beside a run with jumps, at the last cycle that both have; the
-    error is that of what is gained since cycle ``first``, before the first jump."""
+    errors are those of what is gained since cycle ``first``, before the first jump."""
     mine, truth = own.row(cycle), full.row(cycle)
-    settled, of_full = float(own.settlement[mine]), float(full.settlement[truth])
-    error = 100 * full.gain_error(settled, first, cycle)
-    said = f"The full run beside it settled {_format_millimetres(of_full)}"
+    settled, of_full = float(own.loaded_body[mine]), float(full.loaded_body[truth])
+    said = f"In the full run beside it the loaded body settled {_format_millimetres(of_full)}"
     if cycle != own.cycle[-1]:
-        said += f" in {cycle} cycles, this one {_format_millimetres(settled)}"
-    if isfinite(error):
-        off = f"{abs(error):.0f} % {'short' if error < 0 else 'over'}"
-        said += f": the jumps are {off if abs(error) >= 0.5 else 'within 0.5 %'}"
-        said += f" of the gain since cycle {first}" if first else ""
+        said += f" in {cycle} cycles, in this one {_format_millimetres(settled)}"
+    errors = [
+        100 * full.gain_error(float(getattr(own, of)[mine]), first, cycle, of)
+        for of in ("loaded_body", "settlement")
+    ]
+    if all(map(isfinite, errors)):
+        off, of_grains = (
+            f"{abs(error):.0f} % {'short' if error < 0 else 'over'}"
+            if abs(error) >= 0.5 else "within 0.5 %" for error in errors
+        )  # fmt: skip
+        since = f" of the gain since cycle {first}" if first else ""
+        said += f": the jumps are {off}{since} (mean grain {of_grains})"
     spent, of_full_s = float(own.cpu_s[mine]), float(full.cpu_s[truth])
     if min(spent, of_full_s) > 0:
         ratio = max(of_full_s / spent, spent / of_full_s)
         said += f", at {ratio:.1f} times {'less' if spent <= of_full_s else 'more'} computing"
     return said + "."
+
+
+def _read_late(history: History, name: str) -> float | None:
+    value = history.late_mean(name, int(history.cycle[-1])) if len(history.cycle) else nan
+    return value if isfinite(value) else None
 
 
 def _format_millimetres(length: float) -> str:

@@ -42,8 +42,12 @@ class Comparison:
 
     name: str
     computed: int  # load cycles the engine computed for it
-    settlement: float  # [m]
-    settlement_error: float  # over what the full run gained since the state before the first jump
+    loaded_body: float  # permanent settlement of the loaded body [m]
+    loaded_body_error: float  # over what the full run gained since the state before the first jump
+    settlement: float  # that of the mean grain [m]
+    settlement_error: float  # likewise
+    stiffness: float = nan  # secant, of the last `AVERAGED` cycles [N/m]
+    stiffness_error: float = nan
     coordination_number: float = nan
     """Mean of the last `AVERAGED` cycles, as the elastic deflection."""
     coordination_number_error: float = nan
@@ -70,10 +74,11 @@ def compare_runs(
     the first of them.
     """
     mine, truth = own.row(own_cycle), full.row(full_cycle)
-    coordination, deflection = (
+    coordination, deflection, stiffness = (
         (own.late_mean(column, own_cycle), full.late_mean(column, full_cycle))
-        for column in ("coordination_number", "elastic_deflection")
+        for column in ("coordination_number", "elastic_deflection", "stiffness")
     )
+    sunk, settled = float(own.loaded_body[mine]), float(own.settlement[mine])
     cost, full_cost = float(own.cpu_s[mine]), float(full.cpu_s[truth])
     displacement = coordinates = nan
     if beds is not None:
@@ -85,8 +90,12 @@ def compare_runs(
     return Comparison(
         name=name,
         computed=own.count_computed(own_cycle),
-        settlement=float(own.settlement[mine]),
-        settlement_error=full.gain_error(float(own.settlement[mine]), before, full_cycle),
+        loaded_body=sunk,
+        loaded_body_error=full.gain_error(sunk, before, full_cycle, "loaded_body"),
+        settlement=settled,
+        settlement_error=full.gain_error(settled, before, full_cycle),
+        stiffness=stiffness[0],
+        stiffness_error=find_relative_error(*stiffness),
         coordination_number=coordination[0],
         coordination_number_error=find_relative_error(*coordination),
         elastic_deflection=deflection[0],
@@ -99,17 +108,19 @@ def compare_runs(
     )
 
 
-def extrapolate_curve(full: History, law: Law, first: int, last: int, cycle: int) -> float:
-    """Settlement at ``cycle`` [m] by the law fitted to that of cycles ``first`` to ``last``.
+def extrapolate_curve(
+    full: History, law: Law, first: int, last: int, cycle: int, of: str = "settlement"
+) -> float:
+    """Settlement ``of`` a column at ``cycle`` [m] by the law fitted from ``first`` to ``last``.
 
     No bed is relaxed or resubmitted; nan where the law needs more cycles.
     """
     rows = (full.cycle >= first) & (full.cycle <= last)
     if rows.sum() <= law.minimum_cycles:
         return nan
-    parameters = law.fit(full.cycle[rows].astype(float), full.settlement[rows])
+    parameters = law.fit(full.cycle[rows].astype(float), getattr(full, of)[rows])
     on = float(law.increment(parameters, float(last), float(cycle)))
-    return float(full.settlement[full.row(last)]) + on
+    return float(getattr(full, of)[full.row(last)]) + on
 
 
 @dataclass(frozen=True)
@@ -123,8 +134,10 @@ class JumpFigures:
     stage: str
     first_cycle: int
     last_cycle: int
-    estimated: float  # settlement over the jump by the law
-    truth: float  # settlement of the control over the same cycles
+    loaded_body: float  # lowering of the loaded body over the jump
+    loaded_body_truth: float  # that of the control over the same cycles
+    estimated: float  # settlement of the mean grain over the jump by the law
+    truth: float  # that of the control over the same cycles
     law_error: float  # ``estimated`` less ``truth``
     relaxation_change: float  # settlement that relaxation adds
     healing_error: float  # settlement of the healing cycles less that of the control's same cycles
@@ -153,11 +166,13 @@ def measure_jump(stage: str, jump: Outcome, own: History, full: History | None) 
     for cycle, kind in zip(own.cycle, own.kind, strict=True):
         if kind == "healing" and cycle == healed + 1:
             healed = int(cycle)
-    truth = healing = nan
+    truth = healing = sunk = nan
     if full is not None:
+        sunk = full.gain(jump.first_cycle, jump.last_cycle, "loaded_body")
         truth = full.gain(jump.first_cycle, jump.last_cycle)
         healing = own.gain(jump.last_cycle, healed) - full.gain(jump.last_cycle, healed)
     return JumpFigures(
-        stage, jump.first_cycle, jump.last_cycle, estimated, truth, estimated - truth, change,
-        healing, coordination, height,
+        stage, jump.first_cycle, jump.last_cycle,
+        own.gain(jump.first_cycle, jump.last_cycle, "loaded_body"), sunk,
+        estimated, truth, estimated - truth, change, healing, coordination, height,
     )  # fmt: skip

@@ -26,7 +26,7 @@ def make_panels(title: str) -> tuple[Figure, Axes, Axes]:
 
     figure = Figure(figsize=(7.2, 3.8))
     linear, logarithmic = figure.subplots(1, 2, sharey=True)
-    linear.set(ylabel="mean settlement of the grains (µm)", xlabel="load cycles")
+    linear.set(ylabel="settlement of the loaded body (µm)", xlabel="load cycles")
     linear.invert_yaxis()
     logarithmic.set(xscale="log", xlabel="load cycles (logarithmic)")
     logarithmic.xaxis.set_major_formatter("{x:g}")
@@ -45,7 +45,7 @@ def add_legend(figure: Figure, columns: int) -> None:
 def draw_settlement(
     run: History, control: History | None, spans: Sequence[tuple[int, int]], title: str
 ) -> Figure:
-    """Settlement of a run, its jumped ``spans`` and the full run beside it."""
+    """Settlement of the loaded body of a run, its jumped ``spans`` and the full run beside it."""
     figure, *panels = make_panels(title)
     for panel in panels:
         draw_curves(panel, run, control, spans)
@@ -59,7 +59,7 @@ def draw_curves(
     for first, last in spans:
         panel.axvspan(first, last, color=SPAN, lw=0, zorder=0)
     if control is not None:
-        full = 1e6 * control.settlement
+        full = 1e6 * control.loaded_body
         panel.plot(control.cycle, full, color=CONTROL, lw=1.1, label="full run (control)")
     if control is not None and spans:
         still = 1e6 * cut_out_jumps(run, control, spans)
@@ -68,7 +68,7 @@ def draw_curves(
     for span in spans:
         ends = np.isin(run.cycle, span)
         if ends.sum() == 2:
-            jumped = 1e6 * run.settlement[ends]
+            jumped = 1e6 * run.loaded_body[ends]
             panel.plot(run.cycle[ends], jumped, "--", color=COMPUTED, lw=1.1, label=label)
             label = None
     kinds = np.array(run.kind)
@@ -76,12 +76,12 @@ def draw_curves(
     for kind, colour in (("computed", COMPUTED), ("healing", HEALING)):
         if (kinds == kind).any():
             # A line for the eye through dots; a gap wherever another kind of cycle lies between.
-            shown = np.where(kinds == kind, 1e6 * run.settlement, np.nan)
+            shown = np.where(kinds == kind, 1e6 * run.loaded_body, np.nan)
             name = f"{kind} cycles"
             panel.plot(run.cycle, shown, ".-", ms=size, color=colour, label=name, lw=1.1)
 
 
 def cut_out_jumps(run: History, control: History, spans: Sequence[tuple[int, int]]) -> FloatArray:
-    """Settlement of the full run with the jumped cycles cut out, at the rows of ``run``."""
+    """That of the full run with the jumped cycles cut out, at the rows of ``run``."""
     jumped = [sum(last - first for first, last in spans if last <= c) for c in run.cycle]
-    return np.interp(run.cycle - np.array(jumped), control.cycle, control.settlement, right=np.nan)
+    return np.interp(run.cycle - np.array(jumped), control.cycle, control.loaded_body, right=np.nan)

@@ -17,7 +17,8 @@ from trackbed.report import (
 )
 
 HEADER = (
-    "cycles jumped", "settlement by the law", "full run, same cycles", "law", "relaxation",
+    "cycles jumped", "loaded body", "full run's, same cycles", "mean grain by the law",
+    "full run's, same cycles", "law", "relaxation",
     "healing cycles", "coordination number changed", "height changed by relaxation",
 )  # fmt: skip
 """Columns of the table of jumps."""
@@ -34,6 +35,8 @@ def describe_jumps(record: Record, numbers: Numbers) -> str:
     rows = [
         (
             f"{jump.first_cycle} → {jump.last_cycle}",
+            format_um(jump.loaded_body),
+            format_um(jump.loaded_body_truth),
             format_um(jump.estimated),
             format_um(jump.truth),
             format_um(jump.law_error, "+.1f"),
@@ -47,9 +50,10 @@ def describe_jumps(record: Record, numbers: Numbers) -> str:
     return make_section(
         "Jumps and relaxation",
         make_table(
-            "What each step of a jump adds to the error of the settlement (µm, positive: too "
-            "much). The full run is no twin of this one after the first jump: where the beds have "
-            "parted, its increment is another bed's. Bars: coordination number, walls counted, "
+            "By what a jump lowers the loaded body and the mean grain, and what each of its "
+            "steps adds to the error of the mean grain (µm, positive: too much). The full run is "
+            "no twin of this one after the first jump: where the beds have parted, its increment "
+            "is another bed's. Bars: coordination number, walls counted, "
             f"within {100 * COORDINATION_BAR:.0f} % of the state before; mean height within "
             f"{100 * HEIGHT_BAR:.0f} % of the jump's own settlement, "
             "taken for a hundredth of the gain since the first jump at least.",

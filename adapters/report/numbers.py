@@ -41,8 +41,11 @@ class Numbers:
     cycle: int  # cycles done
     total_cycles: int
     cycles_computed: int
-    settlement: float  # at ``cycle`` [m]
-    band: Band | None  # settlement of a run with a tolerance and how far it can be off
+    loaded_body: float  # permanent settlement of the loaded body at ``cycle`` [m]
+    elastic_deflection: float  # its rise on unloading in the last cycles computed [m]
+    stiffness: float  # secant stiffness under it in the same cycles [N/m]
+    mean_grain: float  # settlement of the mean grain at ``cycle`` [m]
+    band: Band | None  # of the mean grain in a run with a tolerance, and how far it can be off
     speed_up_most: float
     """Cycles done over cycles computed: a bound on the speed-up, which is one of CPU times."""
     compared_at: int  # cycle at which run and control are compared; 0 without a control
@@ -96,7 +99,10 @@ def gather_numbers(record: Record) -> Numbers:
         cycle=cycle,
         total_cycles=total,
         cycles_computed=computed,
-        settlement=float(history.settlement[-1]) if cycle else nan,
+        loaded_body=float(history.loaded_body[-1]) if cycle else nan,
+        elastic_deflection=history.late_mean("elastic_deflection", cycle),
+        stiffness=history.late_mean("stiffness", cycle),
+        mean_grain=float(history.settlement[-1]) if cycle else nan,
         band=estimate_band_of_run(run),
         speed_up_most=cycle / computed if computed else nan,
         compared_at=compared_at,
@@ -140,12 +146,17 @@ def tabulate_errors(record: Record, cycle: int) -> tuple[Comparison, ...]:
         beds = (before_jump, truth, control.position(early))
         still = compare_runs(NOTHING, full, early, full, cycle, preparation_s, beds, before)
         rows.append(still)
-        settled = extrapolate_curve(full, get_law(procedure.law), procedure.k_i, early, cycle)
-        if isfinite(settled):
+        sunk, settled = (
+            extrapolate_curve(full, get_law(procedure.law), procedure.k_i, early, cycle, of)
+            for of in ("loaded_body", "settlement")
+        )
+        if isfinite(sunk):
             rows.append(
                 Comparison(
                     FITTED,
                     early,
+                    sunk,
+                    full.gain_error(sunk, before, cycle, "loaded_body"),
                     settled,
                     full.gain_error(settled, before, cycle),
                     cpu_s=still.cpu_s,

@@ -31,6 +31,7 @@ from trackbed.report import (
     make_picture,
     make_section,
     make_table,
+    mark_number,
     save_figure,
 )
 from trackbed.run_files import write_whole
@@ -60,7 +61,7 @@ def write_figure(record: Record, numbers: Numbers) -> Path:
     spans = list_jumped_spans(record.run.outcomes)
     row, title = numbers.row(PROCEDURE), ""
     if row is not None:
-        title = f"error {100 * row.settlement_error:+.1f} % at a speed-up of {row.speed_up:.2f}"
+        title = f"error {100 * row.loaded_body_error:+.1f} % at a speed-up of {row.speed_up:.2f}"
     return save_figure(
         lambda: draw_settlement(record.run.history, full, spans, title), folder / "settlement.png"
     )
@@ -96,7 +97,10 @@ def _describe_claim(record: Record, numbers: Numbers) -> Iterator[str]:
         yield make_paragraph(f"The bed {state}; no load cycle has been computed.", "claim")
         return
     begun = (
-        f"{numbers.cycle} load cycles settle the mean grain by {format_um(numbers.settlement)} µm"
+        f"{numbers.cycle} load cycles settle the loaded body by {format_um(numbers.loaded_body)} "
+        f"µm (the mean grain by {format_um(numbers.mean_grain)} µm); it gives way by "
+        f"{format_um(numbers.elastic_deflection)} µm under the load, a stiffness of "
+        f"{format_stiffness(numbers.stiffness)} kN/mm"
     )
     if not numbers.finished:
         begun = f"Unfinished, at cycle {numbers.cycle} of {numbers.total_cycles}: {begun}"
@@ -112,11 +116,13 @@ def _describe_claim(record: Record, numbers: Numbers) -> Iterator[str]:
     else:
         at = ""
         if numbers.compared_at != numbers.cycle:
-            at = f" At cycle {numbers.compared_at} it is {format_um(row.settlement)} µm."
+            sunk = format_um(row.loaded_body)
+            at = f" At cycle {numbers.compared_at} it has settled by {sunk} µm."
         claim = (
             f"{begun}.{at} The full run, every cycle computed, gives "
-            f"{format_um(full.settlement)} µm, so the error of what is gained since the first jump "
-            f"is {format_share(row.settlement_error)}, at a speed-up of "
+            f"{format_um(full.loaded_body)} µm, so the error of what the loaded body gained since "
+            f"the first jump is {format_share(row.loaded_body_error)} (mean grain "
+            f"{format_share(row.settlement_error)}), at a speed-up of "
             f"{format_number(row.speed_up, '.2f')} ({format_number(row.cpu_s, '.1f')} s of CPU "
             f"time instead of {format_number(full.cpu_s, '.1f')} s from the start of loading; "
             f"{format_number(row.speed_up_with_preparation, '.2f')} with preparation)."
@@ -130,7 +136,7 @@ def _describe_claim(record: Record, numbers: Numbers) -> Iterator[str]:
 def _describe_settlement(numbers: Numbers, figure: Path | None) -> str:
     """The curve: the picture of the report."""
     caption = (
-        "Drop of the mean height of the grains since the preparation, at the end of each load "
+        "Permanent settlement of the loaded body since the preparation, at the end of each load "
         "cycle (load at its trough). Grey spans were jumped. "
     )
     if numbers.row(NOTHING) is not None:
@@ -149,8 +155,9 @@ def _describe_error(numbers: Numbers) -> str:
         f"time of 180 % is <i>S</i> {MINUS} 1 = 1.8."
     )
     header = (
-        f"at cycle {numbers.compared_at}", "cycles computed", "settlement (µm), error",
-        "coordination number, error", "elastic deflection (µm), error",
+        f"at cycle {numbers.compared_at}", "cycles computed", "loaded body (µm), error",
+        "stiffness (kN/mm), error", "mean grain (µm), error", "coordination number, error",
+        "elastic deflection (µm), error",
         "E<sub>r</sub> of displacements", "E<sub>r</sub> of coordinates", "CPU time (s)",
         "speed-up",
     )  # fmt: skip
@@ -158,6 +165,8 @@ def _describe_error(numbers: Numbers) -> str:
         (
             row.name,
             str(row.computed),
+            show_with_error(row, format_um(row.loaded_body), row.loaded_body_error),
+            show_with_error(row, format_stiffness(row.stiffness), row.stiffness_error),
             show_with_error(row, format_um(row.settlement), row.settlement_error),
             show_with_error(
                 row, format_number(row.coordination_number, ".3f"), row.coordination_number_error
@@ -174,7 +183,7 @@ def _describe_error(numbers: Numbers) -> str:
         "Error against speed-up",
         definition,
         make_table(
-            "Errors are signed and relative to the full run at the same cycle; of the settlement, "
+            "Errors are signed and relative to the full run at the same cycle; of a settlement, "
             "to its gain since the state before the first jump. Coordination number "
             f"(contacts with grains) and deflection are means over the last {AVERAGED} computed "
             f"cycles. “{NOTHING}” is the full run after as many cycles as this run "
@@ -201,6 +210,11 @@ LIMITS = (
     "A failed jump is charged with elapsed time, since the CPU time of an engine that was given up "
     "is not known. Work lost to stops of the run is not charged.",
 )
+
+
+def format_stiffness(value: float) -> str:
+    """A stiffness in N/m, shown in kN/mm without the unit."""
+    return mark_number(value, f"{1e-6 * value:.3g}")
 
 
 def show_with_error(row: Comparison, value: str, error: float) -> str:

@@ -107,10 +107,10 @@ def _list_cheaper_ways(rows: dict[str, Comparison]) -> Iterator[str]:
         (FITTED, "fitting the law to the full run's curve, which leaves no bed,"),
     ):
         other = rows.get(name)
-        if other is not None and abs(other.settlement_error) <= abs(run.settlement_error):
+        if other is not None and abs(other.loaded_body_error) <= abs(run.loaded_body_error):
             yield (
                 f"{how} comes at least as near to the full run "
-                f"({100 * other.settlement_error:+.1f} %) for about the same cost"
+                f"({100 * other.loaded_body_error:+.1f} %) for about the same cost"
             )
     if run.jump_displacement_error >= 1:
         yield (

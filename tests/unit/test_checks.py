@@ -179,6 +179,17 @@ def test_elastic_deflection_is_what_the_piston_comes_back_by() -> None:
     np.testing.assert_allclose(found, 70e-6, atol=1e-12)
 
 
+def test_a_spring_under_the_piston_has_its_own_stiffness() -> None:
+    """Height -F/k beside a settlement that grows: F rises by what the load asks for from its
+    trough to its peak, so the secant stiffness is k less what a half cycle's settlement takes;
+    without a deflection it is nan."""
+    phase = np.arange(1, 4 * SAMPLES + 1) / SAMPLES
+    force = 1 - np.cos(2 * np.pi * phase)
+    piston = tracked(target_force=force, height=0.01 - force / 4e4).piston
+    np.testing.assert_allclose(piston.stiffness(STEPS), 4e4, rtol=1e-9)
+    assert np.isnan(tracked(height=np.full(4 * SAMPLES, 0.01)).piston.stiffness(STEPS)).all()
+
+
 @pytest.mark.parametrize(
     ("name", "bound", "words"),
     [

@@ -52,7 +52,7 @@ def table(run: Path) -> dict[int, dict[str, float]]:
     lines = (run / "settlement.csv").read_text().splitlines()
     names = lines[0].split(",")
     rows = [dict(zip(names, line.split(","), strict=True)) for line in lines[1:]]
-    wanted = ("settlement", "coordination_number", "piston_height")
+    wanted = ("mean_grain_settlement", "coordination_number", "piston_height")
     return {int(row["cycle"]): {name: float(row[name]) for name in wanted} for row in rows}
 
 
@@ -114,7 +114,7 @@ def test_paraview_series(run: Path, tmp_path: Path) -> None:
             row = table(run)[cycle]
             assert grains["coordination"].mean() == row["coordination_number"]
             settled = -grains["displacement"][:, 2].mean()
-            assert settled == pytest.approx(row["settlement"], rel=1e-9)
+            assert settled == pytest.approx(row["mean_grain_settlement"], rel=1e-9)
 
 
 def test_meshio_reads_the_same(run: Path, tmp_path: Path) -> None:

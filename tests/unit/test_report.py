@@ -106,7 +106,7 @@ def test_page_shows_the_numbers_of_the_json(finished: Path) -> None:
     numbers, page = report_of(finished)
     for row in numbers["error_rows"][1:]:
         del row["speed_up_with_preparation"]  # the claim has this run's
-    printed = ("error_rows", "jumps", "costs", "preparation", "settlement")
+    printed = ("error_rows", "jumps", "costs", "preparation", "loaded_body", "mean_grain")
     wanted = {value for name in printed for value in numbers_in(numbers[name])}
     assert not wanted - shown(page)
     assert len(wanted) > 30
@@ -122,13 +122,16 @@ def test_status_ends_with_what_came_out(
         for name in ("this run", "full run (control)")
     )
     assert main(["status", str(finished)]) == 0
-    settled, beside = capsys.readouterr().out.splitlines()[-2:]
+    settled, under_load, beside = capsys.readouterr().out.splitlines()[-3:]
     assert settled == (
-        f"The bed settled {1e3 * numbers['settlement']:#.3g} mm in 40 cycles, "
-        f"{numbers['cycles_computed']} of them computed."
+        f"The loaded body settled {1e3 * numbers['loaded_body']:#.3g} mm in 40 cycles, "
+        f"{numbers['cycles_computed']} of them computed; "
+        f"the mean grain {1e3 * numbers['mean_grain']:#.3g} mm."
     )
-    assert beside.startswith(f"The full run beside it settled {1e3 * full['settlement']:#.3g} mm: ")
-    off = 100 * abs(run["settlement_error"])
+    assert f"{1e-6 * numbers['stiffness']:#.3g} kN/mm" in under_load
+    begun = f"the loaded body settled {1e3 * full['loaded_body']:#.3g} mm: "
+    assert begun in beside
+    off = 100 * abs(run["loaded_body_error"])
     assert ("within 0.5 %" if off < 0.5 else f"{off:.0f} % ") in beside
     assert f" {max(run['speed_up'], 1 / run['speed_up']):.1f} times " in beside
     assert main(["status", str(finished), "--json"]) == 0
@@ -200,8 +203,8 @@ def test_figure_shows_every_cycle(finished: Path) -> None:
     for panel in figure.axes:
         (left, right), (bottom, top) = panel.get_xlim(), panel.get_ylim()
         assert left <= 1 < 40 <= right < 80
-        assert top <= 1e6 * record.run.history.settlement.min()
-        assert bottom >= 1e6 * record.run.history.settlement.max()
+        assert top <= 1e6 * record.run.history.loaded_body.min()
+        assert bottom >= 1e6 * record.run.history.loaded_body.max()
 
 
 @pytest.mark.engine("chromium")

@@ -46,6 +46,21 @@ def test_unit_is_that_of_the_header(tmp_path: Path, column: str, unit: str) -> N
     assert series.keep_from(20).settlement.tolist() == [0.5, 0.75]
 
 
+def test_a_run_is_fitted_by_its_loaded_body(tmp_path: Path) -> None:
+    """Of the two settlements in a run's table the loaded body's; the other by its name."""
+    text = (
+        "cycle,loaded_body_settlement,stiffness,mean_grain_settlement,kind\n"
+        "1,4e-5,1e7,1e-5,computed\n2,8e-5,,2e-5,computed\n"
+    )
+    table = written(tmp_path / "settlement.csv", text)
+    for path in (table, tmp_path):
+        series = read_series([path])
+        assert series.settlement.tolist() == [4e-5, 8e-5]
+        assert "loaded_body_settlement" in series.columns
+    of_grains = read_series([table], columns=("cycle", "mean_grain_settlement"))
+    assert of_grains.settlement.tolist() == [1e-5, 2e-5]
+
+
 def test_only_computed_rows_are_taken(tmp_path: Path) -> None:
     """Of a run folder's table, healing and jumped cycles stay out, cells they leave empty too."""
     text = (

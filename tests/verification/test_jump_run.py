@@ -62,7 +62,7 @@ def test_to_the_end_with_its_control(tmp_path: Path) -> None:
     rows = run(tmp_path, 200, control=True)
     truth = engine_fake.SETTLEMENT * np.log(201)
     assert int(rows[-1]["cycle"]) == 200
-    assert float(rows[-1]["settlement"]) == pytest.approx(truth, rel=0.02)
+    assert float(rows[-1]["mean_grain_settlement"]) == pytest.approx(truth, rel=0.02)
     assert sum(row["kind"] != "jumped" for row in rows) < 100
     shared = Path("window_000020") / "states.npz"
     assert (tmp_path / "run" / "control" / shared).samefile(tmp_path / "run" / shared)
@@ -148,7 +148,9 @@ def test_load_step_is_taken_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert any((tmp_path / "run" / "discarded").iterdir())
     cycles = [int(row["cycle"]) for row in rows]
     assert cycles == sorted(set(cycles))
-    assert float(rows[-1]["settlement"]) == pytest.approx(float(step.law(np.array(200.0))), rel=0.1)
+    assert float(rows[-1]["mean_grain_settlement"]) == pytest.approx(
+        float(step.law(np.array(200.0))), rel=0.1
+    )
     assert "taken back" in describe_control(read_run_record(tmp_path / "run"))
 
 

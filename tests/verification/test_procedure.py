@@ -120,8 +120,8 @@ def test_no_jump_h_zero(tmp_path: Path) -> None:
     still = settle(tmp_path / "still", "procedure.h=0", control=True)
     control = read_rows(tmp_path / "still" / "control")
     assert any(name.startswith("jump") for name in stages_of(tmp_path / "still"))
-    assert float(still[-1]["settlement"]) == pytest.approx(
-        float(control[-1]["settlement"]), abs=1e-6
+    assert float(still[-1]["mean_grain_settlement"]) == pytest.approx(
+        float(control[-1]["mean_grain_settlement"]), abs=1e-6
     )
 
 
@@ -201,7 +201,7 @@ def test_what_a_bed_has_no_room_for_is_made_good_by_the_next_jump(
     assert asked == pytest.approx(SETTLEMENT * np.log(61 / 41), rel=0.02)
     assert first == asked / 2
     assert second == owed == pytest.approx(first + SETTLEMENT * np.log(101 / 86), rel=0.02)
-    end = float(rows[-1]["settlement"])
+    end = float(rows[-1]["mean_grain_settlement"])
     assert end == pytest.approx(SETTLEMENT * np.log(126), rel=0.01)
 
 
@@ -280,8 +280,14 @@ def test_a_run_and_its_control(finished: tuple[Run, Window]) -> None:
     first jump are those of the procedure."""
     run = finished[0].folder.path
     rows, control = read_rows(run), read_rows(run / "control")
-    assert float(rows[-1]["settlement"]) == pytest.approx(SETTLEMENT * np.log(1 + 100), rel=0.01)
-    assert next(float(row["settlement"]) for row in rows if row["kind"] == "jumped") > 0
+    assert float(rows[-1]["mean_grain_settlement"]) == pytest.approx(
+        SETTLEMENT * np.log(1 + 100), rel=0.01
+    )
+    assert next(float(row["mean_grain_settlement"]) for row in rows if row["kind"] == "jumped") > 0
+    start = load_window(run / "window_000000" / "states.npz").piston_start
+    for row in rows:  # the loaded body's own settlement, jumped rows too
+        sunk = start - float(row["piston_height"])
+        assert float(row["loaded_body_settlement"]) == pytest.approx(sunk, abs=1e-15)
     before = load_window(run / "window_000020" / "states.npz").piston_heights()[-1]
     after = load_window(run / "window_000060" / "states.npz").piston_start
     assert after <= before

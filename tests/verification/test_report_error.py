@@ -41,6 +41,9 @@ from adapters.report.jumps import show_with_verdict
 A = 3e-5
 """Settlement a ln(1 + N) of the hand-made full run [m]."""
 
+SINKING = 4.0
+"""What the loaded body sinks by over the settlement of the mean grain."""
+
 CYCLE_S = 4.0
 """Its CPU time a cycle [s]."""
 
@@ -57,10 +60,12 @@ def row(cycle: int, kind: str = "computed", **columns: float) -> dict[str, Any]:
         "coordination_number": 4.0,
         "relative_density": 0.56,
         "elastic_deflection": 1e-5,
+        "stiffness": 4e7,
         "force_error": 0.01,
         "maximum_overlap": 1e-7,
     }
-    return {"cycle": cycle, "kind": kind} | values | columns
+    values |= {"cycle": cycle, "kind": kind} | columns
+    return {"loaded_body": SINKING * values["settlement"]} | values
 
 
 def window(first: int, last: int, healing: int = 0, **columns: float) -> Outcome:
@@ -160,12 +165,14 @@ def test_comparison_in_closed_form() -> None:
         [
             *PROCEDURE[:-1],
             window(70, 100, 5, settlement=1.02 * settled(100), coordination_number=3.8,
-                   elastic_deflection=1.5e-5),
+                   elastic_deflection=1.5e-5, stiffness=3e7, loaded_body=3.8 * settled(100)),
         ]
     )  # fmt: skip
     row_ = compare_runs("x", own, 100, full_run(), 100, preparation_s=1000.0)
     assert row_.computed == 80
+    assert row_.loaded_body_error == pytest.approx(-0.05)
     assert row_.settlement_error == pytest.approx(0.02)
+    assert row_.stiffness_error == pytest.approx(-0.25)
     assert row_.coordination_number_error == pytest.approx(-0.05)
     assert row_.elastic_deflection_error == pytest.approx(0.5)
     assert row_.speed_up == pytest.approx(400 / 323)
@@ -177,15 +184,28 @@ def test_comparison_in_closed_form() -> None:
 def test_errors_know_no_zero(zero: float) -> None:
     """Wherever the piston came to rest: 2 % too much of what is gained since cycle 50 is 2 %."""
     own, full = (
-        replace(one, settlement=one.settlement + zero)
+        replace(one, settlement=one.settlement + zero, loaded_body=one.loaded_body - zero)
         for one in (make_history(PROCEDURE), full_run())
     )
     own.settlement[-1] += 0.02 * (settled(100) - settled(50))
+    own.loaded_body[-1] -= 0.03 * SINKING * (settled(100) - settled(50))
     row_ = compare_runs("x", own, 100, full, 100, 0.0, before=50)
     assert row_.settlement_error == pytest.approx(0.02)
+    assert row_.loaded_body_error == pytest.approx(-0.03)
     assert isnan(compare_runs("x", own, 100, full, 100, 0.0, before=100).settlement_error)
     said = compare_with_full(own, full, 100, 50)
-    assert "2 % over of the gain since cycle 50" in said
+    assert "3 % short of the gain since cycle 50 (mean grain 2 % over)" in said
+
+
+def test_stages_of_older_runs_know_the_loaded_body_by_its_heights() -> None:
+    """Rows without its settlement, as version 0.2 wrote them: it counts from the first cycle."""
+    old = window(0, 3)
+    for one, height in zip(old.rows, (0.03, 0.0299, 0.0297), strict=True):
+        del one["loaded_body"]
+        one["piston_height"] = height
+    history = make_history([old])
+    np.testing.assert_allclose(history.loaded_body, [0.0, 1e-4, 3e-4], atol=1e-15)
+    assert history.gain(2, 3, "loaded_body") == pytest.approx(2e-4)
 
 
 def test_a_jump_that_settles_nothing_divides_by_no_zero() -> None:
@@ -313,12 +333,15 @@ def test_a_sentence_compares_run_and_control() -> None:
     full = full_run()
     short = make_history([*PROCEDURE[:4], window(70, 100, settlement=0.87 * settled(100))])
     for own, of_full, cycle, said in (
-        (short, full, 100, "0.138 mm: the jumps are 13 % short, at 1.2 times less computing."),
-        (short, full, 50, "0.118 mm in 50 cycles, this one 0.118 mm: the jumps are within 0.5 %, "
-         "at 1.0 times less computing."),
-        (full, short, 100, "0.120 mm: the jumps are 15 % over, at 1.2 times more computing."),
+        (short, full, 100, "0.554 mm: the jumps are 13 % short (mean grain 13 % short), "
+         "at 1.2 times less computing."),
+        (short, full, 50, "0.472 mm in 50 cycles, in this one 0.472 mm: the jumps are within "
+         "0.5 % (mean grain within 0.5 %), at 1.0 times less computing."),
+        (full, short, 100, "0.482 mm: the jumps are 15 % over (mean grain 15 % over), "
+         "at 1.2 times more computing."),
     ):  # fmt: skip
-        assert compare_with_full(own, of_full, cycle) == f"The full run beside it settled {said}"
+        begun = "In the full run beside it the loaded body settled "
+        assert compare_with_full(own, of_full, cycle) == begun + said
 
 
 def folder_of(path: Path, outcomes: tuple[Outcome, ...]) -> RunFolder:

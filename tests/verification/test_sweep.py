@@ -103,17 +103,18 @@ def test_tables_and_picture(
     curves = table_read(into / "settlement.parquet").to_pydict()
     band = table_read(into / "band.parquet").to_pydict()
     for frequency, cycle, mean in zip(
-        band["loading.frequency"], band["cycle"], band["mean_m"], strict=True
+        band["loading.frequency"], band["cycle"], band["loaded_body_m"], strict=True
     ):
         own = [
             s for f, c, s in zip(
-                curves["loading.frequency"], curves["cycle"], curves["settlement"], strict=True
+                curves["loading.frequency"], curves["cycle"], curves["loaded_body_settlement"],
+                strict=True
             ) if (f, c) == (frequency, cycle)
         ]  # fmt: skip
         assert mean == pytest.approx(np.mean(own), rel=1e-12)
     first = into / shown["members"][0]["run_folder"]
-    assert curves["settlement"][:9] == [
-        row["settlement"] for outcome in RunFolder(first).outcomes() for row in outcome.rows
+    assert curves["loaded_body_settlement"][:9] == [
+        row["loaded_body"] for outcome in RunFolder(first).outcomes() for row in outcome.rows
     ]
 
     code, shown, said = sweep(capsys, scene, *FREQUENCIES, "--seeds", 3, "--into", into)

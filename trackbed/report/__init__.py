@@ -15,10 +15,11 @@ from trackbed.report.page import (
     make_picture,
     make_section,
     make_table,
+    mark_number,
 )
 
 __all__ = [
     "MINUS", "STYLE", "TIMES", "encode_figure", "format_number", "format_share", "format_um",
     "format_verdict", "make_folded", "make_list", "make_page", "make_paragraph", "make_picture",
-    "make_section", "make_table", "save_figure",
+    "make_section", "make_table", "mark_number", "save_figure",
 ]  # fmt: skip

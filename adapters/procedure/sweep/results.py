@@ -1,4 +1,4 @@
-"""What a sweep leaves for other tools: tables as CSV and Parquet, mean settlement with its band.
+"""What a sweep leaves for other tools: tables as CSV and Parquet, the loaded body with its band.
 
 ================ =====================================================================
 ``members``      a row for each member: settings, state, settlement, cost, its error
@@ -30,6 +30,8 @@ from trackbed.run_files import replace_file
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+SETTLEMENT = "loaded_body_settlement"
+"""The column whose band is estimated."""
 CONFIDENCE = 0.95
 """Probability that a band holds the mean, for seeds whose settlements are normal."""
 SAMPLE_FIGURES = ("coordination_number", "relative_density")
@@ -45,7 +47,7 @@ class Band:
     seeds: int  # finished members
     asked: int  # members in all
     cycle: FloatArray  # load cycles, shape (c,)
-    mean: FloatArray  # mean settlement [m], shape (c,)
+    mean: FloatArray  # of the loaded body's settlement [m], shape (c,)
     half: FloatArray  # half the width of the confidence band [m], shape (c,); nan for a single seed
 
     @property
@@ -77,9 +79,10 @@ def convert_settings(member: Member) -> dict[str, Any]:
 
 
 def read_settlement_rows(sweep: Sweep, member: Member) -> list[dict[str, Any]]:
-    """Rows of ``settlement.csv`` of a member, by the names in `COLUMNS`."""
+    """Rows of ``settlement.csv`` of a member, by the names of its columns."""
     outcomes = RunFolder(sweep.run_folder(member)).outcomes()
-    return [row for outcome in outcomes for row in outcome.rows]
+    rows = (row for outcome in outcomes for row in outcome.rows)
+    return [{name: row.get(key) for name, key in COLUMNS.items()} for row in rows]
 
 
 def estimate_bands(sweep: Sweep, finished: set[str]) -> list[Band]:
@@ -88,7 +91,7 @@ def estimate_bands(sweep: Sweep, finished: set[str]) -> list[Band]:
     for group, members in sweep.groups().items():
         curves = [
             {
-                int(row["cycle"]): float(row["settlement"])
+                int(row["cycle"]): float(row[SETTLEMENT])
                 for row in read_settlement_rows(sweep, member)
             }
             for member in members
@@ -113,14 +116,14 @@ def write_results(sweep: Sweep, results: Sequence[Result]) -> tuple[list[Band], 
     for member in sweep.members:
         key = {"member": member.name, **convert_settings(member), SEED: member.seed}
         rows = read_settlement_rows(sweep, member)
-        curve_rows += [key | {name: row.get(name) for name in COLUMNS} for row in rows]
+        curve_rows += [key | row for row in rows]
         figures = {name: rows[-1].get(name) if rows else None for name in SAMPLE_FIGURES}
         result = vars(by_name[member.name]).items()
         result_row = {name: value for name, value in result if name not in ("member", "seed")}
         member_rows.append(key | result_row | figures)
     band_rows = [
         {
-            **band.settings, "cycle": int(cycle), "seeds": band.seeds, "mean_m": float(mean),
+            **band.settings, "cycle": int(cycle), "seeds": band.seeds, "loaded_body_m": float(mean),
             "low_m": _clean_number(mean - half), "high_m": _clean_number(mean + half),
         }
         for band in bands

@@ -38,7 +38,9 @@ class Result:
     sentence: str  # what it said of its error
     cycle: int  # load cycles done
     cycles_computed: int
-    settlement_m: float | None
+    loaded_body_m: float | None  # permanent settlement of the loaded body
+    stiffness_n_per_m: float | None
+    mean_grain_m: float | None
     speed_up: float | None  # cycles done over cycles computed
     cpu_s: float  # CPU time of its finished stages [s]
     run_folder: str
@@ -71,7 +73,8 @@ def find_result(sweep: Sweep, member: Member, ended: Ended | None) -> Result:
     return Result(
         member=member.name, seed=member.seed, state=state, exit_code=exit_code, sentence=sentence,
         cycle=here.cycle if here else 0, cycles_computed=here.cycles_computed if here else 0,
-        settlement_m=here.settlement_m if here else None,
+        **{name: getattr(here, name, None)
+           for name in ("loaded_body_m", "stiffness_n_per_m", "mean_grain_m")},
         speed_up=here.speed_up_so_far if here else None, cpu_s=here.cpu_s if here else 0.0,
         run_folder=str(folder.relative_to(sweep.folder)),
     )  # fmt: skip
@@ -178,8 +181,8 @@ def _find_end(future: Any) -> Ended:
 
 def sum_up_result(result: Result) -> str:
     """A member's end in one line."""
-    if result.state == "finished" and result.settlement_m is not None:
-        return f"{result.member}: settlement {1e6 * result.settlement_m:.2f} um"
+    if result.state == "finished" and result.loaded_body_m is not None:
+        return f"{result.member}: the loaded body settles {1e3 * result.loaded_body_m:.4g} mm"
     first = result.sentence.partition("\n")[0]
     return f"{result.member} {result.state}, exit code {result.exit_code}: {first}"
 
