@@ -6,11 +6,20 @@ from adapters.jumps.control import JUMP, Control, Decision, Settings, decide, jo
 from adapters.jumps.forecast import fit_forecast
 from adapters.jumps.rates import Stretch, find_rates
 from adapters.jumps.schedule import schedule_jumps
-from adapters.jumps.slopes import Jumped, Landing, estimate_slopes, find_asked_gain, remove_moves
+from adapters.jumps.slopes import (
+    LOADED_BODY,
+    SLOPES,
+    Jumped,
+    Landing,
+    SlopeNumbers,
+    estimate_slopes,
+    find_asked_gain,
+    remove_moves,
+)
 
 __all__ = [
-    "BAND_PROBABILITY", "JUMP", "Band", "Control", "Decision", "Jumped", "Landing", "Settings",
-    "Stretch", "accept", "decide", "estimate_band", "estimate_slopes", "find_asked_gain",
-    "find_rates", "fit_forecast", "join_stretch", "judge", "observe", "reject", "remove_moves",
-    "schedule_jumps",
+    "BAND_PROBABILITY", "JUMP", "LOADED_BODY", "SLOPES", "Band", "Control", "Decision", "Jumped",
+    "Landing", "Settings", "SlopeNumbers", "Stretch", "accept", "decide", "estimate_band",
+    "estimate_slopes", "find_asked_gain", "find_rates", "fit_forecast", "join_stretch", "judge",
+    "observe", "reject", "remove_moves", "schedule_jumps",
 ]  # fmt: skip

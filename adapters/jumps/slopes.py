@@ -39,6 +39,10 @@ class SlopeNumbers:
 
 
 SLOPES = SlopeNumbers()
+"""Of the mean grain,"""
+LOADED_BODY = SlopeNumbers(drift=2.0, reseating=0.01)
+"""and of the loaded body: its slope may grow by its mean and more within a unit of ln N, and its
+first cycle behind a jump shows no reseating."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +63,7 @@ class Slopes:
     system: FloatArray
     """Kriging's matrix over the walk's variance in a unit of ln N, shape (b + 1, b + 1)."""
     walk: float = 1.0  # that variance [m^2]
+    reseating: float = SLOPES.reseating  # standard deviation of kappa before any cycle [-]
 
     def at(self, places: FloatArray) -> FloatArray:
         """Estimate of a [m] at places (p,) of ln N, not below 0: no bed rises for long."""
@@ -70,15 +75,17 @@ class Slopes:
     def kappa(self) -> tuple[float, float]:
         """Estimate of kappa and its standard error; below 0 too, or noise would slow every bed."""
         if not self.reseated.any():
-            return 0.0, SLOPES.reseating
-        known = np.append(SLOPES.reseating**2 / self.walk * self.reseated, 0.0)
+            return 0.0, self.reseating
+        known = np.append(self.reseating**2 / self.walk * self.reseated, 0.0)
         weights = np.linalg.solve(self.system, known)[:-1]
         explained = float(weights @ self.reseated)  # share of the prior variance
-        error = SLOPES.reseating * sqrt(min(max(1 - explained, 0.0), 1.0))
+        error = self.reseating * sqrt(min(max(1 - explained, 0.0), 1.0))
         return float(self.slope @ weights), error
 
 
-def estimate_slopes(stretches: Sequence[Stretch], landings: Sequence[Landing] = ()) -> Slopes:
+def estimate_slopes(
+    stretches: Sequence[Stretch], landings: Sequence[Landing] = (), numbers: SlopeNumbers = SLOPES
+) -> Slopes:
     """Blocks of ``stretches`` with their covariance: walk, noise, and kappa behind ``landings``."""
     pieces = [piece for one in stretches for piece in cut_slope_blocks(one, landings)]
     blocks = [block for block, _ in pieces]
@@ -91,25 +98,24 @@ def estimate_slopes(stretches: Sequence[Stretch], landings: Sequence[Landing] = 
     kappa = 0.0
     for _ in range(2):  # the walk's scale is the mean slope without what jumps add to it
         mean = float((slope - kappa * reseated) @ span) / float(span.sum())
-        walk = (SLOPES.drift * (mean if mean > 0 else float(np.abs(slope).mean()))) ** 2 or 1.0
-        system = assemble_kriging(place, noise / walk, reseated, walk)
-        slopes = Slopes(place, slope, reseated, system, walk)
+        walk = (numbers.drift * (mean if mean > 0 else float(np.abs(slope).mean()))) ** 2 or 1.0
+        prior = numbers.reseating**2 / walk * np.outer(reseated, reseated)
+        system = assemble_kriging(place, noise / walk, prior)
+        slopes = Slopes(place, slope, reseated, system, walk, numbers.reseating)
         kappa, _ = slopes.kappa()
     return slopes
 
 
-def assemble_kriging(
-    place: FloatArray, noise: FloatArray, reseated: FloatArray, walk: float = 1.0
-) -> FloatArray:
+def assemble_kriging(place: FloatArray, noise: FloatArray, prior: FloatArray) -> FloatArray:
     """Kriging's matrix of blocks at ``place`` (b,), over the walk's variance in a unit of ln N.
 
-    ``noise`` (b,) is over that too, ``walk`` [m^2] is that.  Stationary is only the walk's change:
-    its level is free, hence the Lagrange multiplier in the last row.
+    ``noise`` (b,) and the covariance (b, b) by a ``prior`` kappa are over that too.  Stationary is
+    only the walk's change: its level is free, hence the Lagrange multiplier in the last row.
     """
     count = len(place)
     system = np.zeros((count + 1, count + 1))
     system[:count, :count] = np.diag(noise) - np.abs(place[:, None] - place) / 2
-    system[:count, :count] += SLOPES.reseating**2 / walk * np.outer(reseated, reseated)
+    system[:count, :count] += prior
     system[:count, count] = system[count, :count] = 1
     return system
 
@@ -165,8 +171,11 @@ class Jumped:
         return float(self.settlement[2] - self.settlement[1])
 
 
-def find_asked_gain(known: Sequence[Stretch], h: int, jumps: Sequence[Jumped] = ()) -> float:
-    """Settlement [m] to move the mean grain by in a jump of ``h`` cycles, 0 at least.
+def find_asked_gain(
+    known: Sequence[Stretch], h: int, jumps: Sequence[Jumped] = (), numbers: SlopeNumbers = SLOPES
+) -> float:
+    """Settlement [m] to move the mean grain, or the loaded body, by in a jump of ``h`` cycles, 0 at
+    least.
 
     Behind the last block the walk's mean does not change, so the gain is the logarithm's with that
     slope; behind a jump the walk is known on both sides of it.  ``known``: all cycles computed,
@@ -174,7 +183,7 @@ def find_asked_gain(known: Sequence[Stretch], h: int, jumps: Sequence[Jumped] = 
     them gained too much; the window behind this one will gain too much by the same share of what
     the bed is moved by.
     """
-    slopes = estimate_slopes(known, [one.landing for one in jumps])
+    slopes = estimate_slopes(known, [one.landing for one in jumps], numbers)
     last = known[-1].last_cycle
     between = np.array([(one.cycles[:2], one.cycles[1:]) for one in jumps], float)
     spans = np.append(between.reshape(-1, 2), [[last, last + h]], axis=0)

@@ -7,14 +7,12 @@ decisions on the finished stages, and finds there what it would do.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from math import nan
 from typing import Any
 
-import numpy as np
-
 from adapters.errors import EngineFailed, JumpRefused, NotConverged, NotCredible
-from adapters.files import Outcome, explain_full_disk
+from adapters.files import explain_full_disk
 from adapters.jumps import (
     Control,
     Decision,
@@ -34,6 +32,12 @@ from adapters.jumps import (
 )
 from adapters.laws.fit import Regime
 from adapters.procedure import stages
+from adapters.procedure.forecast import (
+    follow_loaded_body,
+    forecast_gains,
+    list_stretches,
+    make_stretch,
+)
 from adapters.procedure.history import sum_cost
 from adapters.procedure.record import CHECK, DECISION, make_plain
 from adapters.procedure.seating import seat_piston, warn_if_hung
@@ -88,12 +92,9 @@ def find_piston_regime(run: Run, control: Control) -> Regime | None:
     assert run.scene.loading is not None
     if run.scene.loading.area_share == 1 or not control.stretches:
         return None
-    lowered = [
-        replace(one, rows=[row | {"settlement": -row["piston_height"]} for row in one.rows])
-        for one in run.folder.outcomes()
-    ]
     sunk: tuple[Stretch, ...] = ()
-    for stretch in list_stretches(lowered, control.stretches[0].first_cycle, control.cycle):
+    body = follow_loaded_body(run.folder.outcomes())
+    for stretch in list_stretches(body, control.stretches[0].first_cycle, control.cycle):
         sunk = join_stretch(sunk, stretch)
     return find_sinking_regime(sunk, control.landings)
 
@@ -122,7 +123,8 @@ def jump_and_check(
     healing = settings.healing
     try:
         with explain_full_disk(run.folder.path):
-            moved = stages.jump(run, bed, decision.jump, decision.attempt, decision.moved)
+            gains = decision.moved, forecast_gains(run, bed, decision.jump)[1]
+            moved = stages.jump(run, bed, decision.jump, decision.attempt, gains)
             after = stages.compute(run, moved, healing + decision.window, healing)
     except (EngineFailed, NotCredible, NotConverged) as error:
         if isinstance(error, EngineFailed) and error.from_outside:
@@ -151,39 +153,6 @@ def jump_and_check(
     run.folder.write_settlement()
     run.progress.print_line(f"the jump of {decision.jump} cycles from {bed.cycle} was {why}")
     return bed, reject(control, decision, check.error, settings)
-
-
-def make_stretch(rows: list[dict[str, Any]], before: float) -> Stretch:
-    """Cycles of a table's ``rows``; ``before``: settlement at the end of the cycle before [m]."""
-    settlement = np.array([before, *(row["settlement"] for row in rows)], float)
-    return Stretch(
-        int(rows[0]["cycle"]) - 1,
-        np.diff(settlement),
-        np.array([row["coordination_number"] for row in rows], float),
-        np.array([row["elastic_deflection"] for row in rows], float),
-    )
-
-
-def list_stretches(
-    outcomes: Sequence[Outcome], begin: int, end: int, left_out: int | None = None
-) -> tuple[Stretch, ...]:
-    """Cycles computed from cycle ``begin`` to ``end``, a stretch a window.
-
-    Of its healing cycles the first ``left_out`` are left out; None: all.
-    """
-    stretches: list[Stretch] = []
-    settlement = 0.0
-    for outcome in outcomes:
-        if outcome.last_cycle > end:
-            break
-        rows = [{"settlement": settlement, "cycle": outcome.first_cycle}, *outcome.rows]
-        settlement = float(rows[-1]["settlement"])
-        healed = sum(row["kind"] != "computed" for row in outcome.rows)
-        healed = healed if left_out is None else min(healed, left_out)
-        first = max(healed, begin - outcome.first_cycle)
-        if outcome.stage == "window" and first < len(outcome.rows):
-            stretches.append(make_stretch(rows[first + 1 :], float(rows[first]["settlement"])))
-    return tuple(stretches)
 
 
 def make_refusal(run: Run, decision: Decision) -> JumpRefused:

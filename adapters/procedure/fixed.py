@@ -9,16 +9,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from adapters.errors import EngineFailed, NotConverged, NotCredible
 from adapters.files import Outcome, explain_full_disk
-from adapters.jumps import Jumped, find_asked_gain
 from adapters.procedure import stages
-from adapters.procedure.controlled import list_stretches
-from adapters.procedure.seating import SEATING, find_count_start, seat_piston, warn_if_hung
+from adapters.procedure.forecast import forecast_gains
+from adapters.procedure.seating import find_count_start, seat_piston, warn_if_hung
 from adapters.procedure.stages import Bed, Run
 
 RETRIES = 3
@@ -71,13 +69,14 @@ def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
         if not why:
             try:
                 with explain_full_disk(run.folder.path):
-                    gain = find_history_gain(run, bed, h)
-                    share = 1.0
-                    if gain is not None:
+                    by_history = p.settlement == "history" and h > 0
+                    gains = forecast_gains(run, bed, h) if by_history else None
+                    share, gain = 1.0, gains[0] if gains else 0.0
+                    if gains:
                         room = find_known_room(run.folder.outcomes(), bed.cycle)
                         share = SHARES[attempt - 1] * (min(1.0, room / gain) if gain else 1.0)
                     new = run.folder.outcome(name) is None
-                    moved = stages.jump(run, bed, h, attempt, gain, share)
+                    moved = stages.jump(run, bed, h, attempt, gains, share)
                     if new and gain and share < 1:
                         run.progress.print_line(
                             f"the jump settles the bed by {1e6 * share * gain:.3g} um where it "
@@ -123,31 +122,6 @@ def compute_on(run: Run, bed: Bed) -> Bed:
     return bed
 
 
-def find_history_gain(run: Run, bed: Bed, h: int) -> float | None:
-    """Settlement over a jump [m] by all cycles in which the bed carried the piston, but the first
-    of them; None: by the law.
-
-    Cycles count from the last in which it hung: from there on the bed takes the load for the first
-    time, and settles by ln of these, as one does that carried its piston from the rain on.
-    """
-    p = run.procedure
-    if p.settlement == "law" or h == 0:
-        return None
-    hung, outcomes = find_count_start(run, bed), run.folder.outcomes()
-    left_out = max(1, round(SEATING.first_share * p.k_i))
-    begin = hung + (min(left_out, p.carried_cycles) if hung else left_out)  # k cycles are left
-    known = [
-        replace(one, first_cycle=one.first_cycle - hung)
-        for one in list_stretches(outcomes, begin, bed.cycle, left_out=1)
-    ]
-    jumps = [
-        replace(one, cycles=one.cycles - hung)
-        for one in list_jumps(outcomes, bed.cycle)
-        if one.cycles[0] >= begin
-    ]
-    return find_asked_gain(known, h, jumps)
-
-
 def find_known_room(outcomes: Sequence[Outcome], end: int) -> float:
     """What the next jump by history may try to move the mean grain by [m]; inf: all that is asked.
 
@@ -165,16 +139,3 @@ def find_known_room(outcomes: Sequence[Outcome], end: int) -> float:
         else:
             room = ROOM_GROWTH * got if got else tried * min(filter(None, SHARES)) / 2
     return float(room)
-
-
-def list_jumps(outcomes: Sequence[Outcome], end: int) -> list[Jumped]:
-    """Jumps kept up to cycle ``end``, each with the window behind it."""
-    outcomes = [one for one in outcomes if one.last_cycle <= end]
-    found = []
-    for before, jump, behind in zip(outcomes, outcomes[1:], outcomes[2:], strict=False):
-        if jump.stage == "jump" and jump.rows:
-            rows = [one.rows[-1] for one in (before, jump, behind)]
-            cycles = np.array([row["cycle"] for row in rows], int)
-            settled = np.array([row["settlement"] for row in rows], float)
-            found.append(Jumped(cycles, settled))
-    return found

@@ -200,12 +200,13 @@ def compute(run: Run, bed: Bed, cycles: int, healing: int = 0) -> Bed:
 
 
 def jump(
-    run: Run, bed: Bed, h: int, attempt: int, gain: float | None = None, share: float = 1.0
-) -> Bed:
+    run: Run, bed: Bed, h: int, attempt: int, gains: tuple[float, float] | None = None,
+    share: float = 1.0,
+) -> Bed:  # fmt: skip
     """Estimate the bed ``h`` cycles on (eqs 16, 17), relax it (eq. 29), hand it back at rest.
 
-    ``gain``: settlement of the mean grain [m] where that is not to be the scene's law's; the bed is
-    moved by a ``share`` of what is estimated then.
+    ``gains``: settlement of the mean grain and of the loaded body [m] where that is not to be the
+    scene's law's; the bed is moved by a ``share`` of what is estimated then.
     """
     name = f"jump_{bed.cycle:06d}_{attempt}"
     folder = run.folder.path / name
@@ -215,16 +216,17 @@ def jump(
         with run.clock.time_part("parse"):
             window = load_window(run.folder.path / bed.window / "states.npz")
         before, target, piston_height = estimate(run, window, bed.healing, h)
-        if gain is None:
+        if gains is None:
             height = window.position[bed.healing :, :, 2]
             checks.check_rise(run.scene, height, (target - before.position)[:, 2])
         else:
-            target, piston_height = settle_by(gain, before, target)
+            target = settle_by(gains[0], before, target)
             target = before.position + share * (target - before.position)
-            piston_height = before.piston_height + share * (piston_height - before.piston_height)
+            if get_move(run.procedure.move).moves_piston:
+                piston_height = before.piston_height - share * gains[1]
         with run.clock.time_part("relax"):
             position, record, piston_height = find_room(
-                run.scene, before, target, piston_height, may_wait=gain is not None
+                run.scene, before, target, piston_height, may_wait=gains is not None
             )
         after = before.move_to(
             position, velocity=np.zeros_like(target), spin=np.zeros_like(target),
@@ -233,8 +235,8 @@ def jump(
         save_state(before.move_to(target), folder / "estimated.npz")
         save_state(after, folder / "relaxed.npz")
         notes = {"h": h, "attempt": attempt, "relaxation": record}
-        if gain is not None:
-            notes |= {"gain": share * gain, "asked": gain}
+        if gains is not None:
+            notes |= {"gain": share * gains[0], "asked": gains[0], "sinking": share * gains[1]}
         rows = [_make_row(run, after, "jumped")] if h else []
         cost = run.clock.end_lap()
         folder = _finish(
@@ -269,21 +271,17 @@ def estimate(run: Run, window: Window, healing: int, h: int) -> tuple[State, Flo
     return before, before.position + field_, before.piston_height + drop
 
 
-def settle_by(gain: float, before: State, target: FloatArray) -> tuple[FloatArray, float]:
-    """Estimated positions (n, 3) and piston height whose mean grain has settled by ``gain``, in m.
+def settle_by(gain: float, before: State, target: FloatArray) -> FloatArray:
+    """Estimated positions (n, 3) whose mean grain has settled by ``gain``, in m.
 
-    The rest is a uniform vertical strain, zero at the lowest grain.  The piston goes down as a
-    bed does that is strained evenly by the whole gain, and is never placed above where it is.  A
-    law of its own heights in the window is left aside as that of the grains is: in a long jump from
-    a short window its noise would press the piston into the grains by a part of a radius.
+    The rest is a uniform vertical strain, zero at the lowest grain.
     """
     rest = before.position[:, 2].mean() - target[:, 2].mean() - gain
     height = before.position[:, 2] - before.position[:, 2].min()
     mean = float(height.mean()) or 1.0
     target = target.copy()
     target[:, 2] += rest * height / mean if height.any() else rest
-    above = before.piston_height - float(before.position[:, 2].min())
-    return target, before.piston_height - max(gain, 0.0) * above / mean
+    return target
 
 
 def make_settlement_rows(run: Run, window: Window, healing: int) -> list[dict[str, Any]]:

@@ -17,8 +17,8 @@ from adapters.engines.fake import SETTLEMENT, FakeBed
 from adapters.errors import SceneError
 from adapters.files.run_folder import Outcome, RunFolder
 from adapters.jumps.rates import Stretch
-from adapters.jumps.slopes import Jumped
-from adapters.procedure import fixed as jump_fixed
+from adapters.jumps.slopes import SLOPES, Jumped, SlopeNumbers
+from adapters.procedure import forecast
 from adapters.procedure import run as procedure
 from adapters.procedure import seating as jump_seating
 from adapters.procedure.progress import Progress
@@ -224,7 +224,9 @@ def test_a_piston_that_hangs_to_the_end_has_every_cycle_computed(
     """No jump, and the closed form's settlement exactly."""
     jumps, rows, _ = settle(tmp_path / "run", monkeypatch, (1, 99), *FIXED, WAITS)
     assert not jumps
-    assert float(rows[-1]["settlement"]) == pytest.approx(SETTLEMENT * np.log(83), rel=1e-3)
+    assert float(rows[-1]["mean_grain_settlement"]) == pytest.approx(
+        SETTLEMENT * np.log(83), rel=1e-3
+    )
 
 
 def test_history_begins_where_the_bed_carries_its_piston(
@@ -236,14 +238,17 @@ def test_history_begins_where_the_bed_carries_its_piston(
     cycle it would be 1.3 times that.  Where the piston hangs again, nothing is owed for jumps
     before."""
     asked: list[tuple[int, int, list[int]]] = []
-    real = jump_fixed.find_asked_gain
+    real = forecast.find_asked_gain
 
-    def gain(known: Sequence[Stretch], h: int, jumps: Sequence[Jumped]) -> float:
-        before = [int(one.cycles[0]) for one in jumps]
-        asked.append((known[0].first_cycle, known[-1].last_cycle, before))
-        return real(known, h, jumps)
+    def gain(
+        known: Sequence[Stretch], h: int, jumps: Sequence[Jumped], numbers: SlopeNumbers
+    ) -> float:
+        if numbers is SLOPES:  # of the mean grain: the loaded body's begins there too
+            before = [int(one.cycles[0]) for one in jumps]
+            asked.append((known[0].first_cycle, known[-1].last_cycle, before))
+        return real(known, h, jumps, numbers)
 
-    monkeypatch.setattr(jump_fixed, "find_asked_gain", gain)
+    monkeypatch.setattr(forecast, "find_asked_gain", gain)
     history = (WAITS, 'procedure.settlement="history"')
     with monkeypatch.context() as late:
         taken = FakeBed(lambda n: SETTLEMENT * np.log1p(np.clip(n - 23, 0, None)))

@@ -12,17 +12,20 @@ import numpy as np
 import pytest
 
 from adapters.bed.state import FloatArray, State, load_state
+from adapters.engines import fake as engine_fake
 from adapters.engines.contract import get_engine
-from adapters.engines.fake import SETTLEMENT
+from adapters.engines.fake import SETTLEMENT, FakeBed
 from adapters.errors import NotConverged, NotCredible, UsageError
 from adapters.files.run_folder import Outcome, RunFolder
 from adapters.files.window import Window, load_window
+from adapters.jumps import Jumped
 from adapters.moves import Jump
 from adapters.procedure import fixed as jump_fixed
 from adapters.procedure import room as jump_room
 from adapters.procedure import run as procedure
 from adapters.procedure import stages
 from adapters.procedure.fixed import find_known_room
+from adapters.procedure.forecast import bound_burst
 from adapters.procedure.progress import Progress
 from adapters.procedure.stages import Run, Variant
 from adapters.scene.file import load_scene
@@ -205,6 +208,34 @@ def test_what_a_bed_has_no_room_for_is_made_good_by_the_next_jump(
     assert end == pytest.approx(SETTLEMENT * np.log(126), rel=0.01)
 
 
+@pytest.mark.parametrize("sinking", [0.0, 1e-6])
+def test_a_jump_by_history_lowers_the_loaded_body_by_its_own_cycles(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sinking: float
+) -> None:
+    """A piston that sinks by a ln(1 + N) + s N goes down over a jump by what its own cycles say,
+    not by a strain of the mean grain's gain, twice that here: with s = 0 it is a ln(61 / 41).
+    With s it sinks 20 um more, of which cycles 2 to 40 as a walk in ln N tell two thirds."""
+    monkeypatch.setattr(engine_fake, "BED", FakeBed(sinking=sinking))
+    settle(tmp_path / "run", 'procedure.settlement="history"', "procedure.h=20")
+    outcomes = RunFolder(tmp_path / "run").outcomes()
+    jump = next(one for one in outcomes if one.stage == "jump")
+    before = [one.rows[-1] for one in outcomes if one.last_cycle == jump.first_cycle][-1]
+    lowered = before["piston_height"] - jump.rows[0]["piston_height"]
+    assert jump.notes["sinking"] == pytest.approx(lowered, rel=1e-9)
+    assert jump.notes["gain"] == pytest.approx(SETTLEMENT * np.log(61 / 41), rel=0.02)
+    more = lowered - SETTLEMENT * np.log(61 / 41)
+    assert more == pytest.approx(0, abs=1e-7) if not sinking else 12e-6 < more < 20e-6
+
+
+def test_no_burst_is_extrapolated() -> None:
+    """By hand: 80 um from cycle 60 to 150, jump and window, are 87.3 um a unit of ln N; a jump from
+    150 to 300 may sink by twice that times ln 2.  Before any jump, or where it rose: no bound."""
+    jumped = Jumped(np.array([60, 125, 150]), np.array([0.0, 70e-6, 80e-6]))
+    assert bound_burst([jumped], 150, 150) == pytest.approx(160e-6 * np.log(2) / np.log(2.5))
+    assert bound_burst([], 150, 150) == np.inf
+    assert bound_burst([replace(jumped, settlement=-jumped.settlement)], 150, 150) == np.inf
+
+
 def test_room_that_jumps_found() -> None:
     """By hand, in um: all is tried until a jump fails; then twice what had room, half of the
     smallest try where nothing had; what is asked for within the room leaves it."""
@@ -241,7 +272,7 @@ def test_a_jump_of_no_settlement_is_tried_with_less_of_its_move(
             before.cycle == 40 and not np.array_equal(target, before.position)
         ),
     )
-    monkeypatch.setattr(jump_fixed, "find_history_gain", lambda *_: 0.0)
+    monkeypatch.setattr(jump_fixed, "forecast_gains", lambda *_: (0.0, 0.0))
     settle(tmp_path / "run", 'procedure.settlement="history"', "procedure.total_cycles=90")
     jump = next(one for one in RunFolder(tmp_path / "run").outcomes() if one.stage == "jump")
     assert (jump.notes["attempt"], jump.notes["gain"]) == (4, 0.0)
