@@ -53,6 +53,11 @@ def register_run(parser: argparse.ArgumentParser) -> None:
         help="change a key of the scene, such as procedure.h=10; may be repeated",
     )  # fmt: skip
     parser.add_argument(
+        "--procedure", choices=("paper", "growing", "tolerance"),
+        help="the procedure by name, in place of the scene's own: as in the paper, jumps that grow "
+        "(the default of a scene that has none), or jumps that choose themselves",
+    )  # fmt: skip
+    parser.add_argument(
         "--tolerance", type=float, metavar="T",
         help="jumps choose themselves: error of the settlement gained in a jump over the total "
         "settlement, such as 0.02; short for --set procedure.tolerance=T, instead of k and h",
@@ -88,11 +93,12 @@ def run_command(arguments: argparse.Namespace) -> int:
     """Run a scene from its start."""
     from adapters.procedure import run as procedure
 
+    named = [f"procedure.name={arguments.procedure}"] if arguments.procedure else []
     procedure.run_scene(
         arguments.scene,
         arguments.run_folder or arguments.scene.parent / "run",
         control=arguments.control,
-        overrides=list_overrides(arguments) + list_jump_overrides(arguments),
+        overrides=named + list_overrides(arguments) + list_jump_overrides(arguments),
         dry_run=arguments.dry_run,
         cycle_by_cycle=arguments.cycle_by_cycle,
     )

@@ -11,6 +11,7 @@ from pydantic import BaseModel
 
 from adapters.jumps import schedule_jumps
 from adapters.scene.checks import ALTERNATIVES, JUMP_KEYS, TOLERANCE_KEY, find_problems
+from adapters.scene.named import fill_procedure
 from adapters.scene.tables import Procedure, Scene, flatten_keys
 from trackbed.scene_files import Guide, Problem, find_model, read_scene
 
@@ -21,9 +22,10 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
     """Read and check a scene file.
 
     ``overrides`` such as ``procedure.k=10`` replace or add keys, their values in TOML (a bare word
-    is a string); an override of one of two alternative keys removes the other, and one of
-    procedure.tolerance removes k and h.  A relative path of a load series counts from the scene
-    file's folder.
+    is a string); an override of one of two alternative keys removes the other, one of
+    procedure.tolerance k and h, and one of procedure.name all of the procedure but its cycles.
+    Keys that follow from the procedure's name are put in (`adapters.scene.named`).  A relative path
+    of a load series counts from the scene file's folder.
 
     Raises `UsageError` when the file or an override can not be read, `SceneError` with all that is
     wrong: file, line, dotted key and sentence of each.
@@ -33,6 +35,8 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
     loading = data.get("loading")
     if isinstance(loading, dict) and isinstance(loading.get("series"), str):
         loading["series"] = str(text.path.parent.absolute() / loading["series"])
+    if isinstance(data.get("procedure"), dict):
+        data["procedure"] = fill_procedure(data["procedure"])
     problems = list(_expand_schedule(data))
     text.check(Scene)
     if text.problems:
@@ -45,6 +49,9 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
 
 def _drop_alternatives(data: dict[str, Any], key: str) -> None:
     """Remove what an override of ``key`` stands instead of."""
+    if key == "procedure.name":
+        kept = ("name", "total_cycles")
+        data["procedure"] = {k: v for k, v in data["procedure"].items() if k in kept}
     others = [other for pair in ALTERNATIVES if key in pair for other in pair if other != key]
     for other in (*others, *(JUMP_KEYS if key == TOLERANCE_KEY else ())):
         *tables, name = other.split(".")

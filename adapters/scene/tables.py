@@ -148,6 +148,8 @@ class Loading(Table):
 class Procedure(Table):
     """Numbers of cycles computed and jumped (Fig. 10 of the paper)."""
 
+    name: Literal["paper", "growing", "tolerance"] | None = None
+    """What the other keys follow from, where they are not given: `adapters.scene.named`."""
     k_i: Annotated[int, Field(ge=1)]  # first cycles, computed before anything is fitted
     k: Annotated[int, Field(ge=2)] | None = None  # cycles computed and fitted before each jump
     h: (
@@ -181,7 +183,7 @@ class Procedure(Table):
     @model_serializer(mode="wrap")
     def _drop_newer_defaults(self, whole: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Stored runs are older than these keys: at their defaults they are left out."""
-        newer = {"move": MOVE_DEFAULT, "tolerance": None, "settlement": "law"}
+        newer = {"name": None, "move": MOVE_DEFAULT, "tolerance": None, "settlement": "law"}
         newer |= {"seating": "any", "seating_cycles": None, "jammed": "less"}
         record: dict[str, Any] = whole(self)
         return {k: value for k, value in record.items() if k not in newer or value != newer[k]}

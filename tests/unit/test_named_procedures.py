@@ -1,0 +1,92 @@
+"""Procedures with names: what follows from a name and the number of cycles."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from adapters.engines.fake import SETTLEMENT
+from adapters.files.run_folder import RunFolder
+from adapters.procedure.outlook import plan_jumps
+from adapters.scene.file import load_scene
+from adapters.scene.named import NUMBERS, PROCEDURES, fill_procedure
+from adapters.scene.tables import Procedure
+from tests.small_bed import read_rows
+from trackbed.command import main
+from trackbed.scenes import find_scene_file
+
+COARSE = find_scene_file("karrech-coarse")
+
+
+def load(*overrides: str) -> Procedure:
+    """The procedure of the coarse scene with these overrides."""
+    found = load_scene(COARSE, ['engine.name="fake"', *overrides]).procedure
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize("name", [*PROCEDURES])
+@given(total=st.integers(4, 10**6))
+def test_a_name_and_the_cycles_are_a_whole_procedure(name: str, total: int) -> None:
+    """Nothing else need be said, whatever the number of cycles; what is given stays."""
+    filled = fill_procedure({"name": name, "total_cycles": total})
+    found = Procedure.model_validate(filled)
+    assert found.k_i < total
+    assert (found.tolerance is None) == (found.h is not None)
+    kept = fill_procedure({"name": name, "total_cycles": total, "k_i": 2, "law": "power"})
+    assert (kept["k_i"], kept["law"]) == (2, "power")
+
+
+@given(st.integers(200, 10**6))
+def test_growing_windows_end_evenly_in_ln_n(total: int) -> None:
+    """The last jump leads to the last window; ends of windows are at equal ratios of N, at most
+    1.55 but for the rounding of ends to cycles, with no jump more than that takes."""
+    found = Procedure.model_validate(fill_procedure({"total_cycles": total}))
+    jumps = plan_jumps(found)
+    ends = np.array([jumps[0][0], *(end + 5 + NUMBERS.window for _, end in jumps)])
+    assert ends[-1] == total
+    ratio = ends[1:] / ends[:-1]
+    assert ratio.max() <= NUMBERS.ratio * (1 + 1 / ends[0])
+    assert (total / ends[0]) ** (1 / max(len(jumps) - 1, 1)) > NUMBERS.ratio or len(jumps) == 1
+
+
+def test_a_scene_without_a_procedure_of_its_own_grows(tmp_path: Path) -> None:
+    """Ten thousand cycles, 240 of them computed; keys by hand are a procedure without a name."""
+    text = COARSE.read_text(encoding="utf-8")
+    begin, rest = text.split("[procedure]")
+    scene = tmp_path / "scene.toml"
+    scene.write_text(begin + "[procedure]\ntotal_cycles = 10000\n\n[engine]" +
+                     rest.split("[engine]")[1], encoding="utf-8")  # fmt: skip
+    found = load_scene(scene, ['engine.name="fake"']).procedure
+    assert found is not None
+    assert (found.name, found.settlement, found.move) == ("growing", "history", "profile")
+    skipped = sum(end - start for start, end in plan_jumps(found))
+    assert found.total_cycles - skipped == 240
+    assert load().name is None
+
+
+def test_a_name_replaces_the_keys_of_the_scene() -> None:
+    """Of the scene's own procedure only the number of cycles is left, but for what is set beside
+    the name."""
+    found = load("procedure.name=tolerance", "procedure.k_i=30")
+    assert (found.name, found.total_cycles, found.k_i) == ("tolerance", load().total_cycles, 30)
+    assert (found.h, found.k, found.tolerance) == (None, None, NUMBERS.tolerance)
+
+
+@pytest.mark.parametrize("name", [*PROCEDURES])
+def test_a_named_run_ends_at_its_last_cycle(
+    tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Against u = a ln(1 + N) to cycle 300, within 2 %; and the run says its procedure's name."""
+    run = tmp_path / "run"
+    words = ["run", str(COARSE), "--procedure", name, "--cycles", "300", "--run-folder", str(run)]
+    assert main([*words, "--set", "engine.name=fake", "--set", "sample.count=40"]) == 0
+    rows = read_rows(run)
+    truth = SETTLEMENT * np.log(301)
+    assert float(rows[-1]["mean_grain_settlement"]) == pytest.approx(truth, rel=0.02)
+    assert RunFolder(run).manifest()["scene"]["procedure"]["name"] == name
+    assert any(row["kind"] == "jumped" for row in rows)
