@@ -33,8 +33,8 @@ from adapters.jumps import (
 from adapters.laws.fit import Regime
 from adapters.procedure import stages
 from adapters.procedure.forecast import (
+    estimate_gains,
     follow_loaded_body,
-    forecast_gains,
     list_stretches,
     make_stretch,
 )
@@ -123,7 +123,7 @@ def jump_and_check(
     healing = settings.healing
     try:
         with explain_full_disk(run.folder.path):
-            gains = decision.moved, forecast_gains(run, bed, decision.jump)[1]
+            gains = decision.moved, estimate_gains(run, bed, decision.jump)[1]
             moved = stages.jump(run, bed, decision.jump, decision.attempt, gains)
             after = stages.compute(run, moved, healing + decision.window, healing)
     except (EngineFailed, NotCredible, NotConverged) as error:

@@ -15,7 +15,7 @@ import numpy as np
 from adapters.errors import EngineFailed, NotConverged, NotCredible
 from adapters.files import Outcome, explain_full_disk
 from adapters.procedure import stages
-from adapters.procedure.forecast import forecast_gains
+from adapters.procedure.forecast import estimate_gains
 from adapters.procedure.seating import find_count_start, seat_piston, warn_if_hung
 from adapters.procedure.stages import Bed, Run
 
@@ -70,7 +70,7 @@ def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
             try:
                 with explain_full_disk(run.folder.path):
                     by_history = p.settlement == "history" and h > 0
-                    gains = forecast_gains(run, bed, h) if by_history else None
+                    gains = estimate_gains(run, bed, h) if by_history else None
                     share, gain = 1.0, gains[0] if gains else 0.0
                     if gains:
                         room = find_known_room(run.folder.outcomes(), bed.cycle)

@@ -24,16 +24,16 @@ BURST = 2.0
 the window behind it [-]: a burst of few supporters at the end of a window is no rate."""
 
 
-def forecast_gains(run: Run, bed: Bed, h: int) -> tuple[float, float]:
+def estimate_gains(run: Run, bed: Bed, h: int) -> tuple[float, float]:
     """Settlement of the mean grain and of the loaded body in a jump of ``h`` cycles [m]."""
     grains = run.folder.outcomes()
     body = follow_loaded_body(grains)
-    gain = forecast_gain(run, bed, h, grains, SLOPES)
-    sinking = forecast_gain(run, bed, h, body, LOADED_BODY)
+    gain = estimate_gain(run, bed, h, grains, SLOPES)
+    sinking = estimate_gain(run, bed, h, body, LOADED_BODY)
     return gain, min(sinking, bound_burst(list_jumps(body, bed.cycle), bed.cycle, h))
 
 
-def forecast_gain(
+def estimate_gain(
     run: Run, bed: Bed, h: int, outcomes: Sequence[Outcome], numbers: SlopeNumbers
 ) -> float:
     """Settlement over a jump [m] by all cycles in which the bed carried the piston, but the first

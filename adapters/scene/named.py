@@ -43,12 +43,12 @@ class NamedNumbers:
 NUMBERS = NamedNumbers()
 
 
-def derive_paper(first: int, total: int) -> dict[str, Any]:
+def plan_paper(first: int, total: int) -> dict[str, Any]:
     """Keys of ``paper``."""
     return {"k": NUMBERS.paper_window, "h": NUMBERS.paper_jump, "law": "log", "move": "per-grain"}
 
 
-def derive_growing(first: int, total: int) -> dict[str, Any]:
+def plan_growing(first: int, total: int) -> dict[str, Any]:
     """Keys of ``growing``: the fewest jumps within `NamedNumbers.ratio`, fewer without room."""
     k, healing = NUMBERS.window, NUMBERS.healing
     wanted = ceil(log(max(total / (first + k), 1.0)) / log(NUMBERS.ratio))
@@ -62,13 +62,13 @@ def derive_growing(first: int, total: int) -> dict[str, Any]:
     return {"k": k, "h": h, "settlement": "history", "move": "profile", "seating": "waits"}
 
 
-def derive_tolerance(first: int, total: int) -> dict[str, Any]:
+def plan_tolerance(first: int, total: int) -> dict[str, Any]:
     """Keys of ``tolerance``."""
     return {"tolerance": NUMBERS.tolerance, "seating": "waits"}
 
 
 PROCEDURES: Mapping[str, Callable[[int, int], dict[str, Any]]] = {
-    "paper": derive_paper, "growing": derive_growing, "tolerance": derive_tolerance,
+    "paper": plan_paper, "growing": plan_growing, "tolerance": plan_tolerance,
 }  # fmt: skip
 
 

@@ -272,7 +272,7 @@ def test_a_jump_of_no_settlement_is_tried_with_less_of_its_move(
             before.cycle == 40 and not np.array_equal(target, before.position)
         ),
     )
-    monkeypatch.setattr(jump_fixed, "forecast_gains", lambda *_: (0.0, 0.0))
+    monkeypatch.setattr(jump_fixed, "estimate_gains", lambda *_: (0.0, 0.0))
     settle(tmp_path / "run", 'procedure.settlement="history"', "procedure.total_cycles=90")
     jump = next(one for one in RunFolder(tmp_path / "run").outcomes() if one.stage == "jump")
     assert (jump.notes["attempt"], jump.notes["gain"]) == (4, 0.0)
