@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from validation.age import list_excuses
 from validation.study import DOCS, find_record, import_part, list_studies, make_page, read_record
 
 pytestmark = pytest.mark.studies
@@ -20,5 +21,8 @@ def test_page_and_bars(name: str) -> None:
 @pytest.mark.parametrize("name", [name for name in list_studies() if name.startswith("qdem")])
 def test_every_part_is_recorded_and_no_bar_is_missed(name: str) -> None:
     rows = read_record(find_record(name))
-    assert [row["part"] for row in rows] == list(import_part(name, "run").PARTS)
+    parts = list(import_part(name, "run").PARTS)
+    measured = [row["part"] for row in rows]
+    assert measured == [part for part in parts if part in measured]
+    assert measured == parts or name in list_excuses()  # which its page repeats
     assert all(check.holds for check in import_part(name, "bars").check_bars(rows))
