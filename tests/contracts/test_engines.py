@@ -56,4 +56,4 @@ def test_tiny_run(sample: Sample) -> None:
     with (sample.run / "settlement.csv").open() as stream:
         rows = list(csv.DictReader(stream))
     assert int(rows[-1]["cycle"]) == 11
-    assert all(np.isfinite(float(row["settlement"])) for row in rows)
+    assert all(np.isfinite(float(row["mean_grain_settlement"])) for row in rows)

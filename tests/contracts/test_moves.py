@@ -163,6 +163,6 @@ def test_a_run_with_each_way(name: str, tmp_path: Path) -> None:
     scene.write_text(small_bed(k=10, h=8, total_cycles=50))
     run_scene(scene, tmp_path / "run", overrides=[f'procedure.move="{name}"'], progress=QUIET)
     rows = read_rows(tmp_path / "run")
-    settled = float(rows[-1]["settlement"]) / (SETTLEMENT * np.log(51))
+    settled = float(rows[-1]["mean_grain_settlement"]) / (SETTLEMENT * np.log(51))
     assert [row["kind"] for row in rows].count("jumped") == 2
     assert settled == pytest.approx(1.0, rel=0.03) or (not way.moves_piston and settled < 0.95)

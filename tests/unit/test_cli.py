@@ -313,16 +313,19 @@ def test_a_study_is_judged_by_its_record(
 
     folder = tmp_path / "my_study"
     folder.mkdir()
-    (folder / "__init__.py").touch()
+    (folder / "__init__.py").write_text('ROOMS = "adapters: laws"\n')
     (folder / "bars.py").write_text(
         "from validation.case import Check\ndef check_bars(rows):\n"
         "    return [Check('a', r['a'], '<= 2', r['a'] <= 2) for r in rows]\n"
     )
-    (folder / "record.jsonl").write_text('{"a": 1.0}\n{"a": 3.0}\n{"a": 9')
+    rows = '{"part": "x", "a": 1.0}\n{"part": "y", "a": 3.0}\n{"a": 9'
+    (folder / "record.jsonl").write_text(rows)
     monkeypatch.setattr(studies, "__path__", [str(tmp_path)])
     monkeypatch.setattr(study, "STUDIES", tmp_path)
     assert main(["validate", "my-study"]) == 6
-    assert "1 of 2 checks do not hold" in capsys.readouterr().err
+    told = capsys.readouterr()
+    assert "1 of 2 checks do not hold" in told.err
+    assert "my-study: older than adapters.laws: x, y" in told.out
 
 
 @pytest.mark.parametrize(
