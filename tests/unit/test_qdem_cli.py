@@ -23,6 +23,7 @@ import qdem_fem.scene as scene_room
 from qdem_fem.cli import run as cli
 from qdem_fem.files.errors import Interrupted, SceneError, StepWarning, UsageError
 from qdem_fem.files.output import read_table
+from trackbed.run_files import digest_file
 
 ROOT = Path(__file__).parents[2]
 SCENE = """\
@@ -95,7 +96,9 @@ def test_run_writes_what_it_promises(scene: Path, capsys: pytest.CaptureFixture[
     assert command(scene, "--json") == 0
     printed = json.loads(capsys.readouterr().out)
     folder = scene.with_name("scene-run")
-    assert printed == json.loads((folder / "result.json").read_text()) | {"folder": str(folder)}
+    kept = json.loads((folder / "result.json").read_text())
+    tables = {name: digest_file(folder / name) for name in ("energy.csv", "probes.csv")}
+    assert printed | {"digests": tables} == kept | {"folder": str(folder)}
     assert (folder / "scene.toml").read_text() == SCENE
 
     step, total = printed["step"], printed["steps"]
