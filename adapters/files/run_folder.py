@@ -14,7 +14,7 @@ import os
 import re
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime
@@ -153,9 +153,11 @@ class RunFolder:
         names = [n for n in listing.names if n not in listing.finished and not self.failure(n)]
         if not all(self._read_events()[:-1]):  # a crash cuts the last one
             names.append(EVENTS)
-        rows = "".join(self._known[name][3] for name in listing.finished)
-        table = ",".join(COLUMNS) + "\n" + rows
         text = read_bounded(path, errors="replace") if path.exists() else ""
+        titles = text.partition("\n")[0].split(",")  # version 0.2 had fewer: names in rows
+        keys = [COLUMNS.get(title, title) for title in titles]
+        rows = "".join(_format_rows(one.rows, keys) for one in listing.finished.values())
+        table = ",".join(titles) + "\n" + rows
         if rows and not names and not (text and table.startswith(text)):  # a kill may miss a row
             names.append("settlement.csv")
         return names
@@ -188,9 +190,7 @@ class RunFolder:
             if self._listing is not None:
                 self._listing.finished.pop(name, None)
             return None
-        cells = ([row.get(key) for key in COLUMNS.values()] for row in outcome.rows)
-        rows = (",".join("" if cell is None else str(cell) for cell in row) for row in cells)
-        self._known[name] = files, verify, outcome, "".join(f"{row}\n" for row in rows)
+        self._known[name] = files, verify, outcome, _format_rows(outcome.rows, COLUMNS.values())
         return outcome
 
     def stage_names(self) -> list[str]:
@@ -391,3 +391,10 @@ def _link(source: str, target: str) -> None:
         os.link(source, target)
     except OSError:  # another file system, or one without hard links
         shutil.copy2(source, target)
+
+
+def _format_rows(rows: Iterable[dict[str, Any]], keys: Collection[str]) -> str:
+    """Lines of ``settlement.csv``: the shortest numbers that come back bit for bit."""
+    cells = ([row.get(key) for key in keys] for row in rows)
+    lines = (",".join("" if cell is None else str(cell) for cell in line) for line in cells)
+    return "".join(f"{line}\n" for line in lines)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from datetime import datetime
 from itertools import pairwise
-from math import nan
+from math import isfinite, nan
 from typing import Any
 
 import numpy as np
@@ -84,11 +84,15 @@ def find_speed_up(full_s: float, procedure_s: float) -> float:
     return full_s / procedure_s if procedure_s > 0 else nan
 
 
-def make_history(outcomes: Sequence[Outcome], lost: Sequence[tuple[int, float]] = ()) -> History:
+def make_history(
+    outcomes: Sequence[Outcome], lost: Sequence[tuple[int, float]] = (), loaded_start: float = nan
+) -> History:
     """The table of a run from its stages; a window's cost is spread evenly over its cycles.
 
-    ``lost``: after which cycle failed attempts lost how much CPU time [s].  The preparation has
-    no rows and is left out of the cost.
+    ``lost``: after which cycle failed attempts lost how much CPU time [s].  ``loaded_start``:
+    height of the loaded body before the first cycle [m], for rows of version 0.2, which know its
+    heights alone; where that is not known, its settlement counts from the first row.  The
+    preparation has no rows and is left out of the cost.
     """
     rows, cpu, spent = [], [], 0.0
     for outcome in outcomes:
@@ -104,9 +108,9 @@ def make_history(outcomes: Sequence[Outcome], lost: Sequence[tuple[int, float]] 
         column.name: np.array([_read_number(row.get(column.name)) for row in rows])
         for column in fields(History)[2:-1]
     }
-    if not np.isfinite(columns["loaded_body"]).all():  # stages of 0.2 know heights only
+    if not np.isfinite(columns["loaded_body"]).all():
         heights = np.array([_read_number(row.get("piston_height")) for row in rows])
-        columns["loaded_body"] = heights[0] - heights
+        columns["loaded_body"] = (loaded_start if isfinite(loaded_start) else heights[0]) - heights
     return History(
         cycle=np.array([row["cycle"] for row in rows], np.int64),
         kind=tuple(row["kind"] for row in rows),

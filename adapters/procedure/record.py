@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
-from math import isfinite
+from math import isfinite, nan
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from adapters.bed import FloatArray, State, load_state
-from adapters.errors import UsageError
+from adapters.errors import EngineFailed, UsageError
 from adapters.files import Outcome, RunFolder, Window, load_window
 from adapters.jumps import Band, estimate_band
 from adapters.procedure.history import (
@@ -44,7 +45,12 @@ class Track:
     @cached_property
     def history(self) -> History:
         """The table of the run, with the CPU time at each row."""
-        return make_history(self.outcomes, [(j.first_cycle, j.lost_s) for j in self.failed_jumps])
+        lost, start = [(j.first_cycle, j.lost_s) for j in self.failed_jumps], nan
+        name, first = next(iter(self.windows), ("", None))
+        if first is not None and first.rows and "loaded_body" not in first.rows[0]:
+            with suppress(UsageError, EngineFailed):  # a damaged window is named elsewhere
+                start = self.window(name).piston_start
+        return make_history(self.outcomes, lost, start)
 
     @property
     def preparation(self) -> Outcome | None:

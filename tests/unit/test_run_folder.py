@@ -77,6 +77,16 @@ def test_table_is_exact(run: RunFolder) -> None:
     assert {row[3] for row in rows} == {""}
 
 
+def test_a_table_of_version_0_2_is_no_damage(run: RunFolder) -> None:
+    """Its columns were the names in the rows; a changed number in it is named all the same."""
+    path = run.path / "settlement.csv"
+    rows = [f"{cycle},{cycle / 3},computed\n" for cycle in range(1, 6)]
+    path.write_text("cycle,settlement,kind\n" + "".join(rows))
+    assert run.list_damaged() == []
+    path.write_text(path.read_text().replace("2,0.6", "2,0.7"))
+    assert run.list_damaged() == ["settlement.csv"]
+
+
 @pytest.mark.parametrize("name", ["states.npz", "end.restart", "outcome.json"])
 @pytest.mark.parametrize("damage", ["missing", "shorter", "longer", "empty", "changed"])
 def test_damaged_files_are_noticed(run: RunFolder, name: str, damage: str) -> None:

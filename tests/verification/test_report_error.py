@@ -206,6 +206,8 @@ def test_stages_of_older_runs_know_the_loaded_body_by_its_heights() -> None:
     history = make_history([old])
     np.testing.assert_allclose(history.loaded_body, [0.0, 1e-4, 3e-4], atol=1e-15)
     assert history.gain(2, 3, "loaded_body") == pytest.approx(2e-4)
+    whole = make_history([old], loaded_start=0.031)
+    np.testing.assert_allclose(whole.loaded_body, [1e-3, 1.1e-3, 1.3e-3], atol=1e-15)
 
 
 def test_a_jump_that_settles_nothing_divides_by_no_zero() -> None:

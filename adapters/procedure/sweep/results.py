@@ -22,6 +22,7 @@ import numpy as np
 
 from adapters.bed import FloatArray
 from adapters.files import COLUMNS, RunFolder
+from adapters.procedure import read_run_record
 from adapters.procedure.sweep.plan import SEED, Member, Sweep
 from adapters.procedure.sweep.run import Result
 from adapters.scene import flatten_keys
@@ -30,8 +31,6 @@ from trackbed.run_files import replace_file
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SETTLEMENT = "loaded_body_settlement"
-"""The column whose band is estimated."""
 CONFIDENCE = 0.95
 """Probability that a band holds the mean, for seeds whose settlements are normal."""
 SAMPLE_FIGURES = ("coordination_number", "relative_density")
@@ -89,14 +88,12 @@ def estimate_bands(sweep: Sweep, finished: set[str]) -> list[Band]:
     """The band of every setting of which a member is ``finished``."""
     bands = []
     for group, members in sweep.groups().items():
-        curves = [
-            {
-                int(row["cycle"]): float(row[SETTLEMENT])
-                for row in read_settlement_rows(sweep, member)
-            }
+        histories = [
+            read_run_record(sweep.run_folder(member)).run.history
             for member in members
             if member.name in finished
         ]
+        curves = [dict(zip(one.cycle.tolist(), one.loaded_body, strict=True)) for one in histories]
         if not curves:
             continue
         cycles = sorted(set.intersection(*map(set, curves)))
