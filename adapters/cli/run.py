@@ -77,6 +77,11 @@ def list_jump_overrides(arguments: argparse.Namespace) -> list[str]:
     """KEY=VALUE of ``--tolerance`` and ``--cycles``; `UsageError` beside a k or h by hand."""
     overrides = []
     if arguments.tolerance is not None:
+        if arguments.procedure not in (None, "tolerance"):
+            raise UsageError(
+                f"--tolerance is the procedure tolerance, not {arguments.procedure}",
+                where="--procedure", remedy="leave one of the two out",
+            )  # fmt: skip
         by_hand = [one for one in arguments.overrides if one.split("=")[0].strip() in JUMP_KEYS]
         if by_hand:
             raise UsageError(

@@ -154,7 +154,7 @@ class RunFolder:
         if not all(self._read_events()[:-1]):  # a crash cuts the last one
             names.append(EVENTS)
         text = read_bounded(path, errors="replace") if path.exists() else ""
-        titles = text.partition("\n")[0].split(",")  # version 0.2 had fewer: names in rows
+        titles = text.partition("\n")[0].split(",")[: len(COLUMNS)]  # 0.2 had fewer: names in rows
         keys = [COLUMNS.get(title, title) for title in titles]
         rows = "".join(_format_rows(one.rows, keys) for one in listing.finished.values())
         table = ",".join(titles) + "\n" + rows

@@ -33,7 +33,7 @@ from adapters.jumps import (
 from adapters.laws.fit import Regime
 from adapters.procedure import stages
 from adapters.procedure.forecast import (
-    estimate_gains,
+    estimate_sinking,
     follow_loaded_body,
     list_stretches,
     make_stretch,
@@ -41,7 +41,7 @@ from adapters.procedure.forecast import (
 from adapters.procedure.history import sum_cost
 from adapters.procedure.record import CHECK, DECISION, make_plain
 from adapters.procedure.seating import seat_piston, warn_if_hung
-from adapters.procedure.stages import Bed, Run
+from adapters.procedure.stages import Bed, Gains, Run
 
 ASKED = ("action", "jump", "window")
 """What tells two decisions from one state: a run that was extended decides its end again."""
@@ -123,7 +123,7 @@ def jump_and_check(
     healing = settings.healing
     try:
         with explain_full_disk(run.folder.path):
-            gains = decision.moved, estimate_gains(run, bed, decision.jump)[1]
+            gains = Gains(decision.moved, estimate_sinking(run, bed, decision.jump))
             moved = stages.jump(run, bed, decision.jump, decision.attempt, gains)
             after = stages.compute(run, moved, healing + decision.window, healing)
     except (EngineFailed, NotCredible, NotConverged) as error:

@@ -71,7 +71,7 @@ def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
                 with explain_full_disk(run.folder.path):
                     by_history = p.settlement == "history" and h > 0
                     gains = estimate_gains(run, bed, h) if by_history else None
-                    share, gain = 1.0, gains[0] if gains else 0.0
+                    share, gain = 1.0, gains.mean_grain if gains else 0.0
                     if gains:
                         room = find_known_room(run.folder.outcomes(), bed.cycle)
                         share = SHARES[attempt - 1] * (min(1.0, room / gain) if gain else 1.0)

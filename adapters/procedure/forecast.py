@@ -1,8 +1,8 @@
 """What a run knows from the cycles that it computed: how far grains and loaded body go in a jump.
 
 The loaded body stands on few grains and sinks several times as far as the mean grain, so it is
-forecast from its own cycles, with its own debts: lowered by the mean grain's strain, it stayed
-behind by a half in single jumps.
+forecast from its own cycles, with its own debts: lowered by the mean grain's strain, it stays
+behind.
 """
 
 from __future__ import annotations
@@ -17,20 +17,24 @@ import numpy as np
 from adapters.files import Outcome
 from adapters.jumps import LOADED_BODY, SLOPES, Jumped, SlopeNumbers, Stretch, find_asked_gain
 from adapters.procedure.seating import SEATING, find_count_start
-from adapters.procedure.stages import Bed, Run
+from adapters.procedure.stages import Bed, Gains, Run
 
 BURST = 2.0
 """Greatest settlement of the loaded body in a jump, a unit of ln N, over that in the last jump and
 the window behind it [-]: a burst of few supporters at the end of a window is no rate."""
 
 
-def estimate_gains(run: Run, bed: Bed, h: int) -> tuple[float, float]:
-    """Settlement of the mean grain and of the loaded body in a jump of ``h`` cycles [m]."""
-    grains = run.folder.outcomes()
-    body = follow_loaded_body(grains)
-    gain = estimate_gain(run, bed, h, grains, SLOPES)
+def estimate_gains(run: Run, bed: Bed, h: int) -> Gains:
+    """What a jump of ``h`` cycles is to settle by."""
+    gain = estimate_gain(run, bed, h, run.folder.outcomes(), SLOPES)
+    return Gains(gain, estimate_sinking(run, bed, h))
+
+
+def estimate_sinking(run: Run, bed: Bed, h: int) -> float:
+    """Settlement of the loaded body in a jump of ``h`` cycles [m]."""
+    body = follow_loaded_body(run.folder.outcomes())
     sinking = estimate_gain(run, bed, h, body, LOADED_BODY)
-    return gain, min(sinking, bound_burst(list_jumps(body, bed.cycle), bed.cycle, h))
+    return min(sinking, bound_burst(list_jumps(body, bed.cycle), bed.cycle, h))
 
 
 def estimate_gain(

@@ -101,7 +101,8 @@ def extend(folder: RunFolder, manifest: dict[str, Any], scene: Scene, cycles: in
     """The scene of a run to more ``cycles`` in all, which its manifest then holds.
 
     The stages are those of a run that was asked for so many from the start; what its last ones
-    computed because the end was near goes to discarded/.  The lengths of jumps stay.
+    computed because the end was near goes to discarded/.  The first cycles and the lengths of jumps
+    stay.
     """
     p = scene.procedure
     if p is None or cycles < p.total_cycles:
@@ -110,7 +111,7 @@ def extend(folder: RunFolder, manifest: dict[str, Any], scene: Scene, cycles: in
             f"{have}, and can not be shortened to {cycles}" if p else have,
             where=str(folder.path), remedy="give more cycles, or another folder",
         )  # fmt: skip
-    more = [f"procedure.total_cycles={cycles}"]
+    more = [f"procedure.total_cycles={cycles}", f"procedure.k_i={p.k_i}"]
     if p.h is not None:
         more.append(f"procedure.h={list(p.h)}")
     overrides = [*manifest["overrides"], *more]

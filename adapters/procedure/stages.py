@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -56,6 +56,13 @@ class Variant:
     """True jumps over no cycle: dump, relax, resubmit, which shows what that alone costs."""
     perturbation: float = 0.0
     """Displacement [m] of one grain after the first k_i cycles: how far two equal runs part."""
+
+
+class Gains(NamedTuple):
+    """Settlement over a jump [m]."""
+
+    mean_grain: float
+    loaded_body: float
 
 
 class Clock:
@@ -200,13 +207,12 @@ def compute(run: Run, bed: Bed, cycles: int, healing: int = 0) -> Bed:
 
 
 def jump(
-    run: Run, bed: Bed, h: int, attempt: int, gains: tuple[float, float] | None = None,
-    share: float = 1.0,
-) -> Bed:  # fmt: skip
+    run: Run, bed: Bed, h: int, attempt: int, gains: Gains | None = None, share: float = 1.0
+) -> Bed:
     """Estimate the bed ``h`` cycles on (eqs 16, 17), relax it (eq. 29), hand it back at rest.
 
-    ``gains``: settlement of the mean grain and of the loaded body [m] where that is not to be the
-    scene's law's; the bed is moved by a ``share`` of what is estimated then.
+    ``gains``: what it settles by where that is not to be the scene's law's; the bed is moved by a
+    ``share`` of what is estimated then.
     """
     name = f"jump_{bed.cycle:06d}_{attempt}"
     folder = run.folder.path / name
@@ -220,10 +226,10 @@ def jump(
             height = window.position[bed.healing :, :, 2]
             checks.check_rise(run.scene, height, (target - before.position)[:, 2])
         else:
-            target = settle_by(gains[0], before, target)
+            target = settle_by(gains.mean_grain, before, target)
             target = before.position + share * (target - before.position)
             if get_move(run.procedure.move).moves_piston:
-                piston_height = before.piston_height - share * gains[1]
+                piston_height = before.piston_height - share * gains.loaded_body
         with run.clock.time_part("relax"):
             position, record, piston_height = find_room(
                 run.scene, before, target, piston_height, may_wait=gains is not None
@@ -236,7 +242,8 @@ def jump(
         save_state(after, folder / "relaxed.npz")
         notes = {"h": h, "attempt": attempt, "relaxation": record}
         if gains is not None:
-            notes |= {"gain": share * gains[0], "asked": gains[0], "sinking": share * gains[1]}
+            asked = gains.mean_grain
+            notes |= {"gain": share * asked, "asked": asked, "sinking": share * gains.loaded_body}
         rows = [_make_row(run, after, "jumped")] if h else []
         cost = run.clock.end_lap()
         folder = _finish(
@@ -296,7 +303,7 @@ def make_settlement_rows(run: Run, window: Window, healing: int) -> list[dict[st
     for c in range(1, len(window) + 1):
         row = _make_row(run, window.state(c), "healing" if c <= healing else "computed")
         row["elastic_deflection"] = float(deflections[c - 1])
-        row["stiffness"] = whole * float(stiffness[c - 1])
+        row["stiffness"] = whole * float(stiffness[c - 1]) if stiffness[c - 1] > 0 else None
         row["force_error"] = float(errors[c - 1])
         rows.append(row)
     return rows
@@ -357,13 +364,14 @@ def _watch(run: Run, bed: Bed, folder: Path) -> Callable[[], None]:
         windows = (o for o in outcomes if o.stage == "window")
         run.computed_before = sum(o.last_cycle - o.first_cycle for o in windows)
     computed = run.computed_before + run.computed_here
-    sunk = [run.loaded_start - o.rows[-1]["piston_height"] for o in outcomes if o.rows]
+    last = next((o.rows[-1] for o in reversed(outcomes) if o.rows), None)
+    sunk = None if last is None else run.loaded_start - last["piston_height"]
 
     def watch() -> None:
         here = run.engine.cycles_done(run.scene, bed.start, folder)
         run.progress.show_cycles(
             done=bed.cycle + here, total=procedure.total_cycles, computed=computed + here,
-            settlement=sunk[-1] if sunk else None, computed_here=run.computed_here + here,
+            settlement=sunk, computed_here=run.computed_here + here,
             to_compute=count_cycles_to_compute(run, bed.cycle + here),
         )  # fmt: skip
 

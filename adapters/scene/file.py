@@ -11,7 +11,7 @@ from pydantic import BaseModel
 
 from adapters.jumps import schedule_jumps
 from adapters.scene.checks import ALTERNATIVES, JUMP_KEYS, TOLERANCE_KEY, find_problems
-from adapters.scene.named import fill_procedure
+from adapters.scene.procedures import fill_procedure
 from adapters.scene.tables import Procedure, Scene, flatten_keys
 from trackbed.scene_files import Guide, Problem, find_model, read_scene
 
@@ -23,8 +23,8 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
 
     ``overrides`` such as ``procedure.k=10`` replace or add keys, their values in TOML (a bare word
     is a string); an override of one of two alternative keys removes the other, one of
-    procedure.tolerance k and h, and one of procedure.name all of the procedure but its cycles.
-    Keys that follow from the procedure's name are put in (`adapters.scene.named`).  A relative path
+    procedure.tolerance k, h and another name, one of procedure.name all but total_cycles.  Keys
+    that follow from the procedure's name are put in (`adapters.scene.procedures`).  A relative path
     of a load series counts from the scene file's folder.
 
     Raises `UsageError` when the file or an override can not be read, `SceneError` with all that is
@@ -52,6 +52,8 @@ def _drop_alternatives(data: dict[str, Any], key: str) -> None:
     if key == "procedure.name":
         kept = ("name", "total_cycles")
         data["procedure"] = {k: v for k, v in data["procedure"].items() if k in kept}
+    if key == TOLERANCE_KEY and "name" in data["procedure"]:
+        data["procedure"] = {**data["procedure"], "name": "tolerance"}
     others = [other for pair in ALTERNATIVES if key in pair for other in pair if other != key]
     for other in (*others, *(JUMP_KEYS if key == TOLERANCE_KEY else ())):
         *tables, name = other.split(".")

@@ -149,7 +149,7 @@ class Procedure(Table):
     """Numbers of cycles computed and jumped (Fig. 10 of the paper)."""
 
     name: Literal["paper", "growing", "tolerance"] | None = None
-    """What the other keys follow from, where they are not given: `adapters.scene.named`."""
+    """What the other keys follow from, where they are not given: `adapters.scene.procedures`."""
     k_i: Annotated[int, Field(ge=1)]  # first cycles, computed before anything is fitted
     k: Annotated[int, Field(ge=2)] | None = None  # cycles computed and fitted before each jump
     h: (

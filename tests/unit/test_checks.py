@@ -180,9 +180,8 @@ def test_elastic_deflection_is_what_the_piston_comes_back_by() -> None:
 
 
 def test_a_spring_under_the_piston_has_its_own_stiffness() -> None:
-    """Height -F/k beside a settlement that grows: F rises by what the load asks for from its
-    trough to its peak, so the secant stiffness is k less what a half cycle's settlement takes;
-    without a deflection it is nan."""
+    """Height -F/k: from its trough to its peak the load swings by F, the height by F/k; without a
+    deflection the stiffness is nan."""
     phase = np.arange(1, 4 * SAMPLES + 1) / SAMPLES
     force = 1 - np.cos(2 * np.pi * phase)
     piston = tracked(target_force=force, height=0.01 - force / 4e4).piston

@@ -323,9 +323,9 @@ def test_a_study_is_judged_by_its_record(
     monkeypatch.setattr(studies, "__path__", [str(tmp_path)])
     monkeypatch.setattr(study, "STUDIES", tmp_path)
     assert main(["validate", "my-study"]) == 6
-    told = capsys.readouterr()
-    assert "1 of 2 checks do not hold" in told.err
-    assert "my-study: older than adapters.laws: x, y" in told.out
+    printed = capsys.readouterr()
+    assert "1 of 2 checks do not hold" in printed.err
+    assert "my-study: older than adapters.laws: x, y" in printed.out
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from adapters.engines.fake import SETTLEMENT
 from adapters.files.run_folder import RunFolder
 from adapters.procedure.outlook import plan_jumps
 from adapters.scene.file import load_scene
-from adapters.scene.named import NUMBERS, PROCEDURES, fill_procedure
+from adapters.scene.procedures import NUMBERS, PROCEDURES, fill_procedure
 from adapters.scene.tables import Procedure
 from tests.small_bed import read_rows
 from trackbed.command import main
@@ -75,6 +75,51 @@ def test_a_name_replaces_the_keys_of_the_scene() -> None:
     found = load("procedure.name=tolerance", "procedure.k_i=30")
     assert (found.name, found.total_cycles, found.k_i) == ("tolerance", load().total_cycles, 30)
     assert (found.h, found.k, found.tolerance) == (None, None, NUMBERS.tolerance)
+
+
+@given(total=st.integers(300, 10**5), k=st.integers(2, 30), healing=st.integers(1, 20))
+def test_growing_jumps_leave_room_for_the_windows_given(total: int, k: int, healing: int) -> None:
+    """With windows and healing cycles of one's own the last window ends at the last cycle, too."""
+    keys = {"name": "growing", "total_cycles": total, "k": k, "healing_cycles": healing}
+    found = Procedure.model_validate(fill_procedure(keys))
+    jumps = plan_jumps(found)
+    assert jumps[-1][1] + healing + k == total
+    assert len(jumps) == len(found.h or ())
+
+
+def test_a_tolerance_is_its_own_procedure(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Beside a name it takes its place, without one and without k_i it is one; the flags together
+    are refused.  A name that is none, and cycles that are missing, are the one problem named."""
+    found = load("procedure.name=growing", "procedure.tolerance=0.05")
+    assert (found.name, found.tolerance, found.h) == ("tolerance", 0.05, None)
+    assert fill_procedure({"total_cycles": 99, "tolerance": 0.1})["name"] == "tolerance"
+    assert "name" not in fill_procedure({"total_cycles": 99, "tolerance": 0.1, "k_i": 9})
+    words = ["run", str(COARSE), "--procedure", "growing", "--tolerance", "0.02"]
+    assert main(words) == 2
+    assert "--tolerance is the procedure tolerance" in capsys.readouterr().err
+    begin, rest = COARSE.read_text(encoding="utf-8").split("[procedure]")
+    scene = tmp_path / "scene.toml"
+    for keys, said in (
+        ("name = ['paper']\ntotal_cycles = 9", "procedure.name"),
+        ("name = 'papers'", "procedure.name"),
+        ("", "procedure.total_cycles"),
+    ):
+        scene.write_text(f"{begin}[procedure]\n{keys}\n\n[engine]{rest.split('[engine]')[1]}")
+        assert main(["run", str(scene), "--dry-run"]) == 3
+        assert said in capsys.readouterr().err
+
+
+def test_a_named_run_is_extended_without_computing_its_start_again(tmp_path: Path) -> None:
+    """Of 100 cycles the first 25 are k_i, of 300 they would be 50: an extended run keeps its 25."""
+    run = tmp_path / "run"
+    words = ["run", str(COARSE), "--procedure", "growing", "--cycles", "100", "--run-folder"]
+    assert main([*words, str(run), "--set", "engine.name=fake", "--set", "sample.count=40"]) == 0
+    before = (run / "window_000000" / "outcome.json").stat().st_mtime_ns
+    assert main(["resume", str(run), "--cycles", "300"]) == 0
+    assert (run / "window_000000" / "outcome.json").stat().st_mtime_ns == before
+    assert int(read_rows(run)[-1]["cycle"]) == 300
 
 
 @pytest.mark.parametrize("name", [*PROCEDURES])

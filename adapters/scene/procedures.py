@@ -15,6 +15,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from math import ceil, log
 from typing import Any
@@ -32,7 +33,7 @@ class NamedNumbers:
 
     first: int = 50  # cycles k_i at the start, at most a quarter of all
     window: int = 10  # cycles k of a growing schedule's window
-    healing: int = 5  # cycles behind a jump that are kept out of the fit
+    healing: int = 5  # cycles behind a jump, as in every scene that does not say otherwise
     ratio: float = 1.55
     """Greatest ratio of N at the ends of neighbouring windows [-]: five jumps from 60 to 500."""
     paper_window: int = 20  # cycles k of the paper's window, and
@@ -43,31 +44,36 @@ class NamedNumbers:
 NUMBERS = NamedNumbers()
 
 
-def plan_paper(first: int, total: int) -> dict[str, Any]:
+def plan_paper(given: Mapping[str, Any]) -> dict[str, Any]:
     """Keys of ``paper``."""
     return {"k": NUMBERS.paper_window, "h": NUMBERS.paper_jump, "law": "log", "move": "per-grain"}
 
 
-def plan_growing(first: int, total: int) -> dict[str, Any]:
-    """Keys of ``growing``: the fewest jumps within `NamedNumbers.ratio`, fewer without room."""
-    k, healing = NUMBERS.window, NUMBERS.healing
+def plan_growing(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Keys of ``growing``: the fewest jumps within `NamedNumbers.ratio`, fewer without room.
+
+    Beside windows and healing cycles that are ``given``, jumps are as long as these leave them.
+    """
+    first, total = given["k_i"], given["total_cycles"]
+    k, healing = (
+        given[key] if type(given.get(key)) is int and given[key] > 0 else usual
+        for key, usual in (("k", NUMBERS.window), ("healing_cycles", NUMBERS.healing))
+    )
     wanted = ceil(log(max(total / (first + k), 1.0)) / log(NUMBERS.ratio))
     h = [max(total, 1)]  # no jump fits: a warning of the run says so
     for jumps in range(wanted, 0, -1):
-        try:
+        with suppress(ValueError):
             h = schedule_jumps(jumps, total, first, k, healing)
             break
-        except ValueError:
-            continue
     return {"k": k, "h": h, "settlement": "history", "move": "profile", "seating": "waits"}
 
 
-def plan_tolerance(first: int, total: int) -> dict[str, Any]:
+def plan_tolerance(given: Mapping[str, Any]) -> dict[str, Any]:
     """Keys of ``tolerance``."""
     return {"tolerance": NUMBERS.tolerance, "seating": "waits"}
 
 
-PROCEDURES: Mapping[str, Callable[[int, int], dict[str, Any]]] = {
+PROCEDURES: Mapping[str, Callable[[Mapping[str, Any]], dict[str, Any]]] = {
     "paper": plan_paper, "growing": plan_growing, "tolerance": plan_tolerance,
 }  # fmt: skip
 
@@ -75,14 +81,19 @@ PROCEDURES: Mapping[str, Callable[[int, int], dict[str, Any]]] = {
 def fill_procedure(procedure: Mapping[str, Any]) -> dict[str, Any]:
     """The table ``[procedure]`` with the keys of its name, those that it has as they are.
 
-    Without a name, and without the keys of one by hand, it is `DEFAULT`.  What is not valid in it
-    is left for the checks of the scene.
+    Without a name, and without the keys of one by hand, it is `DEFAULT`; a tolerance alone is
+    ``tolerance``.  What is not valid in it is left for the checks of the scene.
     """
-    name = procedure.get("name", None if {*BY_HAND} & {*procedure} else DEFAULT)
+    name = procedure.get("name")
+    if name is None and not {*BY_HAND} & {*procedure}:
+        name = DEFAULT
+    elif name is None and "tolerance" in procedure and "k_i" not in procedure:
+        name = "tolerance"
+    if not isinstance(name, str) or name not in PROCEDURES:
+        return dict(procedure)
     total = procedure.get("total_cycles")
-    if name not in PROCEDURES or type(total) is not int:
-        return dict(procedure)
-    first = procedure.get("k_i", min(NUMBERS.first, max(total // 4, 1)))
-    if type(first) is not int or first < 1:
-        return dict(procedure)
-    return {"name": name, "k_i": first, **PROCEDURES[name](first, total), **procedure}
+    total = total if type(total) is int and total > 0 else 4 * NUMBERS.first  # is refused later
+    first = procedure.get("k_i")
+    first = first if type(first) is int and first > 0 else min(NUMBERS.first, max(total // 4, 1))
+    keys = PROCEDURES[name]({**procedure, "k_i": first, "total_cycles": total})
+    return {"name": name, "k_i": first, **keys, **procedure}
