@@ -22,24 +22,17 @@ if TYPE_CHECKING:
 
 provide_cache_folders(__path__[0])
 
-_HOMES = {
-    "Body": "bodies",
-    "ContactPlane": "contact.spheres",
-    "CriticalStep": "contact",
-    "Energy": "march",
-    "History": "march",
-    "Material": "element",
-    "PeriodicWidth": "contact.search",
-    "QdemError": "files",
-    "SceneWarning": "files",
-    "Series": "files",
-    "Simulation": "march",
-    "SphereContact": "contact.spheres",
-    "SurfaceContact": "contact.surface",
-    "StaticAnswer": "march",
-    "StepWarning": "files",
-    "make_ramp": "files",
+_ROOMS = {
+    "bodies": ("Body",),
+    "contact": ("CriticalStep",),
+    "contact.search": ("PeriodicWidth",),
+    "contact.spheres": ("ContactPlane", "SphereContact"),
+    "contact.surface": ("SurfaceContact",),
+    "element": ("Material",),
+    "files": ("QdemError", "SceneWarning", "Series", "StepWarning", "make_ramp"),
+    "march": ("Energy", "History", "Simulation", "StaticAnswer"),
 }
+_HOMES = {name: room for room, names in _ROOMS.items() for name in names}
 __all__ = [
     "Body", "ContactPlane", "CriticalStep", "Energy", "History", "Material", "PeriodicWidth",
     "QdemError", "SceneWarning", "Series", "Simulation", "SphereContact", "StaticAnswer",

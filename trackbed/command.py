@@ -79,14 +79,11 @@ def find_checkout() -> None:
     Raises `ImportError` where trackbed is installed and there is no checkout.
     """
     root = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-    if not all(os.path.exists(os.path.join(root, *it)) for it in CHECKOUT):
+    own = "pyproject.toml", "validation/cli.py"  # beside an installation it may be another project
+    if not all(os.path.exists(os.path.join(root, one)) for one in own):
         raise ImportError("the studies are not in this installation", name="validation")
     if root not in sys.path:
         sys.path.insert(0, root)
-
-
-CHECKOUT = (("pyproject.toml",), ("validation", "cli.py"))
-"""What tells a checkout from an installation, where `validation` may be another project."""
 
 
 def find_verb(words: Sequence[str]) -> str | None:
@@ -171,7 +168,3 @@ def main(words: Sequence[str] | None = None) -> int:
         message, code = explain_error(error)
         print(f"trackbed: {message}", file=sys.stderr)
         return code
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -356,9 +356,7 @@ def _make_table(
                 where=f"{path}:{line}", remedy=remedy,
             )  # fmt: skip
     start = 1 if header else 0
-    units = (
-        [cell.strip().strip("[]()").strip() for cell in rows[1]] if rows[start:] and start else []
-    )
+    units = [cell.strip().strip("[]()").strip() for cell in rows[1]] if header and rows[1:] else []
     if units and set(units) <= {*SI, ""} and any(u and not is_number(u) for u in units):
         start = 2
     else:

@@ -42,14 +42,12 @@ def run_qdem(arguments: argparse.Namespace) -> int:
         if arguments.dry_run:
             summary = _preview_run(prepared) | {"warnings": said}
         else:
-            summary = _run(prepared, place_run(arguments), arguments, said)
+            summary = _run(prepared, arguments, said)
     _print(summary, arguments.json)
     return 0
 
 
-def _run(
-    prepared: Prepared, path: Path, arguments: argparse.Namespace, said: list[str]
-) -> dict[str, Any]:
+def _run(prepared: Prepared, arguments: argparse.Namespace, said: list[str]) -> dict[str, Any]:
     """The whole run with its report; its summary.  ``said``: warnings so far."""
     from qdem_fem.scene import (
         RunFolder,
@@ -61,6 +59,7 @@ def _run(
     )
     from trackbed.run_files import record_provenance, write_result
 
+    path = place_run(arguments)
     folder = RunFolder(path)
     manifest = {
         "scene": prepared.scene.parameters(),

@@ -7,7 +7,6 @@ writer cut short is cut back to its last sound row (`Table.cut`).
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,7 @@ import numpy.typing as npt
 
 from qdem_fem.files.arrays import Floats
 from qdem_fem.files.errors import UsageError
-from trackbed.run_files import digest_file, open_unlinked, refuse_writing, replace_file, write_whole
+from trackbed.run_files import append_text, refuse_writing, replace_file, seal_file, write_whole
 
 
 def write_bodies_vtu(path: Path, bodies: Sequence[Any]) -> None:
@@ -64,17 +63,12 @@ class Table:
     def append(self, rows: npt.NDArray[Any]) -> None:
         """Append rows (k, columns); digits enough to read the same numbers back."""
         text = "".join(",".join(map(repr, row)) + "\n" for row in rows.tolist())
-        with refuse_writing(self.path), open_unlinked(self.path, "a") as stream:
-            stream.write(text)
-
-    def sync(self) -> None:
-        """Have the system write everything to the disk."""
-        with self.path.open("rb+") as stream:
-            os.fsync(stream.fileno())
+        with refuse_writing(self.path):
+            append_text(self.path, text)
 
     def seal(self) -> tuple[int, str]:
-        """Length of the file so far [bytes], and its SHA-256."""
-        return self.path.stat().st_size, digest_file(self.path)
+        """Length of the file so far [bytes], all of it on the disk, and its SHA-256."""
+        return self.path.stat().st_size, seal_file(self.path)
 
     def cut(self, time: float, count: int, seal: tuple[int, str] = (0, NOTHING)) -> None:
         """Keep the sound rows up to ``time`` [s], as they were when the run had come there.
@@ -87,28 +81,23 @@ class Table:
         try:
             with self.path.open("rb+") as stream:
                 if stream.readline() != header:
-                    raise UsageError("this table has other columns", where=str(self.path))
+                    raise self._refuse("this table has other columns")
                 for line in stream:
                     if not line.endswith(b"\n") or float(line.partition(b",")[0]) > time:
                         break
                     kept, rows = kept + len(line), rows + 1
                 if rows != count:
-                    raise UsageError(
-                        f"{count} rows up to {time:.6g} s were written, {rows} are there",
-                        where=str(self.path), remedy="start again: --force",
-                    )  # fmt: skip
+                    what = f"{count} rows up to {time:.6g} s were written, {rows} are there"
+                    raise self._refuse(what)
                 stream.seek(0)
                 if hashlib.sha256(stream.read(seal[0])).hexdigest() != seal[1]:
-                    raise UsageError(
-                        "this table was changed since it was written", where=str(self.path),
-                        remedy="start again: --force",
-                    )  # fmt: skip
+                    raise self._refuse("this table was changed since it was written")
                 stream.truncate(kept)
         except (OSError, ValueError) as error:
-            raise UsageError(
-                f"can not read the rows so far ({error})", where=str(self.path),
-                remedy="start again: --force",
-            ) from error  # fmt: skip
+            raise self._refuse(f"can not read the rows so far ({error})") from error
+
+    def _refuse(self, what: str) -> UsageError:
+        return UsageError(what, where=str(self.path), remedy="start again: --force")
 
 
 def read_table(path: Path) -> dict[str, Floats]:

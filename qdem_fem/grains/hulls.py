@@ -160,7 +160,7 @@ def make_flat_form(points: Floats) -> GrainForm:
             f"its flattest tetrahedron has a radius ratio of {worst:.2g}", where="grain shape",
             remedy=f"keep the corners farther apart: {HULLS.ratio:g} is the least",
         )  # fmt: skip
-    volume = integrate_polyhedron(nodes, faces).volume
+    volume, _ = integrate_polyhedron(nodes, faces)
     psi = find_sphericity(volume, find_surface_area(nodes, faces))
     return GrainForm(corner_faces, nodes, psi, find_roundness(surface, faces))
 
@@ -203,7 +203,7 @@ class _Drawn:
 
         Stretches keep the volume.
         """
-        volume = integrate_polyhedron(nodes, self.faces).volume
+        volume, _ = integrate_polyhedron(nodes, self.faces)
 
         def find_excess(size: float) -> float:
             area = find_surface_area(nodes * np.exp(size * self.axes), self.faces)

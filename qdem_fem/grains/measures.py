@@ -27,16 +27,9 @@ class InscribedNumbers:
 INSCRIBED = InscribedNumbers()
 
 
-@dataclass(frozen=True)
-class Solid:
-    """Volume integrals of a polyhedron of unit density."""
-
-    volume: float  # V = integral dV [m^3]; negative where the faces are seen clockwise from outside
-    centroid: Floats  # integral x dV / V [m], (3,)
-
-
-def integrate_polyhedron(nodes: Floats, faces: Integers) -> Solid:
-    """Integrals over the cones from one node to every face, which is exact.
+def integrate_polyhedron(nodes: Floats, faces: Integers) -> tuple[float, Floats]:
+    """Volume V [m^3], negative where the faces are seen clockwise from outside, and centroid [m],
+    (3,), by integrals over the cones from one node to every face, which is exact.
 
     With D = det(a, b, c) of a cone's face: volume D/6, first moment D (a + b + c)/24.
     """
@@ -45,7 +38,7 @@ def integrate_polyhedron(nodes: Floats, faces: Integers) -> Solid:
     sixfold = np.einsum("fi,fi->f", a, np.cross(b, c))
     volume = sixfold.sum() / 6
     first = sixfold @ (a + b + c) / 24
-    return Solid(float(volume), origin + first / volume)
+    return float(volume), origin + first / volume
 
 
 def find_surface_area(nodes: Floats, faces: Integers) -> float:

@@ -53,7 +53,7 @@ def find_radius_ratios(nodes: Floats, elements: Integers) -> Floats:
 
 def place_apex_and_spokes(nodes: Floats, faces: Integers, corners: int) -> Floats:
     """The inner nodes (M + 1, 3) [m] of a surface: its centroid, and one on each spoke."""
-    apex = integrate_polyhedron(nodes, faces).centroid
+    _, apex = integrate_polyhedron(nodes, faces)
     return np.vstack([apex, apex + SPOKE * (nodes[:corners] - apex)])
 
 

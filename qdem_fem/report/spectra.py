@@ -138,7 +138,8 @@ def find_peak_frequencies(
             for peak in {_find_highest_peak(left, step, windowed) for windowed in (True, False)}
             for decay in MODES.decays
         ]
-        start = min(starts, key=lambda one: _square_misfit(one, elapsed / duration, target))
+        misfits = [_find_misfit(np.array(one), elapsed / duration, target) for one in starts]
+        start = min(zip(starts, misfits, strict=True), key=lambda one: float(one[1] @ one[1]))[0]
         fit = least_squares(
             _find_misfit, start, args=(elapsed / duration, target), x_scale="jac", method="lm",
             xtol=1e-14, ftol=1e-14, gtol=1e-14,
@@ -183,11 +184,6 @@ def _find_misfit(unknowns: Floats, t: Floats, target: Floats) -> Floats:
     columns = _make_columns(unknowns, t)
     weight = np.linalg.lstsq(columns, target, rcond=None)[0]
     return np.asarray(target - columns @ weight)
-
-
-def _square_misfit(unknowns: list[float], t: Floats, target: Floats) -> float:
-    left = _find_misfit(np.array(unknowns), t, target)
-    return float(left @ left)
 
 
 def _make_modes(

@@ -272,8 +272,8 @@ class RigidBodies:
             on = self.body[row] == b
             arm, series, weight = self.arm[row[on]], holds.series[on], holds.weight[on]
             hold = find_hold(self.own[b], arm, component[on], series, weight, body.name)
-            self._every.given[b], self._every.given_weight[b] = hold.given, hold.weight
-            self._set_turning(b, hold.turning, work)
+            self._every.given[b], self._every.given_weight[b], turning = hold
+            self._set_turning(b, turning, work)
         self._seen = None
         return loads, held
 

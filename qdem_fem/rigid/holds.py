@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,22 +14,12 @@ LOOSE = 1e-9
 """Share of a freedom's motion below which a held component does not see it."""
 
 
-@dataclass(frozen=True)
-class RigidHold:
-    """Freedoms of one body that its held components leave."""
-
-    given: Integers
-    """(3,) series that each component of the shift follows; -1: free."""
-    weight: Floats
-    """(3,)"""
-    turning: int
-    """`FREE`, an axis, or `STILL`."""
-
-
 def find_hold(
     own: RigidMass, arm: Floats, component: Integers, series: Integers, weight: Floats, where: str
-) -> RigidHold:
-    """The hold of a body by components of some nodes.
+) -> tuple[Integers, Floats, int]:
+    """What the held components of some nodes leave of a body's freedoms: the series that each
+    component of the shift follows (3,), -1 where it is free, the weight of each (3,), and `FREE`,
+    an axis, or `STILL`.
 
     ``arm`` (h, 3) [m]: from the centre to the node of each; ``component`` (h,); it follows
     ``weight`` (h,) times ``series`` (h,).  What the six freedoms may still do is the null space of
@@ -66,7 +54,7 @@ def find_hold(
         if not mask[k]:
             given[k], share[k] = asked.pop() if asked else (0, 0.0)
     turning = {0: STILL, 1: int(np.argmax(mask[3:])), 3: FREE}[int(turns)]
-    return RigidHold(given, share, turning)
+    return given, share, turning
 
 
 def split_conditions(
@@ -76,7 +64,6 @@ def split_conditions(
 
     ``is_rigid`` (n,) by the kernel's number of a node.
     """
-
     of_loads, of_held = is_rigid[loads.node_at // 4], is_rigid[held.node_at // 4]
     mine = _select_held(held, of_held)._replace(
         roller_at=np.zeros(0, np.int64), roller_normal=np.zeros((0, 3))

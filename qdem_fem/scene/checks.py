@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -32,12 +32,23 @@ from qdem_fem.tables import (
     make_body_mesh,
     make_series,
     make_unit_vector,
-    read_tables,
 )
-from trackbed.scene_files import Problem, SceneText, describe_error, suggest_word
+from trackbed.scene_files import (
+    Guide,
+    Problem,
+    SceneText,
+    describe_error,
+    read_scene,
+    suggest_word,
+)
 
 if TYPE_CHECKING:
     from qdem_fem.mesh import TetMesh
+
+
+GUIDE = Guide("cantilever", "simulation.duration=0.1")
+TRACK_GUIDE = Guide("track-small", "simulation.duration=0.1")
+"""Of scenes with a table ``[track]``."""
 
 
 def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Prepared:
@@ -46,16 +57,19 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Prepared:
     Raises `SceneError` with all that is wrong (file, line, key and sentence of each), `UsageError`
     when the scene or an override can not be read.
     """
-    text = read_tables(path, overrides, choose_model)
-    if "track" in text.data:
-        from qdem_fem.track import check_track
+    text = read_scene(path, overrides, guide=GUIDE)
+    if "track" in text.data:  # other scenes do not pay for its import
+        from qdem_fem.track import TrackScene, check_track
 
+        text.guide = TRACK_GUIDE
+        text.check(TrackScene)
         return check_track(text)
+    text.check(Scene)
     problems = list(text.problems)
     folder = text.path.parent
     meshes, found = _make_meshes(text, folder)
     problems += found
-    names = _list_body_names(text)
+    names = [entry["name"] for _, entry in _list_named_bodies(text)]
     conditions: list[Step] = []
     for key, table in list_tables(text, Condition, Periodic):
         if names and table.body not in names:
@@ -81,21 +95,12 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Prepared:
     return Prepared(scene, text, meshes, conditions, probes, dict(list_named_files(text, folder)))
 
 
-def choose_model(data: Mapping[str, Any]) -> type[Scene]:
-    """The tables that a scene may have: those of a track where it names one."""
-    if "track" not in data:
-        return Scene
-    from qdem_fem.track import TrackScene  # other scenes do not pay for its import
-
-    return TrackScene
-
-
-def _list_body_names(text: SceneText) -> list[str]:
-    """Names of all bodies, sound or not, so that a wrong body makes no other problem."""
+def _list_named_bodies(text: SceneText) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Key and entry of each body with a name, sound or not: a wrong one makes no other problem."""
     bodies = text.data.get("body")
-    entries = bodies if isinstance(bodies, list) else []
-    names = [entry.get("name") for entry in entries if isinstance(entry, dict)]
-    return [name for name in names if isinstance(name, str)]
+    for index, entry in enumerate(bodies if isinstance(bodies, list) else []):
+        if isinstance(entry, dict) and isinstance(entry.get("name"), str):
+            yield f"body.{index}", entry
 
 
 def _make_meshes(text: SceneText, folder: Path) -> tuple[dict[str, TetMesh], list[Problem]]:
@@ -129,13 +134,11 @@ def _make_meshes(text: SceneText, folder: Path) -> tuple[dict[str, TetMesh], lis
 
 def list_mesh_tables(text: SceneText) -> Iterator[tuple[str, str, Mesh, list[str]]]:
     """Key, name, mesh and regions of each body whose mesh is sound, whatever else is wrong."""
-    bodies = text.data.get("body")
-    for index, entry in enumerate(bodies if isinstance(bodies, list) else []):
-        key = f"body.{index}"
+    for key, entry in _list_named_bodies(text):
         body = text.tables.get(key)
         if isinstance(body, BodyTable):
             yield key, body.name, body.mesh, list(body.regions)
-        elif isinstance(entry, dict) and isinstance(entry.get("name"), str):
+        else:
             with suppress(ValidationError):
                 yield key, entry["name"], Mesh.model_validate(entry.get("mesh")), []
 

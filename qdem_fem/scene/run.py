@@ -291,8 +291,6 @@ class _Record:
 
     def save(self, checkpoint: Path) -> None:
         """Save the state; the tables reach the disk first, so that they hold all rows up to it."""
-        self.rows.sync()
-        self.energies.sync()
         seals = {table.path.name: table.seal() for table in (self.rows, self.energies)}
         peak = io.BytesIO()  # before the checkpoint: what is ahead of it, the run finds again
         np.savez(peak, displacement=self.peak, energy=self.peak_energy)

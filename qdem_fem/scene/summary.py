@@ -53,15 +53,13 @@ def summarise_run(prepared: Prepared, done: Done, folder: RunFolder) -> dict[str
             for label, modes in find_modes(prepared, rows).items()
         },
         "static": done.static,
-        "discretisation": describe_discretisation(done.discretisation),
+        "discretisation": {
+            name: getattr(done.discretisation, name)
+            for name in ("displacement", "stress", "frequency")
+            if done.discretisation is not None  # without elastic energy there are none
+        },
         "left_out": prepared.scene.list_left_out(),
     }
-
-
-def describe_discretisation(found: Any) -> dict[str, float]:
-    """Errors of the meshes [-], as `qdem_fem.bodies.Discretisation` says; empty: no strain."""
-    names = ("displacement", "stress", "frequency")
-    return {} if found is None else {name: getattr(found, name) for name in names}
 
 
 def describe_critical_step(run: Any) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """The tables of a scene file, and what is checked of them."""
 
-from qdem_fem.tables.contact import ContactTable, PeriodicTable, choose_contact, find_contact_faults
+from qdem_fem.tables.contact import ContactTable, choose_contact, find_contact_faults
 from qdem_fem.tables.keys import (
     BodyTable,
     Condition,
@@ -20,15 +20,14 @@ from qdem_fem.tables.prepared import (
     find_output_faults,
     list_named_files,
     list_tables,
-    read_tables,
 )
 from qdem_fem.tables.series import make_series
 from qdem_fem.tables.types import Cells, Share, WrongKey
 
 __all__ = [
     "BodyTable", "Cells", "Condition", "ContactTable", "MaterialTable", "Mesh", "Nodes",
-    "Output", "Periodic", "PeriodicTable", "Prepared", "Scene", "SeriesTable", "Share",
-    "SimulationTable", "Step", "WrongKey", "choose_contact", "find_contact_faults",
-    "find_named_nodes", "find_output_faults", "list_named_files", "list_tables",
-    "make_body_mesh", "make_series", "make_unit_vector", "read_tables",
+    "Output", "Periodic", "Prepared", "Scene", "SeriesTable", "Share", "SimulationTable",
+    "Step", "WrongKey", "choose_contact", "find_contact_faults", "find_named_nodes",
+    "find_output_faults", "list_named_files", "list_tables", "make_body_mesh", "make_series",
+    "make_unit_vector",
 ]  # fmt: skip

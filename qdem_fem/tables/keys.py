@@ -1,6 +1,6 @@
 """The scene: bodies, conditions and output of one QDEM run, as the tables of a scene file (SI).
 
-`qdem_fem.tables.read_tables` reads a scene; ``cantilever.toml`` explains every key.
+`qdem_fem.scene.load_scene` reads a scene; ``cantilever.toml`` explains every key.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,15 +10,12 @@ from typing import TYPE_CHECKING, Any
 from qdem_fem.files import Integers
 from qdem_fem.tables.keys import BodyTable, Output, Scene, SeriesTable, SimulationTable
 from trackbed.run_files import digest_file
-from trackbed.scene_files import Guide, Problem, SceneText, Table, read_scene
+from trackbed.scene_files import Problem, SceneText, Table
 
 if TYPE_CHECKING:
     from qdem_fem.mesh import TetMesh
 
 
-GUIDE = Guide("cantilever", "simulation.duration=0.1")
-TRACK_GUIDE = Guide("track-small", "simulation.duration=0.1")
-"""Of scenes with a table ``[track]``."""
 ROWS_MOST = 100_000_000
 """Most rows of a table that is written."""
 
@@ -47,25 +44,6 @@ class Prepared:
     """Name -> body and nodes."""
     files: dict[str, str]
     """Each file that the scene names, as it is written there, and its SHA-256."""
-
-
-def read_tables(
-    path: Path | str,
-    overrides: Sequence[str] = (),
-    choose_model: Callable[[Mapping[str, Any]], type[Scene]] = lambda data: Scene,
-) -> SceneText:
-    """Read a scene file and check every table by itself; nothing that needs a mesh.
-
-    ``choose_model`` gives the tables that a scene may have by its data.
-    What is wrong with the keys is in ``problems`` of the answer, not raised: `refuse` does.
-
-    Raises `UsageError` when the file or an override can not be read, `SceneError` for no TOML.
-    """
-    scene = read_scene(path, overrides, guide=GUIDE)
-    if "track" in scene.data:
-        scene.guide = TRACK_GUIDE
-    scene.check(choose_model(scene.data))
-    return scene
 
 
 def list_tables(text: SceneText, *kinds: Any) -> Iterator[tuple[str, Any]]:

@@ -38,10 +38,8 @@ GRID_SPACING = 1.05
 class SceneFile:
     """A scene file as read and checked."""
 
-    path: Path
     text: str
     tables: SceneTables
-    overrides: tuple[str, ...] = ()
 
 
 def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> SceneFile:
@@ -56,7 +54,7 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> SceneFile:
     text.refuse(text.problems)
     tables = SceneTables.model_validate(text.data)
     text.refuse(find_faults(tables))
-    return SceneFile(text.path, text.text, tables, tuple(overrides))
+    return SceneFile(text.text, tables)
 
 
 def build_scene(file: SceneFile) -> Scene:

@@ -100,8 +100,6 @@ def rebuild_frame_scene(frame: dict[str, Any], scene: Scene) -> Scene:
     return made
 
 
-__all__ = ["FRAME", "RunFolder", "read_frame", "restore_frame"]
-
 FRAME = "frame_{:06d}.npz"
 COUNTERS = ("time", "steps", "worst_residual", "steps_above", "steps_scaled", "steps_cut_off")
 

@@ -232,11 +232,8 @@ def find_faults(tables: SceneTables) -> Iterator[Problem]:
 def _find_wrong_sizes(tables: SceneTables) -> Iterator[Problem]:
     """Vectors that are not of the scene's dimensions."""
     vectors: list[tuple[str, Any]] = [("gravity", tables.gravity)]
-    for kind, entries in (
-        ("ground", tables.ground), ("body", tables.body), ("grains", tables.grains),
-        ("load", tables.load),
-    ):  # fmt: skip
-        for i, table in enumerate(entries):
+    for kind in ("ground", "body", "grains", "load"):
+        for i, table in enumerate(getattr(tables, kind)):
             vectors += [(f"{kind}.{i}.{name}", getattr(table, name, None)) for name in VECTORS]
             for k, vertex in enumerate(getattr(table, "vertices", None) or ()):
                 vectors.append((f"{kind}.{i}.vertices.{k}", vertex))

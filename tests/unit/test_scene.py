@@ -88,10 +88,13 @@ def test_shipped_scenes_load_without_doubts() -> None:
 
 def test_new_names_the_verb_that_reads_the_scene() -> None:
     """`trackbed new` says which verb goes on: that whose reader takes the scene."""
-    from qdem_fem.tables.prepared import read_tables as qdem_scene
+    from qdem_fem.scene.checks import GUIDE, Scene, read_scene
     from rigid_lcp.scene.file import load_scene as rigid_scene
 
-    readers = {"run": load_scene, "qdem": qdem_scene, "rigid": rigid_scene}
+    def check_qdem(path: Path) -> None:
+        read_scene(path, guide=GUIDE).check(Scene)
+
+    readers = {"run": load_scene, "qdem": check_qdem, "rigid": rigid_scene}
     for name in list_scenes():
         readers[find_scene_verb(name)](find_scene_file(name))
 

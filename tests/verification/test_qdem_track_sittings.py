@@ -142,6 +142,6 @@ def test_many_held_nodes_of_a_rigid_body(components: str, turning: int) -> None:
     which = np.tile(np.arange(len(components)), len(arm))
     places = np.repeat(arm, len(components), axis=0)
     nothing = np.zeros(len(which), dtype=int)
-    hold = find_hold(own, places, which, nothing, np.zeros(len(which)), "body")
-    assert hold.given.tolist() == [0, 0, -1 if components == "xy" else 0]
-    assert hold.turning == turning
+    given, _, found = find_hold(own, places, which, nothing, np.zeros(len(which)), "body")
+    assert given.tolist() == [0, 0, -1 if components == "xy" else 0]
+    assert found == turning

@@ -1,7 +1,7 @@
 """Run folders: one lock, whole files with digests, provenance, signals."""
 
 from trackbed.run_files import folder
-from trackbed.run_files.arguments import add_run_arguments, place_run, refuse_both
+from trackbed.run_files.arguments import add_run_arguments, place_run, refuse_both, time_step
 from trackbed.run_files.folder import (
     MANIFEST,
     RESULT,
@@ -15,7 +15,6 @@ from trackbed.run_files.folder import (
 )
 from trackbed.run_files.provenance import record_provenance
 from trackbed.run_files.signals import note_interrupts, note_signals, raise_on_signals
-from trackbed.run_files.trial import time_step
 from trackbed.run_files.whole import (
     append_text,
     digest_file,

@@ -1,11 +1,17 @@
-"""Arguments of the verbs that run a scene from its start to its end in a folder."""
+"""What the verbs share that run a scene from its start to its end in a folder: their arguments, and
+what a dry run says of the cost."""
 
 from __future__ import annotations
 
 import argparse
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 from trackbed.errors import UsageError
+
+TRIAL = 0.5
+"""Time that a dry run may spend on trial steps to find the cost [s]."""
 
 
 def add_run_arguments(
@@ -42,3 +48,19 @@ def place_run(arguments: argparse.Namespace) -> Path:
     """The run's folder: the one given, or SCENE-run beside the scene."""
     scene: Path = arguments.scene
     return arguments.run_folder or scene.with_name(f"{scene.stem}-run")
+
+
+def time_step(advance: Callable[[float], object], step: float, most: int) -> float:
+    """Time of one of at ``most`` so many steps on the clock [s]; the first ones compile.
+
+    ``advance`` goes on by so many seconds, ``step`` is the length of one step [s].
+    """
+    advance(step)
+    steps = 1
+    while True:
+        started = time.perf_counter()
+        advance(steps * step)
+        spent = time.perf_counter() - started
+        if spent > TRIAL / 4 or 2 * steps > most:
+            return spent / steps
+        steps *= 2

@@ -34,20 +34,16 @@ def refuse_writing(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise explain_refusal(path, error) from error
-
-
-def explain_refusal(path: Path, error: OSError) -> DiskFull | UsageError:
-    """What to raise when the system refuses to write: no space, no permission, no folder."""
-    full = error.errno in NO_ROOM
-    room = "make room" if full else "make room or get leave to write there"
-    remedy = f"{room}, then try again (a run goes on with --resume); or give another folder"
-    if error.errno in NO_FOLDER:
-        remedy = "a file is where the folder should be: give another folder"
-    if error.errno == ELOOP:
-        remedy = "it is a symbolic link, which may lead anywhere: remove it"
-    kind = DiskFull if full else UsageError
-    return kind(f"can not be written ({error.strerror or error})", where=str(path), remedy=remedy)
+        full = error.errno in NO_ROOM
+        room = "make room" if full else "make room or get leave to write there"
+        remedy = f"{room}, then try again (a run goes on with --resume); or give another folder"
+        if error.errno in NO_FOLDER:
+            remedy = "a file is where the folder should be: give another folder"
+        if error.errno == ELOOP:
+            remedy = "it is a symbolic link, which may lead anywhere: remove it"
+        what = f"can not be written ({error.strerror or error})"
+        kind = DiskFull if full else UsageError
+        raise kind(what, where=str(path), remedy=remedy) from error
 
 
 @contextmanager
@@ -85,9 +81,8 @@ def append_text(path: Path, text: str) -> None:
 def seal_file(path: Path) -> str:
     """Have the system write a file to the disk; its SHA-256.  Raises `OSError`."""
     with path.open("rb") as stream:
-        digest = hashlib.file_digest(stream, "sha256")
         os.fsync(stream.fileno())
-    return digest.hexdigest()
+    return digest_file(path)
 
 
 def digest_file(path: Path) -> str:
