@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
 from qdem_fem.files import MeshError
-from qdem_fem.mesh.surface import find_surface_faces
-from qdem_fem.mesh.tetrahedra import TetMesh, find_altitudes, find_gradients
+from qdem_fem.mesh.tetrahedra import TetMesh
 
 Pattern = Literal["kuhn", "five"]
 Triple = tuple[float, float, float]
@@ -64,33 +62,3 @@ def make_box_mesh(
         sets[f"{letter}-min"] = np.sort(sides[0].reshape(-1))
         sets[f"{letter}-max"] = np.sort(sides[-1].reshape(-1))
     return TetMesh(nodes, elements.reshape(-1, 4), node_sets=sets)
-
-
-def jitter_nodes(mesh: TetMesh, fraction: float, seed: int) -> TetMesh:
-    """Move the interior nodes at random, to make a mesh as irregular as a generator's.
-
-    Each goes uniformly into a ball around it whose radius is ``fraction`` of the smallest
-    altitude of its elements; nodes of the surface stay.  Below a fraction of 1/4 no element can
-    be turned inside out: a tetrahedron is at least half its smallest altitude wide, and four
-    nodes that reach a common plane must together cross that width.
-
-    Raises `MeshError` if the fraction is negative, or if an element is turned inside out.
-    """
-    if not 0 <= fraction < np.inf:
-        raise MeshError(
-            f"fraction is {fraction}", where="jitter", remedy="use 0 or more, best below 0.25"
-        )
-    gradients, _ = find_gradients(mesh.nodes, mesh.elements)
-    reach = np.full(len(mesh.nodes), np.inf)
-    for corner in mesh.elements.T:
-        np.minimum.at(reach, corner, find_altitudes(gradients))
-    reach[find_surface_faces(mesh.elements).reshape(-1)] = 0
-    reach[~np.isfinite(reach)] = 0
-
-    generator = np.random.default_rng(seed)
-    move = generator.standard_normal(mesh.nodes.shape)
-    move /= np.linalg.norm(move, axis=1)[:, None]
-    radius = fraction * reach * np.cbrt(generator.random(len(mesh.nodes)))
-    nodes = mesh.nodes + move * radius[:, None]
-    find_gradients(nodes, mesh.elements)  # refuses what was moved too far
-    return replace(mesh, nodes=nodes)

@@ -20,13 +20,14 @@ from numpy.typing import ArrayLike
 
 from qdem_fem import Body, Material, Series, Simulation
 from qdem_fem.element.kinematics import find_displacement_gradient
-from qdem_fem.mesh.generation import jitter_nodes, make_box_mesh
+from qdem_fem.mesh.generation import make_box_mesh
 from qdem_fem.mesh.tetrahedra import TetMesh
 from qdem_fem.report.spectra import find_peak_frequencies
 from validation.bench.qdem import judge
 from validation.bench.qdem.checks import fit_order
 from validation.bench.qdem.closed_forms import find_dilatational_speed
 from validation.bench.qdem.judge import FloatArray
+from validation.bench.qdem.meshes import jitter_nodes
 from validation.bench.qdem.problem import Problem, clamp_mesh, make_smooth_step
 
 # --- energy -----------------------------------------------------------------------------------

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from qdem_fem import Body, Material, Simulation
 from qdem_fem.files.errors import MeshError
 from qdem_fem.kernel.cpu.ordering import order_for_locality
-from qdem_fem.mesh.generation import jitter_nodes, make_box_mesh
+from qdem_fem.mesh.generation import make_box_mesh
 from qdem_fem.mesh.surface import (
     find_area_vectors,
     find_faces_within,
@@ -23,6 +23,7 @@ from qdem_fem.mesh.surface import (
 )
 from qdem_fem.mesh.tetrahedra import TetMesh, find_altitudes, find_gradients, read_mesh
 from tests.qdem_rings import make_ring_mesh
+from validation.bench.qdem.meshes import jitter_nodes
 
 EPS = float(np.finfo(np.float64).eps)
 EXTENDED = float(np.finfo(np.longdouble).eps)

@@ -13,11 +13,11 @@ import qdem_fem as q
 from qdem_fem.files import Floats, Integers
 from qdem_fem.files.errors import ElementInverted, StepWarning, Unstable
 from qdem_fem.march import steps
-from qdem_fem.mesh.generation import jitter_nodes, make_box_mesh
+from qdem_fem.mesh.generation import make_box_mesh
 from qdem_fem.mesh.tetrahedra import TetMesh
 from validation.bench.qdem import hard, judge
 from validation.bench.qdem.hard import CONCRETE
-from validation.bench.qdem.meshes import make_delaunay, make_graded, make_slivers, measure_edges
+from validation.bench.qdem.meshes import jitter_nodes, make_delaunay, make_slivers, measure_edges
 from validation.bench.qdem.problem import make_cantilever
 from validation.case import Check
 
@@ -26,6 +26,21 @@ def hold(checks: list[Check]) -> None:
     """All of them, or say which do not."""
     failing = [f"{check.name}: {check.value:.4g}, bar {check.bar}" for check in checks]
     assert all(check.holds for check in checks), "\n".join(failing)
+
+
+def make_graded(ratio: float, cells: int) -> tuple[Floats, Integers]:
+    """A unit cube whose cells shrink towards the corner at the origin.
+
+    Shells ``max(x, y, z) = s`` of a regular mesh are moved to ``ratio^((s - 1)/(1 - 1/cells))``:
+    from 1/ratio, the innermost cube, to 1, each by the same factor.  Kuhn's tetrahedra do not
+    cross the planes between the sides of the shells, so none is turned over.
+    """
+    mesh = make_box_mesh((1.0, 1.0, 1.0), (cells, cells, cells))
+    shell = mesh.nodes.max(axis=1)
+    inside = shell > 0
+    moved = np.zeros_like(shell)
+    moved[inside] = ratio ** ((shell[inside] - 1) / (1 - 1 / cells)) / shell[inside]
+    return mesh.nodes * moved[:, None], mesh.elements
 
 
 # --- shapes ----------------------------------------------------------------------------------

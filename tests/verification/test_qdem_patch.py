@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from qdem_fem import Body, Material, Simulation
-from qdem_fem.mesh.generation import jitter_nodes, make_box_mesh
+from qdem_fem.mesh.generation import make_box_mesh
 from tests.qdem_reference_forces import compute_cauchy_stress, stress_finger
+from validation.bench.qdem.meshes import jitter_nodes
 
 SOFT = Material(young=1e6, poisson=0.25, density=1000.0)
 

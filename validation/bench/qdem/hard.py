@@ -21,12 +21,12 @@ from scipy.sparse.linalg import eigsh
 from qdem_fem import Material
 from qdem_fem.bodies.mass_scaling import find_element_step
 from qdem_fem.files.errors import StepWarning
-from qdem_fem.mesh.generation import Pattern, jitter_nodes, make_box_mesh
+from qdem_fem.mesh.generation import Pattern, make_box_mesh
 from qdem_fem.mesh.tetrahedra import read_mesh
 from validation.bench.qdem.checks import check_below, check_between, report
 from validation.bench.qdem.closed_forms import CONCRETE_BEAM
 from validation.bench.qdem.judge import FloatArray, find_tip_p2, list_free
-from validation.bench.qdem.meshes import make_slivers
+from validation.bench.qdem.meshes import jitter_nodes, make_slivers
 from validation.bench.qdem.problem import Problem, clamp_mesh, find_tip_node, make_cantilever
 from validation.bench.qdem.static import StaticAnswer, relax
 from validation.bench.qdem.vibration import find_error, find_exact_motion, release

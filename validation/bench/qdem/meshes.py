@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
+from qdem_fem.files import Floats, Integers
 from qdem_fem.mesh.generation import make_box_mesh
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from qdem_fem.mesh.surface import find_surface_faces
+from qdem_fem.mesh.tetrahedra import TetMesh, find_altitudes, find_gradients
 
 EDGES = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)])
 
@@ -54,20 +55,23 @@ def make_slivers(altitude: float, cells: int = 4) -> tuple[Floats, Integers]:
     return nodes, mesh.elements
 
 
-SLIVER_STEP = {0.3: 0.83, 0.1: 0.51, 0.03: 0.28, 0.01: 0.16}
-"""Critical step of `make_slivers` over that of the undisturbed mesh, by altitude."""
+def jitter_nodes(mesh: TetMesh, fraction: float, seed: int) -> TetMesh:
+    """Move the interior nodes at random, to make a mesh as irregular as a generator's.
 
-
-def make_graded(ratio: float, cells: int = 12) -> tuple[Floats, Integers]:
-    """A unit cube whose cells shrink towards the corner at the origin.
-
-    Shells ``max(x, y, z) = s`` of a regular mesh are moved to ``ratio^((s - 1)/(1 - 1/cells))``:
-    from 1/ratio, the innermost cube, to 1, each by the same factor.  Kuhn's tetrahedra do not
-    cross the planes between the sides of the shells, so none is turned over.
+    Each goes uniformly into a ball around it whose radius is ``fraction`` of the smallest
+    altitude of its elements; nodes of the surface stay.  Below a fraction of 1/4 no element can
+    be turned inside out: a tetrahedron is at least half its smallest altitude wide, and four
+    nodes that reach a common plane must together cross that width.
     """
-    mesh = make_box_mesh((1.0, 1.0, 1.0), (cells, cells, cells))
-    shell = mesh.nodes.max(axis=1)
-    inside = shell > 0
-    moved = np.zeros_like(shell)
-    moved[inside] = ratio ** ((shell[inside] - 1) / (1 - 1 / cells)) / shell[inside]
-    return mesh.nodes * moved[:, None], mesh.elements
+    gradients, _ = find_gradients(mesh.nodes, mesh.elements)
+    reach = np.full(len(mesh.nodes), np.inf)
+    for corner in mesh.elements.T:
+        np.minimum.at(reach, corner, find_altitudes(gradients))
+    reach[find_surface_faces(mesh.elements).reshape(-1)] = 0
+    reach[~np.isfinite(reach)] = 0
+
+    generator = np.random.default_rng(seed)
+    move = generator.standard_normal(mesh.nodes.shape)
+    move /= np.linalg.norm(move, axis=1)[:, None]
+    radius = fraction * reach * np.cbrt(generator.random(len(mesh.nodes)))
+    return replace(mesh, nodes=mesh.nodes + move * radius[:, None])

@@ -7,12 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, make_problem
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 GRAVITY = 9.81
 Feature = tuple[int, tuple[float, float], float]
@@ -160,7 +157,7 @@ def build_pyramid(rows: int, walls: bool = False, seed: int = 1) -> Grains:
     return make_grains(centre, mass, 0.5 * mass, contacts, (0.0, -GRAVITY))
 
 
-def renumber(grains: Grains, contact: NDArray[np.int64], body: NDArray[np.int64]) -> Grains:
+def renumber(grains: Grains, contact: Ints, body: Ints) -> Grains:
     """The same grains with contacts and bodies in another order."""
     number = np.append(np.argsort(body), len(body))
     return Grains(

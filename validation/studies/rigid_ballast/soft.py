@@ -18,8 +18,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Bools, Floats, Ints
 from rigid_lcp.contact.detection_plane import (
     Shapes2D,
     find_pair_contacts,
@@ -35,9 +35,6 @@ from rigid_lcp.contact.near_pairs import (
 )
 from rigid_lcp.motion.state import Motion
 from rigid_lcp.motion.world import World
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 TANGENTIAL = 0.8
 """Tangential over normal stiffness [-], near Mindlin's ratio 2 (1 - nu) / (2 - nu)."""
@@ -131,7 +128,7 @@ def advance_grains(run: SoftGrains, body: int, forces: Floats, seconds: float) -
 @njit(cache=True)
 def list_pairs(
     kind: Ints, first: Ints, vertices: Floats, normals: Floats, radius: Floats, position: Floats,
-    movable: NDArray[np.bool_], skin: float,
+    movable: Bools, skin: float,
 ) -> Ints:  # fmt: skip
     """Pairs of bodies that are nearer than ``skin`` [m], a lower bound of their distance taken."""
     margin = np.full(len(kind), 0.5 * skin)
@@ -219,7 +216,7 @@ def apply_law(
 @njit(cache=True)
 def march_grains(
     kind: Ints, first: Ints, vertices: Floats, normals: Floats, radius: Floats,
-    movable: NDArray[np.bool_], reach: Floats, place: Floats, rates: Floats, inverse: Floats,
+    movable: Bools, reach: Floats, place: Floats, rates: Floats, inverse: Floats,
     gravity: Floats, law: Floats, skin: float, h: float, steps: int, loaded: int, forces: Floats,
     pair: Ints, key: Ints, point: Floats, spring: Floats,
 ) -> tuple[float, Ints, Floats, Floats, Ints, Ints, Floats, Floats]:  # fmt: skip

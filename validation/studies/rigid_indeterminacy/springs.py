@@ -13,12 +13,9 @@ from math import sqrt
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from rigid_lcp.arrays import Floats, Ints
 from validation.bench.rigid.static_grains import Grains
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 STEP = 0.15
 """Step in units of ``(m_min / k)^1/2``: a contact's period has 30 of them or more."""
