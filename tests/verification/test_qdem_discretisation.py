@@ -159,6 +159,8 @@ def test_what_is_exact_has_no_error() -> None:
     found = estimate_discretisation([(body, moved, False)], "small")
     assert found is not None
     assert found.displacement < 1e-12
+    # masses at nodes are the trapezoidal rule: int u^2, 23/12, and (b - a) h^2/6 u'^2 of each half
+    assert found.frequency == pytest.approx(1 - np.sqrt(1 + 1.25 / 24 / (23 / 12)), rel=1e-9)
     assert estimate_discretisation([(body, 0 * moved, False)], "small") is None
 
 

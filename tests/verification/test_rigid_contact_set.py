@@ -12,6 +12,7 @@ from scipy.spatial import Delaunay
 from rigid_lcp import Disc, HalfSpace, Polygon, Polyhedron, Scene, Simulation, Sphere, make_box
 from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import NotConverged
+from rigid_lcp.motion import count_parts, make_world
 
 GRAVITY = 9.81
 SIDE = 0.1
@@ -168,6 +169,20 @@ def test_two_balls_shot_at_each_other_meet():
     run = Simulation(scene, step=1e-3)
     run.advance(0.05)
     assert run.positions == pytest.approx(np.array([[-0.005, 0, 0], [0.005, 0, 0]]), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("speed", "gap", "parts"),
+    [(3, 0, 1), (5, 0, 2), (17, 0, 5), (4000, 0, 1000), (5, 9, 2), (5, 11, 1), (-5, 0, 1)],
+)
+def test_a_part_of_a_step_is_half_of_what_meets(speed, gap, parts):
+    """Discs of radius R = 8 h that approach by 2 v h take ceil(2 v / 8) parts, 1000 at most; one if
+    they part, or are ``gap`` h apart and that is farther.  Powers of two leave no round-off."""
+    scene, h = Scene(2, [0, 0]), 2.0**-10
+    for side in (-1, 1):
+        place, way = [side * (8 * h + gap * h / 2), 0], [-side * speed, 0]
+        scene.add(Disc(8 * h), density=1.0, position=place, velocity=way)
+    assert count_parts(*make_world(scene), h) == parts
 
 
 def test_a_step_too_long_for_bodies_that_meet_is_refused():
