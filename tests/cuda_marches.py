@@ -7,17 +7,14 @@ from typing import Any, NamedTuple
 from unittest.mock import patch
 
 import numpy as np
-from numpy.typing import NDArray
 
 from qdem_fem.contact.bounds import bound_spring_network
 from qdem_fem.contact.search.pairs import Pairs
 from qdem_fem.contact.search.periodic import find_extents
 from qdem_fem.contact.spheres.options import find_pair_stiffness
+from qdem_fem.files import Floats, Integers
 from validation.bench.qdem_gpu.contact import STEPS, stack_cubes
 from validation.bench.qdem_gpu.search import Cloud, find_pairs_gpu, make_contact
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 def lists_gpu_shuffled(given: Cloud, seed: int) -> Pairs:

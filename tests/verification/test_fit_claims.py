@@ -86,6 +86,16 @@ def test_growth_is_that_of_the_rate() -> None:
         assert found[1] == pytest.approx(found[0], rel=1e-6)
 
 
+def test_a_growth_is_judged_by_what_came_half_a_decade_before_the_end() -> None:
+    """ln N, and behind N0, that long before the end, N/N0 - 1 more, read to +-0.8: by what came
+    before N0 the end is missed by 10^(1/2) - 1 + 0.8, above three times 0.8; by what came nearly
+    to the end it is not.  Rates are over two readings, in which the scatter cancels."""
+    cycle, missed = 10 ** (np.arange(65) / 16), 0.8 * (-1) ** np.arange(65)
+    series = np.log(cycle) + np.maximum(cycle / 10**3.5 - 1, 0) + missed
+    growth = 10**-0.5 * (1 + 8 * (10**0.5 - 10**0.375) / np.log(10))
+    assert measure_growth(cycle, series[:, None]) == pytest.approx(growth)
+
+
 @pytest.mark.parametrize("noise", [0.0, 0.005])
 def test_a_rate_that_falls_is_let_go_ahead(noise: float) -> None:
     """Powers and logarithms read to 0.5 % of their range: none of 120 is said to quicken."""

@@ -9,15 +9,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import qdem_fem as q
 from qdem_fem.bodies.frames import BodyFrames
 from qdem_fem.element.kinematics import find_displacement_gradient
+from qdem_fem.files import Floats
 from qdem_fem.mesh.generation import make_box_mesh
 
-Floats = NDArray[np.float64]
 STONE = q.Material(30e9, 0.2, 2600.0)
 MESH = make_box_mesh((0.05, 0.04, 0.03), (4, 3, 3), "kuhn")
 EPS = float(np.finfo(np.float32).eps)

@@ -7,16 +7,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import qdem_fem as q
 from qdem_fem.contact.search.pairs import find_near_pairs, find_periodic_pairs
+from qdem_fem.files import Floats
 from qdem_fem.files.errors import CheckpointError, ConditionError, SceneError
 from qdem_fem.mesh.generation import make_box_mesh
 from qdem_fem.scene.build import make_simulation
 from qdem_fem.scene.checks import load_scene
 
-Floats = NDArray[np.float64]
 STONE = q.Material(30e9, 0.2, 2700.0)
 SIDE, RADIUS, WIDTH = 0.03, 0.006, 0.1
 ACROSS = q.PeriodicWidth("y", WIDTH)

@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import types
-from numpy.typing import NDArray
 
 from qdem_fem.contact.bounds import bound_contacts, bound_spring_network, shorten_step_by_contact
 from qdem_fem.contact.search.pairs import find_near_pairs, find_near_walls, renew_pairs
@@ -26,9 +25,8 @@ from qdem_fem.contact.spheres.law import (
     slide_spring,
 )
 from qdem_fem.contact.spheres.options import find_pair_stiffness, find_tangential_stiffness
+from qdem_fem.files import Floats, Integers
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 EPS = float(np.finfo(float).eps)
 NO_WALLS = np.zeros((2, 0), bool)
 

@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 import qdem_fem as q
 from qdem_fem.contact import window as contact_window
 from qdem_fem.contact.search.pairs import SEARCH, choose_skin
 from qdem_fem.contact.search.periodic import find_extents
 from qdem_fem.contact.spheres.options import SKIN_OF_SPHERES
+from qdem_fem.files import Floats
 from qdem_fem.files.errors import (
     CheckpointError,
     ConditionError,
@@ -32,7 +32,6 @@ from qdem_fem.scene.build import make_simulation
 from qdem_fem.scene.checks import load_scene
 from tests.qdem_slopes import slope_gain
 
-Floats = NDArray[np.float64]
 STONE = q.Material(30e9, 0.2, 2700.0)
 SIDE, RADIUS = 0.03, 0.006
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import qdem_fem as q
 from qdem_fem.contact.surface.options import find_sharp_edges, place_points
 from qdem_fem.contact.window import advance_contact
+from qdem_fem.files import Floats
 from qdem_fem.files.errors import ConditionError, ContactTooDeep
 from qdem_fem.mesh.generation import make_box_mesh
 from tests.qdem_slopes import slope_gain
@@ -23,7 +23,6 @@ pytestmark = [
     pytest.mark.long,  # the loop of surfaces compiles for a minute
     pytest.mark.filterwarnings("ignore::qdem_fem.files.SceneWarning"),  # of overlaps that are meant
 ]
-Floats = NDArray[np.float64]
 STONE = q.Material(30e9, 0.2, 2700.0)
 SIDE = 0.03
 MODULUS = 1e12

@@ -16,9 +16,9 @@ from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 import qdem_fem as q
 from qdem_fem.bodies import estimate_bending, estimate_discretisation
+from qdem_fem.files import Floats
 
 YOUNG, DENSITY = 30e9, 2400.0
-Floats = np.ndarray
 Place = Callable[[Floats], Floats]
 
 

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
@@ -19,6 +18,7 @@ from scipy.special import ellipj
 import qdem_fem as q
 from qdem_fem.bodies.rigid_mass import compute_rigid_mass, make_cross_matrix
 from qdem_fem.contact.bounds import bound_spring_network
+from qdem_fem.files import Floats
 from qdem_fem.files.errors import (
     CheckpointError,
     ConditionError,
@@ -32,7 +32,6 @@ from qdem_fem.scene.checks import load_scene
 from tests.qdem_slopes import slope_gain
 from trackbed import command
 
-Floats = NDArray[np.float64]
 STONE = q.Material(30e9, 0.2, 2700.0)
 SIDE, RADIUS = 0.03, 0.006
 BRICK = (0.02, 0.03, 0.05)

@@ -173,14 +173,15 @@ def test_two_balls_shot_at_each_other_meet():
 
 @pytest.mark.parametrize(
     ("speed", "gap", "parts"),
-    [(3, 0, 1), (5, 0, 2), (17, 0, 5), (4000, 0, 1000), (5, 9, 2), (5, 11, 1), (-5, 0, 1)],
-)
+    [((3, 0), 0, 1), ((5, 0), 0, 2), ((17, 0), 0, 5), ((4000, 0), 0, 1000), ((5, 0), 9, 2),
+     ((5, 0), 11, 1), ((-5, 0), 0, 1), ((0, 5), 3, 1)],
+)  # fmt: skip
 def test_a_part_of_a_step_is_half_of_what_meets(speed, gap, parts):
     """Discs of radius R = 8 h that approach by 2 v h take ceil(2 v / 8) parts, 1000 at most; one if
-    they part, or are ``gap`` h apart and that is farther.  Powers of two leave no round-off."""
+    they part, pass by, or are farther apart, ``gap`` h.  Powers of two leave no round-off."""
     scene, h = Scene(2, [0, 0]), 2.0**-10
     for side in (-1, 1):
-        place, way = [side * (8 * h + gap * h / 2), 0], [-side * speed, 0]
+        place, way = [side * (8 * h + gap * h / 2), 0], [-side * v for v in speed]
         scene.add(Disc(8 * h), density=1.0, position=place, velocity=way)
     assert count_parts(*make_world(scene), h) == parts
 
