@@ -7,9 +7,10 @@ import json
 import sys
 import time
 from contextlib import suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from trackbed.run_files import add_run_arguments, place_run, refuse_both, time_step
+from trackbed.run_files import add_run_arguments, place_run, time_step
 
 if TYPE_CHECKING:
     from rigid_lcp.scene import SceneFile, Simulation
@@ -28,11 +29,11 @@ def run_rigid(arguments: argparse.Namespace) -> int:
     """Run a scene, or tell what would run."""
     from rigid_lcp.scene import list_doubts, load_scene
 
-    refuse_both(arguments)
+    path = place_run(arguments)
     file = load_scene(arguments.scene, arguments.overrides)
     for doubt in list_doubts(file.tables):
         print(f"warning: {doubt}", file=sys.stderr)
-    answer = _preview_run(file) if arguments.dry_run else _run(file, arguments)
+    answer = _preview_run(file) if arguments.dry_run else _run(file, path, arguments)
     if arguments.json:
         print(json.dumps(answer, indent=1))
     else:
@@ -72,13 +73,12 @@ def _preview_run(file: SceneFile) -> dict[str, Any]:
     }
 
 
-def _run(file: SceneFile, arguments: argparse.Namespace) -> dict[str, Any]:
+def _run(file: SceneFile, path: Path, arguments: argparse.Namespace) -> dict[str, Any]:
     """The whole run with its report; its summary."""
     from rigid_lcp.report import write_report
     from rigid_lcp.scene import RunFolder, make_simulation, run_scene, summarise_run
     from trackbed.run_files import raise_on_signals, record_provenance, write_result
 
-    path = place_run(arguments)
     folder = RunFolder(path)
     manifest = {
         "scene": file.tables.model_dump(mode="json"),

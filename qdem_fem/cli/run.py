@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from trackbed.run_files import add_run_arguments, place_run, refuse_both, time_step
+from trackbed.run_files import add_run_arguments, place_run, time_step
 
 if TYPE_CHECKING:
     from qdem_fem.tables import Prepared
@@ -33,7 +33,7 @@ def run_qdem(arguments: argparse.Namespace) -> int:
     from qdem_fem.files import SceneWarning
     from qdem_fem.scene import load_scene
 
-    refuse_both(arguments)
+    path = place_run(arguments)
     said: list[str] = []
     with warnings.catch_warnings():
         warnings.filterwarnings("always", category=SceneWarning)
@@ -42,12 +42,14 @@ def run_qdem(arguments: argparse.Namespace) -> int:
         if arguments.dry_run:
             summary = _preview_run(prepared) | {"warnings": said}
         else:
-            summary = _run(prepared, arguments, said)
+            summary = _run(prepared, path, arguments, said)
     _print(summary, arguments.json)
     return 0
 
 
-def _run(prepared: Prepared, arguments: argparse.Namespace, said: list[str]) -> dict[str, Any]:
+def _run(
+    prepared: Prepared, path: Path, arguments: argparse.Namespace, said: list[str]
+) -> dict[str, Any]:
     """The whole run with its report; its summary.  ``said``: warnings so far."""
     from qdem_fem.scene import (
         RunFolder,
@@ -59,7 +61,6 @@ def _run(prepared: Prepared, arguments: argparse.Namespace, said: list[str]) -> 
     )
     from trackbed.run_files import record_provenance, write_result
 
-    path = place_run(arguments)
     folder = RunFolder(path)
     manifest = {
         "scene": prepared.scene.parameters(),

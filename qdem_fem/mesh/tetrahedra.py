@@ -31,10 +31,6 @@ _SLIVER = 1e-2
 precision; few or no elements of a sound mesh are below it."""
 
 
-def _make_empty() -> Integers:
-    return np.zeros(0, np.int64)
-
-
 @dataclass(frozen=True, eq=False)
 class TetMesh:
     """Linear tetrahedra in the reference configuration; every element is right-handed.
@@ -46,9 +42,9 @@ class TetMesh:
     """Coordinates X [m], (n, 3)."""
     elements: Integers
     """The nodes of each element, (m, 4), with (X1 - X0) x (X2 - X0) . (X3 - X0) > 0."""
-    flipped: Integers = field(default_factory=_make_empty)
+    flipped: Integers = field(default_factory=lambda: np.zeros(0, np.int64))
     """Elements that were left-handed as given, and whose last two nodes were swapped, (k,)."""
-    unused: Integers = field(default_factory=_make_empty)
+    unused: Integers = field(default_factory=lambda: np.zeros(0, np.int64))
     """Nodes of no element, (j,); they have no mass and do not move."""
     node_sets: dict[str, Integers] = field(default_factory=dict)
     """Named nodes, each sorted."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -83,8 +82,7 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Prepared:
                 conditions.append(step)
     probes: dict[str, tuple[str, Integers]] = {}
     for _, output in list_tables(text, Output):
-        found = list(_fill_probes(output, names, meshes, probes))
-        problems += found
+        problems += _fill_probes(output, names, meshes, probes)
     problems += find_output_faults(text)
     problems += find_motion_faults(text)
     for _, contact in list_tables(text, ContactTable):
@@ -108,7 +106,12 @@ def _make_meshes(text: SceneText, folder: Path) -> tuple[dict[str, TetMesh], lis
     meshes: dict[str, TetMesh] = {}
     problems: list[Problem] = []
     seen: dict[str, str] = {}
-    for key, name, table, regions in list_mesh_tables(text):
+    for key, entry in _list_named_bodies(text):
+        try:
+            table = Mesh.model_validate(entry.get("mesh"))
+        except ValidationError:
+            continue  # its faults are known
+        name, body = entry["name"], text.tables.get(key)
         if name in seen:
             what = f"{seen[name]} has this name already"
             problems.append(Problem(f"{key}.name", what))
@@ -123,24 +126,13 @@ def _make_meshes(text: SceneText, folder: Path) -> tuple[dict[str, TetMesh], lis
             file = error.where if error.where.startswith("mesh file") else ""
             problems.append(Problem(f"{key}.mesh", describe_error(error), file))
             continue
-        for region in regions:
+        for region in body.regions if isinstance(body, BodyTable) else ():
             if region not in mesh.element_sets:
                 near = suggest_word(region, mesh.element_sets) or "; the mesh has none"
                 what = f"there is no element set {region!r}{near}"
                 problems.append(Problem(f"{key}.regions.{region}", what))
         meshes[name] = mesh
     return meshes, problems
-
-
-def list_mesh_tables(text: SceneText) -> Iterator[tuple[str, str, Mesh, list[str]]]:
-    """Key, name, mesh and regions of each body whose mesh is sound, whatever else is wrong."""
-    for key, entry in _list_named_bodies(text):
-        body = text.tables.get(key)
-        if isinstance(body, BodyTable):
-            yield key, body.name, body.mesh, list(body.regions)
-        else:
-            with suppress(ValidationError):
-                yield key, entry["name"], Mesh.model_validate(entry.get("mesh")), []
 
 
 def _check_condition(

@@ -62,11 +62,6 @@ class RunFolder(run_folder.RunFolder):
         "scene.output.audit", "scene.output.magnification", "scene.output.modes",
     )  # fmt: skip
 
-    @property
-    def checkpoint(self) -> Path:
-        """Where the last saved state is."""
-        return self.path / CHECKPOINT
-
 
 @dataclass(frozen=True)
 class Plan:
@@ -144,13 +139,13 @@ def run_dynamic(
     Every row and field is the same, bit by bit, however often the run was interrupted.  SIGINT
     and SIGTERM save the state and raise `Interrupted`.
     """
-    goes_on = resume and folder.checkpoint.exists()
+    checkpoint = folder.path / CHECKPOINT
+    goes_on = resume and checkpoint.exists()
     if goes_on:
-        run.restore(folder.checkpoint)
-    probes = {name: (bodies[body], nodes) for name, (body, nodes) in prepared.probes.items()}
+        run.restore(checkpoint)
     plan = make_plan(prepared, float(run.step))
     done = Done(run, bodies, plan, {"cpu_s": 0.0, "wall_s": 0.0})
-    record = _Record(done, plan, folder.path, probes, prepared.scene.audit)
+    record = _Record(prepared, done, folder.path)
     if goes_on:
         cost = read_object(folder.path / COST) or {}  # none: killed before it was written
         record.resume(cost.pop(SEALS, {}))
@@ -164,12 +159,12 @@ def run_dynamic(
             progress.report(run.steps_done, plan.total, run.time)
             late = time.monotonic() - saved >= prepared.scene.output.checkpoint_interval
             if stop.name or late or run.steps_done == plan.total:
-                record.save(folder.checkpoint)
+                record.save(checkpoint)
                 saved = time.monotonic()
             if stop.name and run.steps_done < plan.total:
                 raise Interrupted(
                     f"stopped by {stop.name} at t = {run.time:.6g} s; the state is saved in "
-                    f"{folder.checkpoint}\n  -> the same command with --resume goes on from there"
+                    f"{checkpoint}\n  -> the same command with --resume goes on from there"
                 )
     done.discretisation = run.estimate_errors(record.peak)
     warn_of_strain(run, record.peak)
@@ -184,30 +179,26 @@ def run_static(prepared: Prepared, run: Any, bodies: dict[str, Any], folder: Run
     started, cpu = time.perf_counter(), time.process_time()
     answer = run.relax(tolerance=prepared.scene.simulation.tolerance)
     cost = {"cpu_s": time.process_time() - cpu, "wall_s": time.perf_counter() - started}
-    probes = {name: (bodies[body], nodes) for name, (body, nodes) in prepared.probes.items()}
     names = ("residual", "solver_bound", "steps")
     facts = {name: float(getattr(answer, name)) for name in names}
     done = Done(run, bodies, None, cost, facts, answer.discretisation)
-    record = _Record(done, None, folder.path, probes)
+    record = _Record(prepared, done, folder.path)
     record.begin()
     warn_of_strain(run, record.peak)
     return done
 
 
 class _Record:
-    """What a run writes on its way; without a ``plan`` only what it came to.
+    """What a run writes on its way; of a static answer only what it came to."""
 
-    ``audit``: share of the greatest energy that may be missing.
-    """
-
-    def __init__(
-        self, done: Done, plan: Plan | None, path: Path, probes: dict[str, Any],
-        audit: float | None = None,
-    ) -> None:  # fmt: skip
-        self.done, self.run, self.path, self.probes = done, done.run, path, probes
-        self.plan = plan or Plan(0.0, 0, 1, 1, 1, 1, every_field=False)
-        self.audit, self.account = audit, EnergyAccount()
-        names = [f"{name}_{axis}" for name in probes for axis in "xyz"]
+    def __init__(self, prepared: Prepared, done: Done, path: Path) -> None:
+        self.done, self.run, self.path = done, done.run, path
+        self.probes = {
+            name: (done.bodies[on], nodes) for name, (on, nodes) in prepared.probes.items()
+        }
+        self.plan = done.plan or Plan(0.0, 0, 1, 1, 1, 1, every_field=False)
+        self.audit, self.account = prepared.scene.audit, EnergyAccount()
+        names = [f"{name}_{axis}" for name in self.probes for axis in "xyz"]
         self.rows = Table(path / "probes.csv", ["time", *names])
         self.energies = Table(path / "energy.csv", ["time", *list_energies(self.run)])
         self.peak, self.peak_energy = self.run.assembly.field("displacement"), -1.0

@@ -22,21 +22,20 @@ FREE_SAMPLES = 50  # of free motion at least, for modes to be sought in it [-]
 def summarise_run(prepared: Prepared, done: Done, folder: RunFolder) -> dict[str, Any]:
     """All figures of a finished run; SI units, ready for JSON."""
     run, cost = done.run, done.cost
-    static = done.plan is None
     elements = sum(len(body.elements) for body in done.bodies.values() if not body.rigid)
-    element_steps = 0 if done.plan is None else elements * done.plan.total
+    steps = 0 if done.plan is None else done.plan.total
     rows, energy = (read_table(folder.path / name) for name in ("probes.csv", "energy.csv"))
     return {
         "title": prepared.scene.title,
         "method": prepared.scene.simulation.method,
-        "time": 0.0 if static else float(run.time),
-        "step": None if static else float(run.step),
-        "steps": 0 if done.plan is None else done.plan.total,
+        "time": float(run.time) if steps else 0.0,
+        "step": float(run.step) if steps else None,
+        "steps": steps,
         "critical_step": describe_critical_step(run),
         "mass_scaling": list_mass_scaling_facts(run),
         "bodies": list_body_facts(done.bodies),
-        "cost": {**cost, "million_elements_per_s": element_steps / 1e6 / cost["wall_s"]}
-        if element_steps and cost["wall_s"]
+        "cost": {**cost, "million_elements_per_s": elements * steps / 1e6 / cost["wall_s"]}
+        if elements * steps and cost["wall_s"]
         else dict(cost),
         "energy": list_energy_facts(energy),
         "probes": {

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from qdem_fem.files import Floats, Integers
 from qdem_fem.tables.keys import Mesh, Nodes
@@ -70,7 +69,6 @@ def find_named_nodes(nodes: Nodes, mesh: TetMesh, key: str) -> Integers:
         raise WrongKey(key, f"give exactly one of {', '.join(KINDS)}")
     kind = given[0]
     x = mesh.nodes
-    chosen: npt.NDArray[np.bool_]
     used = np.ones(len(x), bool)
     used[mesh.unused] = False
     if nodes.set is not None:
@@ -80,24 +78,22 @@ def find_named_nodes(nodes: Nodes, mesh: TetMesh, key: str) -> Integers:
             known = f" (sets of this mesh: {', '.join(sorted(sets)[:20])})"
             what = f"there is no set {nodes.set!r}{near}{known if 'mean' in near else ''}"
             raise WrongKey(f"{key}.set", what)
-        chosen = np.zeros(len(x), bool)
-        chosen[sets[nodes.set]] = True
+        found = sets[nodes.set]
     elif nodes.box is not None:
         low, high = np.array(nodes.box.min), np.array(nodes.box.max)
         if (low > high).any():
             raise WrongKey(f"{key}.box", "min must not be above max")
-        chosen = np.asarray(((x >= low) & (x <= high)).all(axis=1), bool)
+        found = np.flatnonzero(((x >= low) & (x <= high)).all(axis=1))
     elif nodes.plane is not None:
         normal = make_unit_vector(nodes.plane.normal, f"{key}.plane.normal")
         height = (x - np.array(nodes.plane.point)) @ normal
-        chosen = (height >= -nodes.plane.tolerance) & (height <= nodes.plane.tolerance)
+        found = np.flatnonzero(np.abs(height) <= nodes.plane.tolerance)
     elif nodes.nearest is not None:
         distance = np.linalg.norm(x - np.array(nodes.nearest), axis=1)
-        chosen = np.zeros(len(x), bool)
-        chosen[np.argmin(np.where(used, distance, np.inf))] = True
+        found = np.argmin(np.where(used, distance, np.inf)).reshape(1)
     else:
-        chosen = used
-    found = np.flatnonzero(chosen & used)
+        found = np.flatnonzero(used)
+    found = found[used[found]]
     if not len(found):
         low, high = x[used].min(axis=0), x[used].max(axis=0)
         spans = ", ".join(f"{a:g} ... {b:g}" for a, b in zip(low, high, strict=True))

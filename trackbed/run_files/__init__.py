@@ -1,7 +1,7 @@
 """Run folders: one lock, whole files with digests, provenance, signals."""
 
 from trackbed.run_files import folder
-from trackbed.run_files.arguments import add_run_arguments, place_run, refuse_both, time_step
+from trackbed.run_files.arguments import add_run_arguments, place_run, time_step
 from trackbed.run_files.folder import (
     MANIFEST,
     RESULT,
@@ -32,7 +32,6 @@ __all__ = [
     "MANIFEST", "RESULT", "add_run_arguments", "append_text", "digest_file", "folder",
     "is_written", "list_changed_tables", "list_differences", "lock_folder", "note_interrupts",
     "note_signals", "open_unlinked", "place_run", "raise_on_signals", "read_object",
-    "record_provenance", "refuse_both", "refuse_format", "refuse_links", "refuse_writing",
-    "replace_file", "seal_file", "sync_folder", "time_step", "write_pvd", "write_result",
-    "write_whole",
+    "record_provenance", "refuse_format", "refuse_links", "refuse_writing", "replace_file",
+    "seal_file", "sync_folder", "time_step", "write_pvd", "write_result", "write_whole",
 ]  # fmt: skip

@@ -38,14 +38,13 @@ def add_run_arguments(
     parser.add_argument("--json", action="store_true", help="print JSON on standard output")
 
 
-def refuse_both(arguments: argparse.Namespace) -> None:
-    """Raise `UsageError` for ``--resume`` beside ``--force``."""
+def place_run(arguments: argparse.Namespace) -> Path:
+    """The run's folder: the one given, or SCENE-run beside the scene.
+
+    Raises `UsageError` for ``--resume`` beside ``--force``.
+    """
     if arguments.resume and arguments.force:
         raise UsageError("--resume and --force exclude each other", remedy="give one of them")
-
-
-def place_run(arguments: argparse.Namespace) -> Path:
-    """The run's folder: the one given, or SCENE-run beside the scene."""
     scene: Path = arguments.scene
     return arguments.run_folder or scene.with_name(f"{scene.stem}-run")
 
