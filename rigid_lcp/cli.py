@@ -5,12 +5,10 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-import time
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from trackbed.run_files import add_run_arguments, place_run, time_step
+from trackbed.run_files import Progress, add_run_arguments, place_run, time_step
 
 if TYPE_CHECKING:
     from rigid_lcp.scene import SceneFile, Simulation
@@ -88,32 +86,17 @@ def _run(file: SceneFile, path: Path, arguments: argparse.Namespace) -> dict[str
     if finished := folder.look_ahead(manifest, **given):
         return finished | {"folder": str(path)}
     scene, run = make_simulation(file)  # what it refuses must not leave a folder behind
+    progress = Progress(0.0)
+
+    def show(now: float, end: float, run: Simulation) -> None:
+        progress.report(now, end, f"{now:.4g} of {end:.4g} s, {len(run.contacts)} contacts")
+
     kept = "every finished frame is saved"
     remedy = "the same command with --resume goes on from the last one"
     with folder.lock(), raise_on_signals(kept, remedy, str(path)):
         goes_on = folder.prepare(manifest, file.text, **given)
-        run_scene(file, run, folder, resume=goes_on, progress=_make_progress())
+        run_scene(file, run, folder, resume=goes_on, progress=show)
         summary = summarise_run(file, scene, run, folder)
         write_report(folder, scene, manifest, summary, draw=not arguments.no_pictures)
         write_result(path, summary)
     return summary | {"folder": str(path)}
-
-
-def _make_progress() -> Any:
-    """A line on standard error after every frame: time reached, contacts, time left."""
-    began = time.monotonic()
-    first: list[float] = []
-
-    def show(now: float, duration: float, run: Simulation) -> None:
-        if not first:
-            first.append(now)
-        spent = time.monotonic() - began
-        left = spent / max(now - first[0] / 2, 1e-12) * (duration - now)
-        with suppress(OSError):  # who reads this line may be gone; the run goes on
-            print(
-                f"{now:.4g} of {duration:.4g} s, {len(run.contacts)} contacts, "
-                f"about {max(left, 0.0):.0f} s left",
-                file=sys.stderr, flush=True,
-            )  # fmt: skip
-
-    return show

@@ -5,14 +5,13 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-import time
 import warnings
 from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from trackbed.run_files import add_run_arguments, place_run, time_step
+from trackbed.run_files import Progress, add_run_arguments, place_run, time_step
 
 if TYPE_CHECKING:
     from qdem_fem.tables import Prepared
@@ -191,23 +190,3 @@ def _print(content: dict[str, Any], as_json: bool) -> None:
         rate = f", {speed:.3g} million element-steps per second" if speed else ""
         print(f"{cost['cpu_s']:.3g} s of CPU time{rate}")
         print(f"{content['folder']}/report.html")
-
-
-class Progress:
-    """How far a run is, on standard error: a line every 10 s."""
-
-    def __init__(self) -> None:
-        self._printed = time.monotonic()
-        self._first: tuple[float, int] | None = None
-
-    def report(self, steps: int, total: int, when: float) -> None:
-        """So many of all steps are done; ``when`` is the simulated time [s]."""
-        now = time.monotonic()
-        first = self._first = self._first or (now, steps)
-        if now - self._printed >= 10 and steps > first[1]:
-            self._printed = now
-            left = (now - first[0]) / (steps - first[1]) * (total - steps)
-            print(
-                f"t = {when:.4g} s, step {steps} of {total}, {left:.0f} s left",
-                file=sys.stderr, flush=True,
-            )  # fmt: skip

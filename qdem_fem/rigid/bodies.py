@@ -92,9 +92,8 @@ class RigidBodies:
         count = len(counts)
         still = np.zeros((count, 3))
         none = np.zeros(0, np.int64)
-        first, node_at, force_at, arm = self._vertices(np.arange(len(self.nodes)))
         self._every = Rigid(
-            node_first=first, node_at=node_at, force_at=force_at, arm=arm,
+            *self._vertices(np.arange(len(self.nodes))),
             inverse_mass=1 / self.mass,
             axes=np.array([own.axes for own in self.own]),
             inverse_inertia=1 / np.array([own.inertia for own in self.own]),
@@ -114,7 +113,7 @@ class RigidBodies:
             if body._velocity.any():
                 self._set_velocity(b, body._velocity)
 
-    def _vertices(self, chosen: Integers) -> tuple[Any, ...]:
+    def _vertices(self, chosen: Integers) -> tuple[Any, Any, Any, Any]:
         """First four entries of `Rigid` for some of the nodes, in their order."""
         place = self.place[chosen]
         return (
@@ -335,10 +334,9 @@ class RigidBodies:
             for nodes in (touching, probed):
                 row = self.of_place[nodes // 4]
                 needed[row[row >= 0]] = True
-            names = ("node_first", "node_at", "force_at", "arm")
             vertices = self._vertices(np.flatnonzero(needed))
             self._following = np.flatnonzero(~needed)
-            self.kernel = self._every._replace(**dict(zip(names, vertices, strict=True)))
+            self.kernel = Rigid(*vertices, *self._every[len(vertices) :])
             self._seen = probed.copy()
         return self.kernel
 

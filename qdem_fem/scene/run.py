@@ -135,7 +135,7 @@ def run_dynamic(
     """Advance a scene to its duration, from its start or from the last checkpoint.
 
     ``run`` and ``bodies`` are those of `make_simulation`, ``progress`` is a
-    `qdem_fem.cli.run.Progress`.
+    `trackbed.run_files.Progress`.
     Every row and field is the same, bit by bit, however often the run was interrupted.  SIGINT
     and SIGTERM save the state and raise `Interrupted`.
     """
@@ -156,7 +156,8 @@ def run_dynamic(
     with note_signals() as stop:
         while run.steps_done < plan.total:
             record.advance(plan.find_next_stop(run.steps_done) - run.steps_done)
-            progress.report(run.steps_done, plan.total, run.time)
+            text = f"t = {run.time:.4g} s, step {run.steps_done} of {plan.total}"
+            progress.report(run.steps_done, plan.total, text)
             late = time.monotonic() - saved >= prepared.scene.output.checkpoint_interval
             if stop.name or late or run.steps_done == plan.total:
                 record.save(checkpoint)

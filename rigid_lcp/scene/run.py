@@ -20,7 +20,7 @@ from rigid_lcp.wear import Breakage, Wear
 from trackbed.run_files import write_whole
 
 Progress = Callable[[float, float, Simulation], None]
-"""Called after every frame: time reached, duration [s], the run."""
+"""Called at the start and after every frame: time reached, duration [s], the run."""
 
 HISTORY = ("time", "energy", "contacts", "sliding", "overlap", "residual", "cpu")
 
@@ -55,6 +55,7 @@ def run_scene(
     if not there:
         folder.write_frame(0, run, 0.0)
     began = time.process_time()
+    progress(run.time, duration, run)
     for number in range(max(len(there), 1), len(times)):
         run.advance(float(times[number] - times[number - 1]))
         folder.write_frame(number, run, spent + time.process_time() - began)

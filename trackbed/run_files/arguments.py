@@ -1,11 +1,13 @@
-"""What the verbs share that run a scene from its start to its end in a folder: their arguments, and
-what a dry run says of the cost."""
+"""What verbs share that run a scene to its end in a folder: their arguments, the cost that a dry
+run states, and lines on the way."""
 
 from __future__ import annotations
 
 import argparse
+import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 from trackbed.errors import UsageError
@@ -63,3 +65,21 @@ def time_step(advance: Callable[[float], object], step: float, most: int) -> flo
         if spent > TRIAL / 4 or 2 * steps > most:
             return spent / steps
         steps *= 2
+
+
+class Progress:
+    """How far a run is, on standard error: lines that are ``apart`` [s] at least."""
+
+    def __init__(self, apart: float = 10.0) -> None:
+        self.apart, self._printed = apart, time.monotonic()
+        self._first: tuple[float, float] | None = None
+
+    def report(self, done: float, total: float, text: str) -> None:
+        """So much of the ``total`` is done, in words the ``text``; the first call is the start."""
+        now = time.monotonic()
+        first = self._first = self._first or (now, done)
+        if now - self._printed >= self.apart and done > first[1]:
+            self._printed = now
+            left = (now - first[0]) / (done - first[1]) * (total - done)
+            with suppress(OSError):  # who reads this line may be gone; the run goes on
+                print(f"{text}, {left:.0f} s left", file=sys.stderr, flush=True)
