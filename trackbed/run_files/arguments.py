@@ -80,6 +80,6 @@ class Progress:
         first = self._first = self._first or (now, done)
         if now - self._printed >= self.apart and done > first[1]:
             self._printed = now
-            left = (now - first[0]) / (done - first[1]) * (total - done)
+            left = (now - first[0]) / (done - first[1]) * max(total - done, 0.0)
             with suppress(OSError):  # who reads this line may be gone; the run goes on
                 print(f"{text}, {left:.0f} s left", file=sys.stderr, flush=True)
