@@ -51,20 +51,15 @@ def find_surface_faces(elements: Integers, where: str = "mesh") -> Integers:
 
 def _raise_overlap(face: Integers, elements: Integers, where: str) -> None:
     owners = np.flatnonzero(np.isin(elements, face).sum(axis=1) == 3)
-    shown = ", ".join(map(str, owners[:_OWNERS_SHOWN])) + (
-        ", ..." if len(owners) > _OWNERS_SHOWN else ""
-    )
-    many = len(owners) > 2
-    raise MeshError(
-        f"{len(owners)} elements ({shown}) share the face of nodes {face.tolist()}"
-        if many
-        else f"elements {shown} lie on the same side of the face of nodes {face.tolist()} "
-        "that they share: they overlap",
-        where=where,
-        remedy="remove the elements that are one too many"
-        if many
-        else "one of them was turned inside out: mesh again there, or move its nodes back",
-    )
+    shown = ", ".join(map(str, owners[:_OWNERS_SHOWN])) + ", ..." * (len(owners) > _OWNERS_SHOWN)
+    if len(owners) > 2:
+        what = f"{len(owners)} elements ({shown}) share the face of nodes {face.tolist()}"
+        remedy = "remove the elements that are one too many"
+    else:
+        what = f"elements {shown} lie on the same side of the face of nodes {face.tolist()} "
+        what += "that they share: they overlap"
+        remedy = "one of them was turned inside out: mesh again there, or move its nodes back"
+    raise MeshError(what, where=where, remedy=remedy)
 
 
 def find_area_vectors(nodes: Floats, faces: Integers) -> Floats:

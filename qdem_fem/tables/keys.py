@@ -279,28 +279,21 @@ class Scene(Table):
             for body in self.body
             if not body.rigid
         )
+        driven = self.load or self.pressure or self.prescribe or self.simulation.gravity
+        moved = driven or any(body.moves for body in self.body)
+        turns = MEASURES[self.simulation.strain].OBJECTIVE
         missing = [
             (not viscous, "viscosity: the material is elastic"),
             (self.simulation.gravity is None, "gravity"),
-            (
-                not self._is_driven(),
-                "any cause of motion: no load, pressure, gravity, displacement",
-            ),
+            (not moved, "any cause of motion: no load, pressure, gravity, displacement"),
             (self.simulation.mass_scaling is None, "mass scaling: every mass is the material's"),
-            (
-                not MEASURES[self.simulation.strain].OBJECTIVE,
-                f"finite rotations: the strain is {self.simulation.strain}",
-            ),
+            (not turns, f"finite rotations: the strain is {self.simulation.strain}"),
             (self.simulation.method == "static", "inertia: the answer is static"),
             (self.contact is None, "contact and friction between bodies"),
             (any(body.rigid for body in self.body), "deformation of the bodies said to be rigid"),
             (True, "plasticity, damage and fracture"),
         ]
         return [text for absent, text in missing if absent]
-
-    def _is_driven(self) -> bool:
-        driven = self.load or self.pressure or self.prescribe or self.simulation.gravity
-        return bool(driven) or any(body.moves for body in self.body)
 
     def parameters(self) -> dict[str, Any]:
         """Every effective value, defaults included, as JSON would hold it."""
