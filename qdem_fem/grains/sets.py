@@ -129,14 +129,11 @@ def load_grains(path: str | os.PathLike[str]) -> GrainSet:
             nodes, faces, shape = file["nodes"], file["corner_faces"], file["shape"]
     except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
         raise MeshError(f"not a set of grains ({error})", where=where, remedy=remedy) from error
-    wanted = ((5 * corners.sum() - 5 * len(corners), 3), (2 * corners.sum() - 4 * len(corners), 3))
-    if (
-        number != GRAINS_FORMAT
-        or (nodes.shape, faces.shape) != wanted
-        or shape.shape != (3, len(corners))
-    ):
+    total, count = corners.sum(), len(corners)
+    wanted = (GRAINS_FORMAT, (5 * (total - count), 3), (2 * (total - 2 * count), 3), (3, count))
+    if (number, nodes.shape, faces.shape, shape.shape) != wanted:
         raise MeshError(
-            f"format {number}, nodes {nodes.shape}, faces {faces.shape} for {len(corners)} grains",
+            f"format {number}, nodes {nodes.shape}, faces {faces.shape} for {count} grains",
             where=where, remedy=remedy,
         )  # fmt: skip
     return GrainSet(corners, nodes, faces.astype(np.int64), *shape)

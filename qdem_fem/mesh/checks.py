@@ -34,13 +34,12 @@ def raise_problems(problems: list[Problem], where: str) -> None:
     """Raise one `MeshError` that names all problems, if there are any."""
     if not problems:
         return
-    listed = "".join(f"\n  {number}. {p.what}" for number, p in enumerate(problems, 1))
-    raise MeshError(
-        problems[0].what
-        if len(problems) == 1
-        else f"{len(problems)} problems with this mesh:{listed}",
-        where=where, remedy="; ".join(dict.fromkeys(p.remedy for p in problems)),
-    )  # fmt: skip
+    what = problems[0].what
+    if len(problems) > 1:
+        listed = "".join(f"\n  {number}. {p.what}" for number, p in enumerate(problems, 1))
+        what = f"{len(problems)} problems with this mesh:{listed}"
+    remedy = "; ".join(dict.fromkeys(p.remedy for p in problems))
+    raise MeshError(what, where=where, remedy=remedy)
 
 
 def convert_array(raw: Any, what: str, kinds: str, of: str, remedy: str) -> Any:

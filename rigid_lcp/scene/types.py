@@ -221,9 +221,8 @@ def find_faults(tables: SceneTables) -> Iterator[Problem]:
             yield Problem(f"grains.{i}.corners", "a polyhedron has at least 4")
     if tables.run.method == "acceleration" and (tables.wear or tables.strength):
         yield Problem("run.method", "nothing wears or breaks at acceleration level")
-    if tables.strength and (tables.strength.modulus is None) != (
-        tables.strength.reference_volume is None
-    ):
+    size = tables.strength and (tables.strength.modulus, tables.strength.reference_volume)
+    if size and (size[0] is None) != (size[1] is None):
         yield Problem("strength", "give both modulus and reference_volume, or neither")
     if not tables.grains and all(body.fixed for body in tables.body):
         yield Problem("", "no body can move: add a [[body]] with a density, or [[grains]]")
