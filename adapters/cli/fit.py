@@ -4,11 +4,20 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from adapters.cli.arguments import add_json, print_json
 from adapters.errors import UsageError
 from trackbed.plausible import Quantity, describe_implausible
+
+if TYPE_CHECKING:
+    from adapters.files import Series
+    from adapters.laws import Law
+    from adapters.laws.fit import Prediction
 
 FARTHEST = 1e12
 """Load cycles that are asked for at most: a hundred thousand years of the busiest line."""
@@ -61,6 +70,17 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
         "--probability", type=float, default=0.9, metavar="P",
         help="that the band should hold the truth; default: 0.9; refusals do not depend on it",
     )  # fmt: skip
+    parser.add_argument(
+        "--frequency", type=float, metavar="HZ",
+        help="auto only: the series is a cyclic triaxial test on ballast at so many load cycles a "
+        "second, 5 to 60, from its first cycle on: lean on what such tests did",
+    )  # fmt: skip
+    parser.add_argument(
+        "--figure",
+        type=Path,
+        metavar="FILE",
+        help="draw readings, prediction, band, laws that agree and where it is refused: .png, .svg",
+    )
     add_json(parser)
     parser.set_defaults(command=run_fit)
 
@@ -70,7 +90,16 @@ def run_fit(arguments: argparse.Namespace) -> int:
     from adapters.errors import JumpRefused
     from adapters.files import UNKNOWN
     from adapters.laws import get_law
-    from adapters.laws.fit import AGREE, UNCLAIMED, fit_auto, fit_series, read_series, refuse_fall
+    from adapters.laws.fit import (
+        AGREE,
+        UNCLAIMED,
+        draw_forecast,
+        fit_auto,
+        fit_series,
+        read_series,
+        refuse_fall,
+    )
+    from trackbed.report import save_figure
 
     for flag in ("to_cycle", "from_cycle", "load_change"):
         value = getattr(arguments, flag)
@@ -81,6 +110,15 @@ def run_fit(arguments: argparse.Namespace) -> int:
             )  # fmt: skip
     auto = arguments.law == "auto"
     law = get_law("log" if auto else arguments.law)
+    if arguments.frequency is not None and not auto:
+        raise UsageError(
+            "a law that is named follows the readings alone", where="--frequency",
+            remedy="leave it out, or take --law auto",
+        )  # fmt: skip
+    if (picture := arguments.figure) and picture.suffix not in (".png", ".svg"):
+        raise UsageError(
+            "a figure is written as .png or .svg", where=str(picture), remedy="name it so"
+        )
     series = read_series(
         arguments.paths, arguments.steps_per_cycle, arguments.columns, arguments.unit
     )
@@ -105,11 +143,17 @@ def run_fit(arguments: argparse.Namespace) -> int:
             to_cycle - arguments.load_change,
         )
     series = series.keep_from(arguments.from_cycle)
-    try:
+
+    def predict(cycle: float) -> Prediction:
+        asked = (cycle, arguments.probability, arguments.fail_at)
         if auto:
-            found = fit_auto(series, ahead, arguments.probability, arguments.fail_at)
-        else:
-            found = fit_series(series, law, ahead, arguments.probability, arguments.fail_at)
+            return fit_auto(series, *asked, arguments.frequency)
+        return fit_series(series, law, *asked)
+
+    if picture and ahead > series.cycle.max(initial=0.0) > 0:
+        save_figure(lambda: draw_forecast(series, predict, ahead), picture)
+    try:
+        found = predict(ahead)
     except JumpRefused as refusal:
         if arguments.json:
             unexcluded = {} if arguments.fail_at is None else {"failure_excluded": False}
@@ -128,8 +172,7 @@ def run_fit(arguments: argparse.Namespace) -> int:
     unit = "(unit as given)" if series.unit == UNKNOWN else series.unit
     read = f" of {series.columns}" if series.columns else ""
     print(f"law {fitted['law']}, fitted to {len(series.cycle)} cycles{read}")
-    for name, value in fitted["parameters"].items():
-        print(f"  {name} = {value:.6g}")
+    print(*describe_formula(None if auto else law, found, series, ahead, unit), sep="\n")
     print(f"regime: {fitted['regime'] or UNCLAIMED}")
     if found.laws:
         agreeing = [name for name, said in found.laws.items() if said.agrees]
@@ -140,3 +183,29 @@ def run_fit(arguments: argparse.Namespace) -> int:
     if found.failure_excluded is False:
         print(f"  so that failure at {arguments.fail_at:g} is not excluded")
     return 0
+
+
+def describe_formula(
+    law: Law | None, found: Prediction, series: Series, to_cycle: float, unit: str
+) -> Iterator[str]:
+    """The law that was fitted, as lines; of auto (None) the tail from the last reading, with the
+    exponent that the regime follows from, to the prediction for ``to_cycle`` of the series."""
+    from adapters.laws.fit import make_tail_column
+
+    begin, last, reading = series.counted_from, series.cycle[-1], series.settlement[-1]
+    cycles = f", N in cycles from cycle {begin:.10g} on" if begin else ", N in cycles"
+    if law:
+        yield f"u(N) = {law.formula}{cycles}"
+        for name, one in zip(law.parameter_names, law.parameter_units, strict=True):
+            own = {"1": "", "m": unit, "m/cycle": f"{unit}/cycle", "cycle": "cycles"}[one]
+            yield f"  {name} = {found.parameters[name]:.6g} {own}".rstrip()
+        return
+    if to_cycle > last:
+        beta, ratio = round(found.parameters["exponent"], 2), f"N / {last:.10g}"
+        column = float(make_tail_column(np.array(to_cycle / last), np.array(beta)))
+        slope = (found.prediction - reading) / column
+        form = f"(({ratio})^{beta:g} - 1) / ({beta:g})" if beta else f"ln({ratio})"
+        ends = "from the last reading to the prediction"
+        yield f"u(N) = {reading:.6g} {unit} + {slope:.6g} {unit} {form}{cycles}: {ends}"
+    for name, value in found.parameters.items():
+        yield f"  {name} = {value:.6g} {'' if name.startswith('exponent') else unit}".rstrip()

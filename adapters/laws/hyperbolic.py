@@ -16,6 +16,7 @@ class Hyperbolic(ShapedLaw):
     """
 
     name = "hyperbolic"
+    formula = "c + a N / (tau + N)"
     parameter_names = ("c", "a", "tau")
     parameter_units = ("m", "m", "cycle")
     minimum_cycles = 3

@@ -19,6 +19,7 @@ class InverseLog(ShapedLaw):
     """
 
     name = "inverse-log"
+    formula = "c + a (1 - 1 / (1 + B ln(1 + N / tau)))"
     parameter_names = ("c", "a", "tau", "B")
     parameter_units = ("m", "m", "cycle", "1")
     minimum_cycles = 4

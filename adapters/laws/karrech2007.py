@@ -23,6 +23,7 @@ class Karrech2007:
     """
 
     name = "karrech2007"
+    formula = "a ln N + b N"
     parameter_names = ("a", "b")
     parameter_units = ("m", "m/cycle")
     minimum_cycles = 2

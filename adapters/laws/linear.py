@@ -19,6 +19,7 @@ class Linear:
     """
 
     name = "linear"
+    formula = "c + b N"
     parameter_names = ("c", "b")
     parameter_units = ("m", "m/cycle")
     minimum_cycles = 2

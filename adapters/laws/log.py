@@ -20,6 +20,7 @@ class Log:
     """
 
     name = "log"
+    formula = "c + a ln N"
     parameter_names = ("c", "a")
     parameter_units = ("m", "m")
     minimum_cycles = 2

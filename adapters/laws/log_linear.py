@@ -23,6 +23,7 @@ class LogLinear:
     """
 
     name = "log-linear"
+    formula = "c + a ln N + b N"
     parameter_names = ("c", "a", "b")
     parameter_units = ("m", "m", "m/cycle")
     minimum_cycles = 3

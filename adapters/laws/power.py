@@ -19,6 +19,7 @@ class Power(ShapedLaw):
     """
 
     name = "power"
+    formula = "c + a N^b"
     parameter_names = ("c", "a", "b")
     parameter_units = ("m", "m", "1")
     minimum_cycles = 3

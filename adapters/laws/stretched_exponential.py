@@ -19,6 +19,7 @@ class StretchedExponential(ShapedLaw):
     """
 
     name = "stretched-exponential"
+    formula = "c + a (1 - exp(-(N / tau)^b))"
     parameter_names = ("c", "a", "tau", "b")
     parameter_units = ("m", "m", "cycle", "1")
     minimum_cycles = 4

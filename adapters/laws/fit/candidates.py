@@ -48,6 +48,7 @@ class Candidates:
     """Absolute error on the held-out block's last cycle, (c, n); nan where not tested."""
     distance: float  # ln(N_k / N_h), length of the held-out block; 0 where there was none
     combined_miss: FloatArray  # error of the candidates' median there, shape (n,)
+    happened: FloatArray  # increment there, shape (n,)
 
     def votes(self, bounded: BoolArray, unbounded: BoolArray) -> BoolArray:
         """True for candidates that have a vote, shape (c, n); half of the admitted ones at least.
@@ -62,6 +63,13 @@ class Candidates:
             return admitted
         bound = CANDIDATES.veto * np.nanmedian(np.where(tested, self.miss, np.nan), axis=0)
         return admitted & ~(self.miss > bound)
+
+    def missed_share(self) -> FloatArray:
+        """What the median missed of the held-out block, of what happened there, (n,); infinite
+        where there was no block or nothing moved [-]."""
+        share = np.full(len(self.happened), np.inf)
+        moved = np.abs(self.happened)
+        return np.divide(np.abs(self.combined_miss), moved, out=share, where=moved > 0)
 
     def median(self, votes: BoolArray) -> FloatArray:
         """Median increment of those that have a vote, shape (n,)."""
@@ -162,7 +170,7 @@ def find_candidates(cycle: FloatArray, displacement: FloatArray, to_cycle: float
     found = find_increments(cycle, displacement, to_cycle)
     count, before = displacement.shape[1], count_held_out_rows(cycle)
     miss = dict.fromkeys(found, np.full(count, np.nan))
-    combined, distance = np.zeros(count), 0.0
+    combined, happened, distance = np.zeros(count), np.zeros(count), 0.0
     if before:
         past = find_increments(cycle[:before], displacement[:before], float(cycle[-1]))
         happened = displacement[-1] - displacement[before - 1]
@@ -172,4 +180,5 @@ def find_candidates(cycle: FloatArray, displacement: FloatArray, to_cycle: float
     return Candidates(
         tuple(name for name, _ in found), np.stack(list(found.values())),
         np.stack([miss[key] for key in found]), distance, combined,
+        happened,
     )  # fmt: skip

@@ -18,6 +18,7 @@ from adapters.laws.fit.candidates import (
     fit_constant_rates,
     thin_rows,
 )
+from adapters.laws.fit.prior import lean_on_end, lean_on_tests
 from adapters.laws.fit.regime import (
     EXPONENTS,
     SHAKEDOWN,
@@ -58,22 +59,26 @@ class Outlook:
     to_cycle: float
     last: FloatArray  # reading at the last cycle
     settled: FloatArray  # largest settlement so far, without its sign
-    judged: tuple[FloatArray, FloatArray]  # low and high end of the band with probability `JUDGED`
+    alone: FloatArray  # prediction of the laws without `fit.prior`: no prior undoes a refusal, so
+    judged: tuple[FloatArray, FloatArray]  # this is the band around it, with probability `JUDGED`
     reading: FloatArray
     """Error of a reading: its half-width with `JUDGED`, `TAIL.resolution` of the range at least."""
     counted_from: float = 0.0  # the user's number of cycle 0, as in `Series`: for sentences
 
 
 def find_outlook(
-    cycle: FloatArray, displacement: FloatArray, to_cycle: float, probability: float = 0.9
-) -> Outlook:
+    cycle: FloatArray, displacement: FloatArray, to_cycle: float, probability: float = 0.9,
+    frequency: float | None = None,
+) -> Outlook:  # fmt: skip
     """Regime, prediction and band of n series (k, n) at ``to_cycle``, whatever the regime.
 
     *Prediction*: the last value plus the median increment of the slow laws, each fitted to the
     last decade, the last two, and all data; one that missed the held-out block by more than three
     times the median miss has no vote.  Where the tail says for certain (90 %) that the total has
     an end, or has none, only laws of that kind vote.  No law is right on ballast, and the median
-    of several is less often far off than the one that fits best.
+    of several is less often far off than the one that fits best.  Where they missed much of the
+    held-out block it is drawn towards a tail that ends, and with ``frequency`` [Hz] towards what
+    tests on ballast did, which has a band of its own (`fit.prior`).
 
     *Band*, three independent parts added as squares, each side by itself:
 
@@ -103,11 +108,14 @@ def find_outlook(
     with np.errstate(over="ignore", invalid="ignore"):  # judged in `fit.refusal`
         candidates = find_candidates(few, means, to_cycle)
         votes = candidates.votes(bounded, unbounded)
-        moved = np.zeros_like(last) if known else candidates.median(votes)
+        alone = np.zeros_like(last) if known else candidates.median(votes)
+        moved = lean_on_end(few, means, alone, candidates.missed_share(), to_cycle)
         endless = np.where(unbounded, fit_constant_rates(few, means, to_cycle), np.nan)
 
-        def find_band(probability: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-            """Low end, high end, and half-width of a reading."""
+        def find_band(
+            moved: FloatArray, probability: float
+        ) -> tuple[FloatArray, FloatArray, FloatArray]:
+            """Low end and high end around an increment, and half-width of a reading."""
             reading, tail = find_tail_error(cycle, displacement, exponent, to_cycle, probability)
             if known:
                 return last, last, reading
@@ -123,12 +131,15 @@ def find_outlook(
             high = np.where(moved < 0, np.minimum(high, last + reading), high)
             return low, high, reading
 
-        low, high, _ = find_band(probability)
-        *judged, reading = find_band(JUDGED)
+        low, high, _ = find_band(moved, probability)
+        *judged, reading = find_band(alone, JUDGED)
+        if frequency is not None and not known:
+            found = lean_on_tests(last, moved, reach, frequency, probability)
+            moved, low, high = found[0], last + found[1], last + found[2]
     least = np.fmax(TAIL.resolution * np.ptp(displacement, axis=0), TAIL.round_off * settled)
     return Outlook(
         regimes, last + moved, low, high, candidates, votes, *reach, last, settled,
-        judged=(judged[0], judged[1]), reading=np.fmax(reading, least),
+        alone=last + alone, judged=(judged[0], judged[1]), reading=np.fmax(reading, least),
     )  # fmt: skip
 
 

@@ -130,10 +130,11 @@ def fit_series(
 
 
 def fit_auto(
-    series: Series, to_cycle: float, probability: float = 0.9, fail_at: float | None = None
-) -> Prediction:
+    series: Series, to_cycle: float, probability: float = 0.9, fail_at: float | None = None,
+    frequency: float | None = None,
+) -> Prediction:  # fmt: skip
     """Predict the settlement at ``to_cycle`` from the slow laws together; see
-    `find_outlook`.
+    `find_outlook`.  ``frequency`` [Hz]: that of a cyclic triaxial test on ballast.
 
     ``parameters`` of the result: ``exponent`` beta of the tail with its deviation, which the
     regime follows from, and under each law's name the settlement that it alone predicts (the
@@ -151,14 +152,19 @@ def fit_auto(
             left_out=series.left_out, else_do=", or name a law: --law log",
         )  # fmt: skip
     _check_target(series, float(cycle[-1]), to_cycle, probability, fail_at)
-    found = find_outlook(cycle, settlement[:, None], to_cycle, probability)
+    if frequency is not None and series.counted_from:
+        raise UsageError(
+            "what tests on ballast did holds from their first cycle on, not from a changed load",
+            where="--frequency", remedy="leave out --frequency or --load-change",
+        )  # fmt: skip
+    found = find_outlook(cycle, settlement[:, None], to_cycle, probability, frequency)
     begin, settled = series.counted_from, np.abs(settlement[:, None] - series.begun).max(axis=0)
     found = replace(found, settled=settled, counted_from=begin)
     parameters = found.regime[0].parameters()
-    prediction = float(found.prediction[0])
+    prediction, alone = float(found.prediction[0]), float(found.alone[0])
     refusal = find_failure(cycle + begin, settlement, fail_at)
-    if refusal is None and isfinite(prediction):
-        refusal = predict_failure(prediction, fail_at, to_cycle + begin)
+    if refusal is None and isfinite(alone):
+        refusal = predict_failure(max(prediction, alone, key=abs), fail_at, to_cycle + begin)
     refusal = refusal or refuse_fall(cycle + begin, settlement)
     if found.regime[0].jump_allowed and to_cycle > cycle[-1]:
         refusal = refusal or refuse_growth(cycle, settlement, begin)
@@ -166,8 +172,7 @@ def fit_auto(
     said = compare_laws(found, refused=refusal is not None)
     if refusal:
         raise _make_refusal(refusal, "auto", parameters, said)
-    alone = {name: one.prediction for name, one in said.items()}
-    parameters |= {name: value for name, value in alone.items() if value is not None}
+    parameters |= {name: one.prediction for name, one in said.items() if one.prediction is not None}
     band = (float(found.low[0]), float(found.high[0]))
     widest = (*band, *(float(end[0]) for end in found.judged))
     reach = to_cycle / cycle[-1]

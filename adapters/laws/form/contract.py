@@ -25,6 +25,10 @@ class Law(Protocol):
         """The name in scenes and ``--law``: that of the file, dashes for its underscores."""
 
     @property
+    def formula(self) -> str:
+        """u(N) in the names of the parameters, such as ``c + a ln N``."""
+
+    @property
     def parameter_names(self) -> tuple[str, ...]:
         """Names of the p parameters, such as ``("c", "a")``."""
 

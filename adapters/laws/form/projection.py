@@ -197,6 +197,7 @@ class ShapedLaw(ABC):
     """
 
     name: str
+    formula: str
     parameter_names: tuple[str, ...]
     parameter_units: tuple[str, ...]
     minimum_cycles: int
