@@ -4,20 +4,11 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-import numpy as np
 
 from adapters.cli.arguments import add_json, print_json
 from adapters.errors import UsageError
 from trackbed.plausible import Quantity, describe_implausible
-
-if TYPE_CHECKING:
-    from adapters.files import Series
-    from adapters.laws import Law
-    from adapters.laws.fit import Prediction
 
 FARTHEST = 1e12
 """Load cycles that are asked for at most: a hundred thousand years of the busiest line."""
@@ -76,11 +67,9 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
         "second, 5 to 60, from its first cycle on: lean on what such tests did",
     )  # fmt: skip
     parser.add_argument(
-        "--figure",
-        type=Path,
-        metavar="FILE",
+        "--figure", type=Path, metavar="FILE",
         help="draw readings, prediction, band, laws that agree and where it is refused: .png, .svg",
-    )
+    )  # fmt: skip
     add_json(parser)
     parser.set_defaults(command=run_fit)
 
@@ -89,16 +78,7 @@ def run_fit(arguments: argparse.Namespace) -> int:
     """Fit a law to a series; print its parameters, a prediction and its band."""
     from adapters.errors import JumpRefused
     from adapters.files import UNKNOWN
-    from adapters.laws import get_law
-    from adapters.laws.fit import (
-        AGREE,
-        UNCLAIMED,
-        draw_forecast,
-        fit_auto,
-        fit_series,
-        read_series,
-        refuse_fall,
-    )
+    from adapters.laws import fit, get_law
     from trackbed.report import save_figure
 
     for flag in ("to_cycle", "from_cycle", "load_change"):
@@ -110,16 +90,16 @@ def run_fit(arguments: argparse.Namespace) -> int:
             )  # fmt: skip
     auto = arguments.law == "auto"
     law = get_law("log" if auto else arguments.law)
-    if arguments.frequency is not None and not auto:
+    if arguments.frequency is not None and (not auto or arguments.load_change is not None):
         raise UsageError(
-            "a law that is named follows the readings alone", where="--frequency",
-            remedy="leave it out, or take --law auto",
+            "what tests on fresh ballast did is known to auto, from the first load on",
+            where="--frequency", remedy="take --law auto without --load-change, or leave it out",
         )  # fmt: skip
     if (picture := arguments.figure) and picture.suffix not in (".png", ".svg"):
         raise UsageError(
             "a figure is written as .png or .svg", where=str(picture), remedy="name it so"
         )
-    series = read_series(
+    series = fit.read_series(
         arguments.paths, arguments.steps_per_cycle, arguments.columns, arguments.unit
     )
     if arguments.steps_per_cycle is not None and series.columns:
@@ -144,14 +124,14 @@ def run_fit(arguments: argparse.Namespace) -> int:
         )
     series = series.keep_from(arguments.from_cycle)
 
-    def predict(cycle: float) -> Prediction:
+    def predict(cycle: float) -> fit.Prediction:
         asked = (cycle, arguments.probability, arguments.fail_at)
         if auto:
-            return fit_auto(series, *asked, arguments.frequency)
-        return fit_series(series, law, *asked)
+            return fit.fit_auto(series, *asked, arguments.frequency)
+        return fit.fit_series(series, law, *asked)
 
-    if picture and ahead > series.cycle.max(initial=0.0) > 0:
-        save_figure(lambda: draw_forecast(series, predict, ahead), picture)
+    if picture and series.cycle.max(initial=0.0) > 0:
+        save_figure(lambda: fit.draw_forecast(series, predict, ahead), picture)
     try:
         found = predict(ahead)
     except JumpRefused as refusal:
@@ -159,7 +139,7 @@ def run_fit(arguments: argparse.Namespace) -> int:
             unexcluded = {} if arguments.fail_at is None else {"failure_excluded": False}
             print_json(refusal.to_json(series.unit) | unexcluded)
         raise
-    if fall := refuse_fall(series.cycle + series.counted_from, series.settlement):
+    if fall := fit.refuse_fall(series.cycle + series.counted_from, series.settlement):
         print(f"warning: {fall.why}\n  -> {fall.remedy}", file=sys.stderr)
     quantity: Quantity = "strain" if series.unit == "1" else "settlement"
     most = float(abs(series.settlement).max()) if series.unit in ("m", "1") else 0.0
@@ -172,40 +152,14 @@ def run_fit(arguments: argparse.Namespace) -> int:
     unit = "(unit as given)" if series.unit == UNKNOWN else series.unit
     read = f" of {series.columns}" if series.columns else ""
     print(f"law {fitted['law']}, fitted to {len(series.cycle)} cycles{read}")
-    print(*describe_formula(None if auto else law, found, series, ahead, unit), sep="\n")
-    print(f"regime: {fitted['regime'] or UNCLAIMED}")
+    print(*fit.describe_formula(None if auto else law, found, series, ahead, unit), sep="\n")
+    print(f"regime: {fitted['regime'] or fit.UNCLAIMED}")
     if found.laws:
-        agreeing = [name for name, said in found.laws.items() if said.agrees]
-        print(f"laws that agree to {AGREE:.0%} of the increment: {', '.join(agreeing) or 'none'}")
+        agreeing = ", ".join(name for name, said in found.laws.items() if said.agrees)
+        print(f"laws that agree to {fit.AGREE:.0%} of the increment: {agreeing or 'none'}")
     low, high = fitted["band"]
     print(f"settlement at cycle {to_cycle:.10g}: {fitted['prediction']:.6g} {unit}")
     print(f"  with probability {arguments.probability:g} in {low:.6g} ... {high:.6g} {unit}")
     if found.failure_excluded is False:
         print(f"  so that failure at {arguments.fail_at:g} is not excluded")
     return 0
-
-
-def describe_formula(
-    law: Law | None, found: Prediction, series: Series, to_cycle: float, unit: str
-) -> Iterator[str]:
-    """The law that was fitted, as lines; of auto (None) the tail from the last reading, with the
-    exponent that the regime follows from, to the prediction for ``to_cycle`` of the series."""
-    from adapters.laws.fit import make_tail_column
-
-    begin, last, reading = series.counted_from, series.cycle[-1], series.settlement[-1]
-    cycles = f", N in cycles from cycle {begin:.10g} on" if begin else ", N in cycles"
-    if law:
-        yield f"u(N) = {law.formula}{cycles}"
-        for name, one in zip(law.parameter_names, law.parameter_units, strict=True):
-            own = {"1": "", "m": unit, "m/cycle": f"{unit}/cycle", "cycle": "cycles"}[one]
-            yield f"  {name} = {found.parameters[name]:.6g} {own}".rstrip()
-        return
-    if to_cycle > last:
-        beta, ratio = round(found.parameters["exponent"], 2), f"N / {last:.10g}"
-        column = float(make_tail_column(np.array(to_cycle / last), np.array(beta)))
-        slope = (found.prediction - reading) / column
-        form = f"(({ratio})^{beta:g} - 1) / ({beta:g})" if beta else f"ln({ratio})"
-        ends = "from the last reading to the prediction"
-        yield f"u(N) = {reading:.6g} {unit} + {slope:.6g} {unit} {form}{cycles}: {ends}"
-    for name, value in found.parameters.items():
-        yield f"  {name} = {value:.6g} {'' if name.startswith('exponent') else unit}".rstrip()

@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from adapters.laws.fit.prior import PRIOR, predict_growth
 from validation.studies.laws.run import (
+    LEARNED,
     judge_auto,
-    predict_by_curve_fit,
+    learn_prior,
+    list_predictors,
     predict_by_law,
-    predict_by_polyfit,
     summarise_auto,
 )
 from validation.studies.laws.series import (
@@ -28,7 +30,7 @@ READ = np.geomspace(1, 1e5, 61)
 
 def one_case(settlement: np.ndarray, name: str = "series") -> LawCase:
     """Cut at 1,000 cycles."""
-    (found,) = cut_cases("made", name, READ, settlement, (1000.0,))
+    (found,) = cut_cases(name, READ, settlement, (1000.0,))
     return found
 
 
@@ -38,7 +40,7 @@ def test_a_case_knows_nothing_behind_its_cut() -> None:
     assert case.cycle[-1] <= 1000
     assert case.to_cycle == pytest.approx(REACH * case.cycle[-1])
     assert case.truth == pytest.approx(np.log(case.to_cycle))
-    short = list(cut_cases("made", "series", READ[:20], READ[:20], CUTS))
+    short = list(cut_cases("series", READ[:20], READ[:20], CUTS))
     assert not short  # its end lies before ten times any cut
 
 
@@ -52,12 +54,23 @@ def test_families_are_drawn_once_and_for_all() -> None:
     assert len(list_fast_cases(2)) == 10
 
 
-def test_rivals_recover_their_own_law() -> None:
-    """numpy's line in ln N, scipy's power law, a law of the bank: exact on their own series."""
-    straight, power = one_case(2 + 3 * np.log(READ)), one_case(2 * READ**0.3)
-    assert predict_by_polyfit(straight) == pytest.approx(straight.truth, rel=1e-10)
+def test_a_law_recovers_its_own_series() -> None:
+    """The logarithm is exact on its own series; nothing more settles at the last reading."""
+    straight = one_case(2 + 3 * np.log(READ))
     assert predict_by_law("log")(straight) == pytest.approx(straight.truth, rel=1e-10)
-    assert predict_by_curve_fit(power) == pytest.approx(power.truth, rel=1e-6)
+    assert list_predictors()["nothing"](straight) == straight.settlement[-1]
+
+
+def test_what_the_tests_teach_is_what_they_were_made_of() -> None:
+    """Strains that go as g(N) of the prior teach its numbers, whatever their size."""
+    cycle = np.geomspace(1, 5e5, 60)
+    made = []
+    for frequency in (5.0, 15.0, 50.0):
+        growth = predict_growth(np.array([np.ones(60), cycle]), frequency)
+        made.append((f"p_1kPa_q_1kPa_f_{frequency:g}Hz", cycle, 0.01 * np.exp(growth)))
+    found = learn_prior(made)
+    for name in LEARNED:
+        assert getattr(found, name) == pytest.approx(getattr(PRIOR, name), rel=0.1)
 
 
 def test_summary_counts_refusals_apart() -> None:
@@ -66,4 +79,4 @@ def test_summary_counts_refusals_apart() -> None:
     found = summarise_auto(rows)
     assert (found["cases"], found["refused"], found["all"]["cases"]) == (1, 1, 2)
     assert found["error"] == abs(rows[0]["error"])
-    assert found["regimes"]["ratcheting"] == 1
+    assert [row["regime"] for row in rows] == ["steady", "ratcheting"]

@@ -6,6 +6,7 @@ from adapters.laws.fit.outlook import AGREE
 from adapters.laws.fit.prediction import (
     UNCLAIMED,
     Prediction,
+    describe_formula,
     fit_auto,
     fit_series,
     read_series,
@@ -18,13 +19,12 @@ from adapters.laws.fit.regime import (
     WHY_NOT_PISTON,
     Regime,
     find_regime_of_weight,
-    make_tail_column,
 )
 from adapters.laws.fit.residual import FIRST_WINDOW, compare_coordinates, compare_displacements
 
 __all__ = [
     "AGREE", "CANDIDATES", "EXPONENTS", "FIRST_WINDOW", "TAIL", "UNCLAIMED", "WHY_NOT",
     "WHY_NOT_PISTON", "BoolArray", "Prediction", "Regime", "compare_coordinates",
-    "compare_displacements", "draw_forecast", "find_increments", "find_regime_of_weight",
-    "fit_auto", "fit_series", "make_tail_column", "read_series", "refuse_fall", "thin_rows",
+    "compare_displacements", "describe_formula", "draw_forecast", "find_increments",
+    "find_regime_of_weight", "fit_auto", "fit_series", "read_series", "refuse_fall", "thin_rows",
 ]  # fmt: skip

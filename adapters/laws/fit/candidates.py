@@ -64,13 +64,6 @@ class Candidates:
         bound = CANDIDATES.veto * np.nanmedian(np.where(tested, self.miss, np.nan), axis=0)
         return admitted & ~(self.miss > bound)
 
-    def missed_share(self) -> FloatArray:
-        """What the median missed of the held-out block, of what happened there, (n,); infinite
-        where there was no block or nothing moved [-]."""
-        share = np.full(len(self.happened), np.inf)
-        moved = np.abs(self.happened)
-        return np.divide(np.abs(self.combined_miss), moved, out=share, where=moved > 0)
-
     def median(self, votes: BoolArray) -> FloatArray:
         """Median increment of those that have a vote, shape (n,)."""
         return np.asarray(np.nanmedian(np.where(votes, self.increment, np.nan), axis=0))
@@ -179,6 +172,5 @@ def find_candidates(cycle: FloatArray, displacement: FloatArray, to_cycle: float
         combined = np.median(np.stack(list(past.values())), axis=0) - happened
     return Candidates(
         tuple(name for name, _ in found), np.stack(list(found.values())),
-        np.stack([miss[key] for key in found]), distance, combined,
-        happened,
+        np.stack([miss[key] for key in found]), distance, combined, happened,
     )  # fmt: skip

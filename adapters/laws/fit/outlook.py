@@ -109,7 +109,7 @@ def find_outlook(
         candidates = find_candidates(few, means, to_cycle)
         votes = candidates.votes(bounded, unbounded)
         alone = np.zeros_like(last) if known else candidates.median(votes)
-        moved = lean_on_end(few, means, alone, candidates.missed_share(), to_cycle)
+        moved = lean_on_end(few, means, alone, candidates, to_cycle)
         endless = np.where(unbounded, fit_constant_rates(few, means, to_cycle), np.nan)
 
         def find_band(

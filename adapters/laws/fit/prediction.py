@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from math import isfinite
+from math import isfinite, log
 from typing import Any
 
 import numpy as np
@@ -27,7 +27,7 @@ from adapters.laws.fit.refusal import (
 from adapters.laws.fit.regime import COLLAPSE, SHAKEDOWN, WHY_NOT, Regime, find_regimes
 from adapters.laws.form import Law
 
-__all__ = ["Prediction", "Series", "fit_auto", "fit_series", "read_series"]
+__all__ = ["Prediction", "Series", "describe_formula", "fit_auto", "fit_series", "read_series"]
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ def fit_auto(
     frequency: float | None = None,
 ) -> Prediction:  # fmt: skip
     """Predict the settlement at ``to_cycle`` from the slow laws together; see
-    `find_outlook`.  ``frequency`` [Hz]: that of a cyclic triaxial test on ballast.
+    `find_outlook`.  ``frequency`` [Hz]: that of a cyclic triaxial test on fresh ballast.
 
     ``parameters`` of the result: ``exponent`` beta of the tail with its deviation, which the
     regime follows from, and under each law's name the settlement that it alone predicts (the
@@ -152,11 +152,6 @@ def fit_auto(
             left_out=series.left_out, else_do=", or name a law: --law log",
         )  # fmt: skip
     _check_target(series, float(cycle[-1]), to_cycle, probability, fail_at)
-    if frequency is not None and series.counted_from:
-        raise UsageError(
-            "what tests on ballast did holds from their first cycle on, not from a changed load",
-            where="--frequency", remedy="leave out --frequency or --load-change",
-        )  # fmt: skip
     found = find_outlook(cycle, settlement[:, None], to_cycle, probability, frequency)
     begin, settled = series.counted_from, np.abs(settlement[:, None] - series.begun).max(axis=0)
     found = replace(found, settled=settled, counted_from=begin)
@@ -258,3 +253,27 @@ def _select_training_rows(series: Series, law: Law) -> tuple[FloatArray, FloatAr
             len(cycle), fewest, purpose, where=series.where, left_out=series.left_out
         )
     return cycle, settlement
+
+
+def describe_formula(
+    law: Law | None, found: Prediction, series: Series, to_cycle: float, unit: str
+) -> Iterator[str]:
+    """What was fitted, as lines with units; of auto (None) the tail with the exponent of the
+    regime, from the last reading to what is predicted for ``to_cycle`` of the series."""
+    begin, last, reading = series.counted_from, float(series.cycle[-1]), series.settlement[-1]
+    cycles = f", N in cycles from cycle {begin:.10g} on" if begin else ", N in cycles"
+    units = {"1": "", "m": unit, "m/cycle": f"{unit}/cycle", "cycle": "cycles"}
+    if law:
+        yield f"u(N) = {law.formula}{cycles}"
+        for name, one in zip(law.parameter_names, law.parameter_units, strict=True):
+            yield f"  {name} = {found.parameters[name]:.6g} {units[one]}".rstrip()
+        return
+    if to_cycle > last:
+        beta, x = round(found.parameters["exponent"], 2), f"(N / {last:.10g})"
+        column = ((to_cycle / last) ** beta - 1) / beta if beta else log(to_cycle / last)
+        form = f"({x}^{beta:g} - 1) / ({beta:g})" if beta else f"ln {x}"
+        slope = f"{(found.prediction - reading) / column:.6g} {unit}"
+        ends = "from the last reading to the prediction"
+        yield f"u(N) = {reading:.6g} {unit} + {slope} {form}{cycles}: {ends}"
+    for name, value in found.parameters.items():
+        yield f"  {name} = {value:.6g} {'' if name.startswith('exponent') else unit}".rstrip()

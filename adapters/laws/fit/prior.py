@@ -8,6 +8,7 @@ import numpy as np
 
 from adapters.bed import FloatArray
 from adapters.errors import UsageError
+from adapters.laws.fit.candidates import Candidates
 from adapters.laws.fit.regime import make_tail_column
 
 
@@ -16,7 +17,7 @@ class PriorNumbers:
     """Learned from 12 cyclic triaxial tests on ballast (Sun, Indraratna and Nimbalkar 2016,
     digitised) as the study of laws does it, which judges each test by numbers of the other 11.
 
-    The strain of these tests goes as g(N) = 1 + a ln N + b (f / 20 Hz)^p / (1 + (N_b / N)^s): most
+    The strain of these tests goes as g(N) = 1 + a ln N + b (f / 1 Hz)^p / (1 + (N_b / N)^s): most
     of it comes in one burst at some hundred cycles, the larger the faster they are loaded.
     """
 
@@ -25,12 +26,11 @@ class PriorNumbers:
     """What the laws missed of the held-out block, as a share of what settled there, a reading, with
     which that tail weighs as much as they do [-]; less would cost the families of the literature
     more than the tests gain."""
-    slowing: float = 0.098  # a [-]
-    burst: float = 2.74  # b, over the strain of the first cycle [-]
-    speed: float = 0.59  # p [-]
-    burst_cycle: float = 274.0  # N_b, middle of the burst [cycle]
-    steepness: float = 1.63  # s [-]
-    frequency: float = 20.0  # to which b belongs [Hz]
+    slowing: float = 0.07  # a [-]
+    burst: float = 0.6  # b, over the strain of the first cycle [-]
+    speed: float = 0.49  # p [-]
+    burst_cycle: float = 272.0  # N_b, middle of the burst [cycle]
+    steepness: float = 1.69  # s [-]
     frequencies: tuple[float, float] = (5.0, 60.0)  # of the tests [Hz]
     share: float = 0.8  # of the tests in the growth ln u(N) that is predicted; the laws' is 0.2 [-]
     scatter: tuple[float, float] = (0.06, 0.3)
@@ -41,12 +41,12 @@ PRIOR = PriorNumbers()
 
 
 def lean_on_end(
-    cycle: FloatArray, displacement: FloatArray, increment: FloatArray, miss: FloatArray,
+    cycle: FloatArray, displacement: FloatArray, increment: FloatArray, candidates: Candidates,
     to_cycle: float,
 ) -> FloatArray:  # fmt: skip
-    """``increment`` (n,) of the laws, drawn towards that of a tail that ends where they ``miss`` a
-    share (n,) of the held-out block of the series (k, n) at cycles (k,), or there is none: laws
-    of three parameters go through five readings of a burst, and see no end of it.
+    """``increment`` (n,) of the laws, drawn towards that of a tail that ends where they missed much
+    of the held-out block of the series (k, n) at cycles (k,), or there is none: laws of three
+    parameters go through five readings of a burst, and see no end of it.
 
     The tail goes as c + a N^beta with `PriorNumbers.exponent`, on from what the last half decade
     moved.
@@ -56,12 +56,13 @@ def lean_on_end(
     begun = [np.interp(np.log(start), np.log(cycle), series) for series in displacement.T]
     behind, ahead = make_tail_column(np.array([start, to_cycle]) / last, np.array(PRIOR.exponent))
     tail = (displacement[-1] - np.array(begun)) * ahead / -behind
-    weight = 1 / (1 + (miss / (PRIOR.missed * len(cycle))) ** 2)
+    allowed = (PRIOR.missed * len(cycle) * candidates.happened) ** 2
+    weight = allowed / (allowed + candidates.combined_miss**2 + np.finfo(float).tiny)
     return np.asarray(tail + (increment - tail) * weight)
 
 
-def predict_growth(cycle: float, to_cycle: float, frequency: float) -> float:
-    """ln(u(``to_cycle``) / u(``cycle``)) of the tests of `PriorNumbers` at ``frequency`` [Hz].
+def predict_growth(reach: FloatArray, frequency: float) -> FloatArray:
+    """ln u of the tests of `PriorNumbers` at ``frequency`` [Hz], from cycles reach[0] to reach[1].
 
     Raises `UsageError` for a frequency that none of them had.
     """
@@ -71,11 +72,11 @@ def predict_growth(cycle: float, to_cycle: float, frequency: float) -> float:
             f"tests at {frequency:g} Hz are not known, those known had {least:g} to {most:g} Hz",
             where="--frequency", remedy="leave it out: the readings alone then decide",
         )  # fmt: skip
-    number = np.maximum([cycle, to_cycle], 1.0)
-    burst = PRIOR.burst * (frequency / PRIOR.frequency) ** PRIOR.speed
+    number = np.maximum(reach, 1.0)
+    burst = PRIOR.burst * frequency**PRIOR.speed
     grown = 1 + PRIOR.slowing * np.log(number)
     grown += burst / (1 + (PRIOR.burst_cycle / number) ** PRIOR.steepness)
-    return float(np.log(grown[1] / grown[0]))
+    return np.asarray(np.log(grown[1] / grown[0]))
 
 
 def lean_on_tests(
@@ -83,14 +84,12 @@ def lean_on_tests(
     probability: float,
 ) -> FloatArray:  # fmt: skip
     """Increment, and low and high end of its band, (3, n): mean of what the laws say, ``moved``
-    (n,) from the readings ``last`` (n,), and of the tests at ``frequency`` [Hz], in ln u.
-
-    ``reach`` is the last cycle and the one asked for, both counted from the first load on a bed
-    that had none before.
+    (n,) from the readings ``last`` (n,), and of the tests at ``frequency`` [Hz], in ln u; ``reach``
+    is the last cycle and the one asked for, counted from the first load on a fresh bed.
     """
     from scipy.special import ndtri
 
-    growth = predict_growth(*reach, frequency)
+    growth = predict_growth(np.array(reach), frequency)
     laws = np.log(np.maximum(1 + np.divide(moved, last, where=last != 0, out=0 * last), 0.5))
     joint = PRIOR.share * growth + (1 - PRIOR.share) * laws
     decades, share = PRIOR.scatter

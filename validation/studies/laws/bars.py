@@ -18,7 +18,7 @@ def check_bars(rows: Sequence[dict[str, Any]]) -> list[Check]:
     """Error, band and refusals against what was asked before."""
     found = {row["part"]: row for row in rows}
     checks = []
-    for source in ("ballast", "families"):
+    for source in ("ballast", "frequency", "families"):
         auto = found[source]["auto"]
         for text, key, bar in (
             ("median error", "error", ERROR),
@@ -29,6 +29,12 @@ def check_bars(rows: Sequence[dict[str, Any]]) -> list[Check]:
         value = auto["coverage"]
         name = f"{source}: share of cases whose 90 % band holds the truth"
         checks.append(Check(name, value, f">= {COVERAGE:g}", value >= COVERAGE, page=PAGE))
+    for rival in ("nothing", "hyperbolic", "log"):
+        value, bar = (
+            row["rms"] for row in (found["ballast"]["auto"], found["ballast"]["methods"][rival])
+        )
+        name = f"ballast: rms error beside {rival}"
+        checks.append(Check(name, value, f"<= {bar:.3g}", value <= bar, page=PAGE))
     families, fast = found["families"]["auto"], found["fast"]
     alarms = families["refused"] / (families["cases"] + families["refused"])
     refused = fast["refused"] / fast["cases"]

@@ -2,16 +2,16 @@
 
 A case is what is known up to about a cycle N_c and the value at ``REACH`` times the last known
 cycle.  Real ballast is read from the folder that TRACKBED_DATA names: 12 cyclic triaxial tests on
-ballast (Sun, Indraratna and Nimbalkar 2016, digitised in erolsson/railway_ballast).  Nothing in
-`adapters.laws.fit.outlook` was fitted to any of them; the families are drawn with a seed that no
-choice was
-made on.
+ballast (Sun, Indraratna and Nimbalkar 2016, digitised in erolsson/railway_ballast), of which
+`adapters.laws.fit.prior` was learned; the families are drawn with a seed that no choice was made
+on.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -21,9 +21,10 @@ from adapters.bed.state import FloatArray
 REACH = 10.0
 """Predicted over last known cycle."""
 CUTS = (300.0, 1e3, 3e3, 1e4)
-"""N_c."""
-OTHER_CUTS = (200.0, 500.0, 700.0, 2e3, 5e3, 2e4, 5e4)
-"""N_c between these: what the choice of `CUTS` is worth."""
+"""N_c of the families."""
+FIRST_CUT, BEGINS, EACH = 40.0, (0.0, 20.0, 100.0), (1, 3)
+"""Real ballast is cut at every reading from the first one on, and known from each of the second
+ones on, by all readings or each third."""
 LAST = 5e5
 """Cycles of a made series, as of the real ones."""
 READING = 0.002
@@ -41,7 +42,6 @@ Curve = Callable[[FloatArray], FloatArray]
 class LawCase:
     """A series cut short and its truth."""
 
-    source: str
     name: str
     cut: float
     cycle: FloatArray
@@ -59,7 +59,7 @@ def read_ballast(folder: Path) -> Iterator[tuple[str, FloatArray, FloatArray]]:
 
 
 def cut_cases(
-    source: str, name: str, cycle: FloatArray, settlement: FloatArray, cuts: tuple[float, ...]
+    name: str, cycle: FloatArray, settlement: FloatArray, cuts: tuple[float, ...]
 ) -> Iterator[LawCase]:
     """Cases of one series: five readings or more, the last after N_c / 2; truth by ln N."""
     for cut in cuts:
@@ -69,16 +69,22 @@ def cut_cases(
         to_cycle = REACH * float(cycle[known][-1])
         if to_cycle <= cycle[-1] * (1 + 1e-9):
             truth = float(np.interp(np.log(to_cycle), np.log(cycle), settlement))
-            yield LawCase(source, name, cut, cycle[known], settlement[known], to_cycle, truth)
+            yield LawCase(name, cut, cycle[known], settlement[known], to_cycle, truth)
 
 
-def list_ballast_cases(folder: Path, cuts: tuple[float, ...] = CUTS) -> list[LawCase]:
-    """All cases of the triaxial tests."""
-    return [
-        case
-        for name, cycle, strain in read_ballast(folder)
-        for case in cut_cases("ballast", name, cycle, strain, cuts)
-    ]
+def list_ballast_cases(folder: Path) -> list[LawCase]:
+    """Cuts of all kinds of the triaxial tests, of four readings or more; truth by ln N."""
+    found = []
+    for name, cycle, strain in read_ballast(folder):
+        for end, begin, each in product(range(len(cycle)), BEGINS, EACH):
+            rows = np.arange(end, -1, -each)[::-1]
+            rows = rows[cycle[rows] >= begin]
+            cut, to_cycle = float(cycle[end]), REACH * float(cycle[end])
+            if cut >= FIRST_CUT and len(rows) >= 4 and to_cycle <= cycle[-1] * (1 + 1e-9):
+                truth = float(np.interp(np.log(to_cycle), np.log(cycle), strain))
+                known = (cycle[rows], strain[rows], to_cycle, truth)
+                found.append(LawCase(name, cut, *known))
+    return found
 
 
 def list_run_cases(folder: Path) -> list[LawCase]:
@@ -88,7 +94,7 @@ def list_run_cases(folder: Path) -> list[LawCase]:
         with np.load(folder / "full_runs" / f"{name}.npz") as data:
             settlement = -1e-6 * data["displacement_um"][1:, :, 2].mean(axis=1, dtype=float)
         cycle = np.arange(1.0, len(settlement) + 1)
-        found += list(cut_cases("engine", name, cycle, settlement, (10.0, 20.0, 30.0, 50.0, 100.0)))
+        found += list(cut_cases(name, cycle, settlement, (10.0, 20.0, 30.0, 50.0, 100.0)))
     return found
 
 
@@ -171,10 +177,10 @@ def list_family_cases(members: int) -> list[LawCase]:
         random = np.random.default_rng([SEED, member])
         for name, curve in draw_slow_families(random).items():
             cycle, read = read_off(curve, LAST, random)
-            for case in cut_cases("families", name, cycle, read, CUTS):
+            for case in cut_cases(name, cycle, read, CUTS):
                 truth = float(np.asarray(curve(np.array([case.to_cycle])))[0])
                 known = (case.cycle, case.settlement, case.to_cycle, truth)
-                found.append(LawCase("families", name, case.cut, *known))
+                found.append(LawCase(name, case.cut, *known))
     return found
 
 
@@ -185,5 +191,5 @@ def list_fast_cases(members: int) -> list[LawCase]:
         random = np.random.default_rng([SEED, 1, member])
         for name, curve in draw_fast_families(random).items():
             cycle, read = read_off(curve, 300.0, random)
-            found.append(LawCase("fast", name, 300.0, cycle, read, 10 * float(cycle[-1]), np.nan))
+            found.append(LawCase(name, 300.0, cycle, read, 10 * float(cycle[-1]), np.nan))
     return found
