@@ -18,7 +18,7 @@ from adapters.laws.fit.candidates import (
     fit_constant_rates,
     thin_rows,
 )
-from adapters.laws.fit.prior import lean_on_end, lean_on_tests
+from adapters.laws.fit.prior import shrink_to_tail, shrink_to_tests
 from adapters.laws.fit.regime import (
     EXPONENTS,
     SHAKEDOWN,
@@ -76,9 +76,8 @@ def find_outlook(
     last decade, the last two, and all data; one that missed the held-out block by more than three
     times the median miss has no vote.  Where the tail says for certain (90 %) that the total has
     an end, or has none, only laws of that kind vote.  No law is right on ballast, and the median
-    of several is less often far off than the one that fits best.  Where they missed much of the
-    held-out block it is drawn towards a tail that ends, and with ``frequency`` [Hz] towards what
-    tests on ballast did, which has a band of its own (`fit.prior`).
+    of several is less often far off than the one that fits best.  It is shrunk towards a tail that
+    ends and, with ``frequency`` [Hz], towards tests on ballast, with a band of theirs (`prior`).
 
     *Band*, three independent parts added as squares, each side by itself:
 
@@ -109,7 +108,7 @@ def find_outlook(
         candidates = find_candidates(few, means, to_cycle)
         votes = candidates.votes(bounded, unbounded)
         alone = np.zeros_like(last) if known else candidates.median(votes)
-        moved = lean_on_end(few, means, alone, candidates, to_cycle)
+        moved = shrink_to_tail(few, means, alone, candidates, to_cycle)
         endless = np.where(unbounded, fit_constant_rates(few, means, to_cycle), np.nan)
 
         def find_band(
@@ -134,7 +133,7 @@ def find_outlook(
         low, high, _ = find_band(moved, probability)
         *judged, reading = find_band(alone, JUDGED)
         if frequency is not None and not known:
-            found = lean_on_tests(last, moved, reach, frequency, probability)
+            found = shrink_to_tests(last, moved, reach, frequency, probability)
             moved, low, high = found[0], last + found[1], last + found[2]
     least = np.fmax(TAIL.resolution * np.ptp(displacement, axis=0), TAIL.round_off * settled)
     return Outlook(

@@ -23,9 +23,8 @@ class PriorNumbers:
 
     exponent: float = -0.7  # beta of the tail by which the next decade follows the last half [-]
     missed: float = 0.05
-    """What the laws missed of the held-out block, as a share of what settled there, a reading, with
-    which that tail weighs as much as they do [-]; less would cost the families of the literature
-    more than the tests gain."""
+    """Share of the held-out block that the laws missed, over the readings, with which that tail
+    weighs as much as they [-]; less would cost the families more than the tests gain."""
     slowing: float = 0.07  # a [-]
     burst: float = 0.6  # b, over the strain of the first cycle [-]
     speed: float = 0.49  # p [-]
@@ -40,16 +39,13 @@ class PriorNumbers:
 PRIOR = PriorNumbers()
 
 
-def lean_on_end(
+def shrink_to_tail(
     cycle: FloatArray, displacement: FloatArray, increment: FloatArray, candidates: Candidates,
     to_cycle: float,
 ) -> FloatArray:  # fmt: skip
-    """``increment`` (n,) of the laws, drawn towards that of a tail that ends where they missed much
-    of the held-out block of the series (k, n) at cycles (k,), or there is none: laws of three
-    parameters go through five readings of a burst, and see no end of it.
-
-    The tail goes as c + a N^beta with `PriorNumbers.exponent`, on from what the last half decade
-    moved.
+    """``increment`` (n,) of the laws, shrunk towards that of a tail c + a N^beta behind the last
+    half decade where they missed much of the held-out block of the series (k, n) at cycles (k,), or
+    there is none: a law of three parameters goes through five readings of a burst, and sees no end.
     """
     last = float(cycle[-1])
     start = max(last / 10**0.5, float(cycle[0]))
@@ -79,7 +75,7 @@ def predict_growth(reach: FloatArray, frequency: float) -> FloatArray:
     return np.asarray(np.log(grown[1] / grown[0]))
 
 
-def lean_on_tests(
+def shrink_to_tests(
     last: FloatArray, moved: FloatArray, reach: tuple[float, float], frequency: float,
     probability: float,
 ) -> FloatArray:  # fmt: skip
