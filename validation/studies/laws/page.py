@@ -77,12 +77,13 @@ def tabulate_laws(found: dict[str, Row]) -> str:
 def tabulate_cuts(found: dict[str, Row]) -> str:
     """Errors of auto by the last known cycle, without and with the frequency."""
     lines = [
-        [f"from {max(one['from'], FIRST_CUT):,.0f} on", format_error(one), format_error(other)]
+        [f"{max(one['from'], FIRST_CUT):,.0f}", str(one["cases"]), *map(format_error, (one, other))]
         for one, other in zip(
             *(found[source]["auto"]["by_cut"] for source in ("ballast", "frequency")), strict=True
         )
     ]
-    return format_table(["last known cycle", "readings alone", "with `--frequency`"], lines)
+    head = ["last known cycle, from", "cases", "readings alone", "with `--frequency`"]
+    return format_table(head, lines)
 
 
 def describe_whole(whole: Row) -> str:

@@ -3,8 +3,7 @@
 A case is what is known up to about a cycle N_c and the value at ``REACH`` times the last known
 cycle.  Real ballast is read from the folder that TRACKBED_DATA names: 12 cyclic triaxial tests on
 ballast (Sun, Indraratna and Nimbalkar 2016, digitised in erolsson/railway_ballast), of which
-`adapters.laws.fit.prior` was learned; the families are drawn with a seed that no choice was made
-on.
+`adapters.laws.fit.prior` was learned; the families have a seed that no choice was made on.
 """
 
 from __future__ import annotations
