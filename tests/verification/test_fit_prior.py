@@ -22,7 +22,7 @@ READ = np.geomspace(1, 1000, 22)
 @pytest.mark.parametrize(("miss", "held", "laws"), [(0, 0, 0.0), (0, 1, 1.0), (1, 1, 0.5)])
 def test_laws_that_missed_are_shrunk_to_a_tail(miss: int, held: int, laws: float) -> None:
     """A tail c - N^-0.7 goes on exactly where no block was held out; the laws' increment stands
-    where they met it, and counts for half where they missed `PRIOR.missed` of it by the square of readings."""
+    where they met it, and counts for half where they missed `PRIOR.missed` times 22^2 of it."""
     series = 3 - READ[:, None] ** PRIOR.exponent
     tried = find_candidates(READ, series, 1e4)
     missed, happened = miss * PRIOR.missed * 22**2 * tried.happened, held * tried.happened
