@@ -59,15 +59,6 @@ def test_series_that_follows_a_law_is_predicted(name: str, parameters: dict[str,
     }
 
 
-def test_karrech2007_counts_twice_what_was_computed() -> None:
-    """Eq. 17 as printed adds the whole law to the last settlement."""
-    cycle = np.arange(1.0, 101.0)
-    law = get_law("karrech2007")
-    series = Series(cycle, law.value(np.array([0.3, 0.01]), cycle))
-    expected = series.settlement[-1] + 0.3 * log(1000) + 0.01 * 1000
-    assert fit_series(series, law, 1000).prediction == pytest.approx(expected, rel=1e-9)
-
-
 def test_prediction_is_anchored_at_the_last_cycle() -> None:
     """A series that left its law at the end goes on from where it is, by the law's increment."""
     cycle = np.arange(10.0, 31.0)

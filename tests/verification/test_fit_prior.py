@@ -70,9 +70,9 @@ def test_fit_shows_its_formula_and_a_picture(tmp_path: Path, capsys) -> None:
     words = ["fit", str(path), "--to-cycle", "1e4", "--figure", str(picture), "--law"]
     assert main([*words, "auto"]) == 0
     said = capsys.readouterr().out
-    form = re.search(r"u\(N\) = (.*), N in cycles: from", said)[1].replace(" mm", "")
+    form = re.search(r"u\(N\) = (.*), N in cycles: from", said)[1].replace("^", "**")
+    form = form.replace(" mm ((", " * ((").replace(" mm", "")
     predicted = float(re.search(r"at cycle 10000: (\S+) mm", said)[1])
-    form = form.replace("^", "**").replace(" ((", " * ((")
     assert eval(form, {"N": 1e4}) == pytest.approx(predicted, rel=1e-4)
     assert "<!-- band -->" in picture.read_text()
     assert main([*words, "hyperbolic"]) == 0
