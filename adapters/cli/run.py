@@ -49,6 +49,11 @@ def register_run(parser: argparse.ArgumentParser) -> None:
         "--control", action="store_true", help="also run every cycle, to know the error"
     )
     parser.add_argument(
+        "--members", type=int, metavar="M",
+        help="M runs from states that differ by 1e-10 m, with --control beside M full runs, to "
+        "know result and error with their bands; short for --set procedure.members=M",
+    )  # fmt: skip
+    parser.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
         help="change a key of the scene, such as procedure.h=10; may be repeated",
     )  # fmt: skip
@@ -74,7 +79,8 @@ def register_run(parser: argparse.ArgumentParser) -> None:
 
 
 def list_jump_overrides(arguments: argparse.Namespace) -> list[str]:
-    """KEY=VALUE of ``--tolerance`` and ``--cycles``; `UsageError` beside a k or h by hand."""
+    """KEY=VALUE of ``--tolerance``, ``--cycles`` and ``--members``; `UsageError` beside a k or h by
+    hand."""
     overrides = []
     if arguments.tolerance is not None:
         if arguments.procedure not in (None, "tolerance"):
@@ -91,6 +97,8 @@ def list_jump_overrides(arguments: argparse.Namespace) -> list[str]:
         overrides.append(f"procedure.tolerance={arguments.tolerance!r}")
     if arguments.cycles is not None:
         overrides.append(f"procedure.total_cycles={arguments.cycles}")
+    if arguments.members is not None:
+        overrides.append(f"procedure.members={arguments.members}")
     return overrides
 
 
@@ -99,15 +107,26 @@ def run_command(arguments: argparse.Namespace) -> int:
     from adapters.procedure import run as procedure
 
     named = [f"procedure.name={arguments.procedure}"] if arguments.procedure else []
+    folder = arguments.run_folder or arguments.scene.parent / "run"
     procedure.run_scene(
         arguments.scene,
-        arguments.run_folder or arguments.scene.parent / "run",
+        folder,
         control=arguments.control,
         overrides=named + list_overrides(arguments) + list_jump_overrides(arguments),
         dry_run=arguments.dry_run,
         cycle_by_cycle=arguments.cycle_by_cycle,
     )
+    if not arguments.dry_run:
+        print_result(folder)
     return 0
+
+
+def print_result(run_folder: Path) -> None:
+    """Print the sentence that an engineer asks for; nothing of a run without load cycles."""
+    from adapters.procedure import describe_result, read_run_record
+
+    for sentence in describe_result(read_run_record(run_folder))[-1:]:
+        print(sentence)
 
 
 def run_resume(arguments: argparse.Namespace) -> int:
@@ -117,6 +136,7 @@ def run_resume(arguments: argparse.Namespace) -> int:
     procedure.resume(
         arguments.run_folder, cycles=arguments.cycles, cycle_by_cycle=arguments.cycle_by_cycle
     )
+    print_result(arguments.run_folder)
     return 0
 
 
@@ -124,11 +144,15 @@ def run_status(arguments: argparse.Namespace) -> int:
     """Print how far a run is, and in sentences what came out."""
     from dataclasses import asdict
 
-    from adapters.procedure import describe_result, judge_progress, read_run_record
+    from adapters.procedure import describe_result, judge_progress, make_plain, read_run_record
 
     record = read_run_record(arguments.run_folder)
-    print_fields(asdict(judge_progress(record)), arguments.json)
-    if not arguments.json:
+    content = make_plain(asdict(judge_progress(record)))
+    if arguments.json:
+        print_fields(content, as_json=True)
+    else:
+        del content["result"]  # the sentences say it
+        print_fields(content, as_json=False)
         print("", *describe_result(record), sep="\n")
     return 0
 
@@ -138,4 +162,5 @@ def run_report(arguments: argparse.Namespace) -> int:
     from adapters.report import write_report
 
     show_page(write_report(arguments.run_folder), arguments.open)
+    print_result(arguments.run_folder)
     return 0

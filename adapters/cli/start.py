@@ -70,7 +70,7 @@ def run_new(arguments: argparse.Namespace) -> int:
 
 def run_cite(arguments: argparse.Namespace) -> int:
     """Print BibTeX entries, each under a comment saying what it is cited for."""
-    from adapters.citations import CITATIONS
+    from adapters.cli.citations import CITATIONS
     from trackbed import __version__
 
     entries = "\n\n".join(f"% {purpose}\n{entry}" for purpose, entry in CITATIONS)

@@ -9,6 +9,14 @@ from adapters.procedure.history import (
     list_jumped_spans,
     sum_cost,
 )
+from adapters.procedure.members import (
+    Mean,
+    Settled,
+    describe_result,
+    describe_sleeper,
+    estimate_mean,
+    judge_members,
+)
 from adapters.procedure.progress import Progress
 from adapters.procedure.record import (
     CONTROL,
@@ -21,14 +29,15 @@ from adapters.procedure.record import (
     make_plain,
     read_run_record,
 )
-from adapters.procedure.run import record_scene, refuse_differences
+from adapters.procedure.run import record_scene, refuse_differences, refuse_unloaded
 from adapters.procedure.seating import SEATING, find_hung_cycles, format_spans
-from adapters.procedure.status import describe_result, judge_progress, read_status
+from adapters.procedure.status import judge_progress, read_status
 
 __all__ = [
-    "AVERAGED", "BOUNDS", "CONTROL", "SEATING", "History", "Progress", "Record", "Track",
-    "describe_result", "estimate_band_of_run", "find_comparable_cycle", "find_hung_cycles",
-    "find_speed_up", "format_spans", "judge_progress", "list_checks", "list_decisions",
-    "list_jumped_spans", "make_plain", "read_run_record", "read_status", "record_scene",
-    "refuse_differences", "run", "sum_cost",
+    "AVERAGED", "BOUNDS", "CONTROL", "SEATING", "History", "Mean", "Progress", "Record", "Settled",
+    "Track", "describe_result", "describe_sleeper", "estimate_band_of_run", "estimate_mean",
+    "find_comparable_cycle", "find_hung_cycles", "find_speed_up", "format_spans", "judge_members",
+    "judge_progress", "list_checks", "list_decisions", "list_jumped_spans", "make_plain",
+    "read_run_record", "read_status", "record_scene", "refuse_differences", "refuse_unloaded",
+    "run", "sum_cost",
 ]  # fmt: skip

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from adapters.bed import FloatArray, State, load_state
-from adapters.errors import EngineFailed, UsageError
+from adapters.errors import EngineFailed, SceneError, UsageError
 from adapters.files import Outcome, RunFolder, Window, load_window
 from adapters.jumps import Band, estimate_band
 from adapters.procedure.history import (
@@ -23,10 +23,15 @@ from adapters.procedure.history import (
     list_jumped_spans,
     make_history,
 )
-from adapters.scene import Scene, load_scene
+from adapters.scene import MEMBERS_MOST, Scene, load_scene
+from trackbed.run_files import list_differences
 
 CONTROL = "control"
 """Folder inside a run that holds the full run beside it."""
+MEMBERS = "members"
+"""Folder inside a run that holds the members beside it, number 0: ``members/1``, and so on."""
+LENGTHS = ("scene.procedure.total_cycles", "scene.procedure.h")
+"""What may differ between a run that was extended and its members, until they go on."""
 
 
 @dataclass(frozen=True)
@@ -112,16 +117,57 @@ class Record:
     scene: Scene
     run: Track
     control: Track | None  # none when there is none, or it has not yet a cycle of its own
+    members: tuple[Record, ...]  # beside this one, as far as they have begun
+    asked: int  # members in all, this one counted
 
 
 def read_run_record(path: Path) -> Record:
-    """Read the run folder ``path``; raises `UsageError` when it is none."""
+    """Read the run folder ``path``; raises `UsageError` when it is none, `SceneError` when a member
+    in it is another run's."""
     folder = RunFolder(path)
     manifest = folder.manifest()
     scene = load_scene(path / "scene.toml", manifest["overrides"])
     control = read_track(RunFolder(path / CONTROL))
     has_control = len(control.history.cycle) > 0
-    return Record(path, manifest, scene, read_track(folder), control if has_control else None)
+    members, (_, asked) = [], read_members(folder)
+    for number in range(1, asked):
+        inner = RunFolder(path / MEMBERS / str(number))
+        if (inner.path / "manifest.json").exists():
+            refuse_other_member(manifest, inner, number)
+            members.append(read_run_record(inner.path))
+    return Record(
+        path, manifest, scene, read_track(folder), control if has_control else None,
+        tuple(members), asked,
+    )  # fmt: skip
+
+
+def read_members(folder: RunFolder) -> tuple[int, int]:
+    """Which member a run is, 0 for one that is not beside another, and how many it asks for.
+
+    Raises `UsageError` for a manifest that does not say so in numbers.
+    """
+    manifest = folder.manifest()
+    number, asked = manifest.get("member", 0), manifest.get(MEMBERS, 1)
+    if type(number) is type(asked) is int and 0 <= number < MEMBERS_MOST >= asked > 0:
+        return number, asked
+    raise UsageError(
+        f"this manifest.json is damaged: it is of member {number!r:.20} of {asked!r:.20}",
+        where=str(folder.path), remedy="take the run from a copy, or start it again elsewhere",
+    )  # fmt: skip
+
+
+def refuse_other_member(whole: dict[str, Any], inner: RunFolder, number: int) -> None:
+    """Raise `SceneError` where a folder is not member ``number`` of the run that has the manifest
+    ``whole``."""
+    there = inner.manifest()
+    old = {"scene": there["scene"], "member": there.get("member")}
+    new = {"scene": whole["scene"], "member": number}
+    if lines := list(list_differences("", old, new, LENGTHS)):
+        raise SceneError(
+            f"this is not member {number} of the run that it lies in:\n  " + "\n  ".join(lines),
+            where=str(inner.path),
+            remedy="move this folder away: trackbed resume computes the member again",
+        )
 
 
 def read_track(folder: RunFolder) -> Track:

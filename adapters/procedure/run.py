@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import os
 import shlex
 import shutil
 import sys
-from collections.abc import Sequence
-from dataclasses import asdict, replace
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +20,8 @@ from adapters.files import RunFolder, explain_full_disk
 from adapters.procedure import stages
 from adapters.procedure.controlled import settle_controlled
 from adapters.procedure.fixed import settle_fixed
-from adapters.procedure.outlook import describe_plan, warn_without_jumps
-from adapters.procedure.progress import Progress
+from adapters.procedure.progress import Progress, describe_plan, warn_without_jumps
+from adapters.procedure.record import MEMBERS, read_members, refuse_other_member
 from adapters.procedure.stages import Bed, Clock, Run, Variant
 from adapters.scene import Scene, load_scene
 from trackbed.memory import refuse_more_memory
@@ -30,6 +32,9 @@ OWN_FILES = ("lock", "scene.toml", "load_series.csv", "dry_run")
 STATE_BYTES = 500
 """Memory that a grain takes at each cycle end of a window, contacts and wall forces too [bytes]."""
 CONTROL = Variant("control", jumps=False)
+MEMBER_STEP = 1e-10
+"""By which the first grain of member m is moved along x after k_i cycles, m times [m]: far below
+what anyone measures of a grain of millimetres, far above the round-off of its place."""
 
 
 def settle(run: Run) -> Bed:
@@ -48,6 +53,8 @@ def run_scene(
     dry_run: bool = False, cycle_by_cycle: bool = False, progress: Progress | None = None,
 ) -> None:  # fmt: skip
     """Run a scene in the folder ``run_path``; with ``control``, every cycle beside it too.
+
+    Members beside the first, where ``procedure.members`` asks for more, run in ``members/`` inside.
 
     A folder that holds the same scene is resumed; one that holds another is refused with the
     differences.  ``dry_run`` writes the first decks and prints the engine's command line.
@@ -73,8 +80,9 @@ def run_scene(
         return
     folder = RunFolder(run_path)
     with allow_interrupts(), explain_full_disk(run_path), folder.lock():
-        prepare_manifest(folder, scene, scene_path, overrides, control)
-        _run_all(folder, scene, control, folder.keep_cycle_by_cycle(cycle_by_cycle), progress)
+        members = scene.procedure.members if scene.procedure else 1
+        prepare_manifest(folder, scene, scene_path, overrides, control, members)
+        _run_all(folder, scene, cycle_by_cycle, progress)
 
 
 def resume(
@@ -93,8 +101,7 @@ def resume(
         ):
             scene = extend(folder, manifest, scene, cycles)
         folder.add_event("resumed")
-        asked = folder.keep_cycle_by_cycle(cycle_by_cycle)
-        _run_all(folder, scene, manifest["control"], asked, progress or Progress())
+        _run_all(folder, scene, cycle_by_cycle, progress or Progress())
 
 
 def extend(folder: RunFolder, manifest: dict[str, Any], scene: Scene, cycles: int) -> Scene:
@@ -104,6 +111,11 @@ def extend(folder: RunFolder, manifest: dict[str, Any], scene: Scene, cycles: in
     computed because the end was near goes to discarded/.  The first cycles and the lengths of jumps
     stay.
     """
+    if number := read_members(folder)[0]:
+        raise UsageError(
+            f"this is member {number} of another run, and as long as that", where=str(folder.path),
+            remedy="extend the run around it: trackbed resume RUN --cycles N",
+        )  # fmt: skip
     p = scene.procedure
     if p is None or cycles < p.total_cycles:
         have = f"this run is of {p.total_cycles} cycles" if p else "this run has no load cycles"
@@ -122,6 +134,15 @@ def extend(folder: RunFolder, manifest: dict[str, Any], scene: Scene, cycles: in
     return longer
 
 
+def refuse_unloaded(scene: Scene, path: Path) -> None:
+    """Raise `SceneError` for a scene at ``path`` that has no load cycles to settle in."""
+    if scene.loading is None or scene.procedure is None:
+        raise SceneError(
+            "this is about settlements, and this scene has no load cycles",
+            where=str(path), remedy="add the tables [loading] and [procedure]",
+        )  # fmt: skip
+
+
 def refuse_large(scene: Scene) -> None:
     """Raise `OutOfMemory` where the states of one window would not fit into memory."""
     p = scene.procedure
@@ -133,19 +154,58 @@ def refuse_large(scene: Scene) -> None:
     )  # fmt: skip
 
 
-def _run_all(
-    folder: RunFolder, scene: Scene, control: bool, cycle_by_cycle: bool, progress: Progress
-) -> None:
-    try:
-        run_variant(folder, scene, Variant(), progress, cycle_by_cycle)
-        if control:
-            run_variant(folder, scene, CONTROL, progress)
+def _run_all(folder: RunFolder, scene: Scene, cycle_by_cycle: bool, progress: Progress) -> None:
+    """All members, then the full runs beside them: the answer comes before its error."""
+    with note_stop(folder):
+        number, members = read_members(folder)
+        asked = folder.keep_cycle_by_cycle(cycle_by_cycle)
+        for kind in (Variant(), CONTROL)[: 1 + bool(folder.manifest()["control"])]:
+            own = replace(kind, perturbation=number * MEMBER_STEP)
+            run_variant(folder, scene, own, progress, asked)
+            for other in range(1, members):
+                progress.print_line(f"member {other} of 0 to {members - 1}")
+                moved = replace(kind, perturbation=other * MEMBER_STEP)
+                with open_member(folder, scene, other) as inner:
+                    ask = inner.keep_cycle_by_cycle(asked)
+                    run_variant(inner, scene, moved, progress, ask)
         path = shlex.quote(str(folder.path))
         progress.print_line(f"the run is finished: trackbed report {path}")
+
+
+@contextmanager
+def note_stop(folder: RunFolder) -> Iterator[None]:
+    """Keep among the events of a run why it stopped."""
+    try:
+        yield
     except BaseException as error:
         with explain_full_disk(folder.path):
             folder.add_event("stopped", why=str(error) or type(error).__name__)
         raise
+
+
+@contextmanager
+def open_member(folder: RunFolder, scene: Scene, number: int) -> Iterator[RunFolder]:
+    """The folder of a member of the run in ``folder``, its lock held: an ordinary run, which has
+    the first k_i cycles of that run and then a grain moved.
+
+    Its manifest is that of the run around it, which may have been extended since, with its number.
+    Raises `SceneError` for a folder that is no such member, and `UsageError` for no run.
+    """
+    whole, inner = folder.manifest(), RunFolder(folder.path / MEMBERS / str(number))
+    manifest = inner.path / "manifest.json"
+    with inner.lock():
+        if manifest.exists():
+            refuse_other_member(whole, inner, number)
+        else:
+            refuse_strangers(inner)
+            for name in {"scene.toml", "load_series.csv"} & {*os.listdir(folder.path)}:
+                shutil.copyfile(folder.path / name, inner.path / name)
+        own = whole | {"members": 1, "member": number}
+        write_whole(manifest, json.dumps(own, indent=1) + "\n")
+        with note_stop(inner):
+            assert scene.procedure is not None
+            inner.share_start(folder, scene.procedure.k_i)
+            yield inner
 
 
 def run_variant(
@@ -162,13 +222,13 @@ def run_variant(
         here = folder
     else:
         here = folder.enter(variant.name)
-        here.share_start(folder, count_shared_cycles(folder, scene, variant))
+        here.share_start(folder, count_shared_cycles(folder, scene))
         progress.print_line(variant.name.replace("_", " "))
     if scene.engine.launcher:
         words = shlex.join(engine.command(scene, "in.prepare"))
         progress.print_line(f"the scene's launcher is started, as in: {words}")
     run = Run(scene, here, engine, variant, progress, cycle_by_cycle)
-    if variant.name == "procedure":
+    if variant == Variant():
         run.clock = Clock(0.0)  # it bears the start-up of Python; the others come in its wake
     progress.start()
     if scene.procedure is None or scene.loading is None:
@@ -179,16 +239,13 @@ def run_variant(
     return here
 
 
-def count_shared_cycles(folder: RunFolder, scene: Scene, variant: Variant) -> int:
-    """Cycles up to which a variant's stages are those of the procedure in ``folder``.
+def count_shared_cycles(folder: RunFolder, scene: Scene) -> int:
+    """Cycles up to which the control's stages are those of the procedure in ``folder``.
 
-    Up to k_i where a grain is moved there; else the first window, and where jumps waited for the
-    piston all windows before the first jump.
+    The first window, and where jumps waited for the piston all windows before the first jump.
     """
     p = scene.procedure
     assert p is not None
-    if variant.perturbation:
-        return p.k_i
     first = p.k_i + p.window_cycles
     if p.seating == "any":
         return first
@@ -207,17 +264,39 @@ def record_scene(scene: Scene) -> dict[str, Any]:
 
 
 def prepare_manifest(
-    folder: RunFolder, scene: Scene, scene_path: Path, overrides: Sequence[str], control: bool
-) -> None:
-    """Write the manifest of a new run, or refuse a folder that holds another scene's run."""
+    folder: RunFolder, scene: Scene, scene_path: Path, overrides: Sequence[str], control: bool,
+    members: int,
+) -> None:  # fmt: skip
+    """Write the manifest of a new run, or refuse a folder that holds another scene's run.
+
+    A run that is there goes on with a ``control``, and ``members``, if it is asked for more.
+    """
     path = folder.path / "manifest.json"
     if path.exists():
         manifest = folder.manifest()
         refuse_differences(manifest["scene"], record_scene(scene), folder.path)
-        if control and not manifest["control"]:
-            write_whole(path, json.dumps(manifest | {"control": True}, indent=1) + "\n")
+        most = max(members, read_members(folder)[1])
+        more = manifest | {"control": manifest["control"] or control, "members": most}
+        if more != manifest:
+            write_whole(path, json.dumps(more, indent=1) + "\n")
         folder.add_event("resumed")
         return
+    refuse_strangers(folder)
+    shutil.copyfile(scene_path, folder.path / "scene.toml")
+    kept = list(overrides)
+    if scene.loading is not None and scene.loading.series is not None:
+        shutil.copyfile(scene.loading.series, folder.path / "load_series.csv")
+        kept.append('loading.series="load_series.csv"')
+    manifest = {
+        "scene": record_scene(scene), "overrides": kept, "control": control, "members": members,
+        "provenance": record_provenance(sys.argv),
+    }  # fmt: skip
+    write_whole(path, json.dumps(manifest, indent=1) + "\n")
+    folder.add_event("started")
+
+
+def refuse_strangers(folder: RunFolder) -> None:
+    """Raise `UsageError` for a folder without a manifest that holds other people's files."""
     strangers = [p.name for p in folder.path.iterdir() if p.name not in OWN_FILES]
     if strangers:
         raise UsageError(
@@ -225,17 +304,6 @@ def prepare_manifest(
             where=str(folder.path),
             remedy="give an empty or new folder: --run-folder FOLDER",
         )
-    shutil.copyfile(scene_path, folder.path / "scene.toml")
-    kept = list(overrides)
-    if scene.loading is not None and scene.loading.series is not None:
-        shutil.copyfile(scene.loading.series, folder.path / "load_series.csv")
-        kept.append('loading.series="load_series.csv"')
-    manifest = {
-        "scene": record_scene(scene), "overrides": kept, "control": control,
-        "variant": asdict(Variant()), "provenance": record_provenance(sys.argv),
-    }  # fmt: skip
-    write_whole(path, json.dumps(manifest, indent=1) + "\n")
-    folder.add_event("started")
 
 
 def refuse_differences(old: dict[str, Any], new: dict[str, Any], path: Path) -> None:

@@ -4,25 +4,18 @@ from __future__ import annotations
 
 import shlex
 from dataclasses import dataclass
-from math import isfinite, nan
 from pathlib import Path
 
 from adapters.files import EVENTS
-from adapters.jumps import BAND_PROBABILITY
-from adapters.procedure.history import History, find_speed_up, list_jumped_spans, sum_cost
-from adapters.procedure.record import (
-    Record,
-    Track,
-    estimate_band_of_run,
-    find_comparable_cycle,
-    read_run_record,
-)
+from adapters.procedure.members import Settled, judge_members, sum_members_cost
+from adapters.procedure.record import MEMBERS, Record, Track, make_plain, read_run_record
 from trackbed.run_files import is_written
 
 
 @dataclass(frozen=True)
 class Status:
-    """How far a run is; SI units, None for what is not known yet."""
+    """How far a run is, the first of its members where it has several; SI units, None for what is
+    not known yet.  Settlements and stiffness are means over members."""
 
     run_folder: str
     state: str  # ``running``, ``finished`` or ``stopped``
@@ -43,14 +36,15 @@ class Status:
     """Settlement of the mean grain since the preparation."""
     speed_up_so_far: float | None
     """CPU time of the full run beside it over its own, as in the report; None without one."""
-    cpu_s: float  # CPU time of all finished stages, preparation included [s]
+    cpu_s: float  # CPU time of all finished stages, preparation included, full runs not [s]
     band_m: tuple[float, float] | None
-    """Of a run with a tolerance: the mean grain of a full run would be between them with
-    probability 0.9."""
+    """Of the mean grain, with probability 0.9: of one run with a tolerance that of a full run, of
+    several members that of their mean."""
     control_cycle: int | None  # cycles the full run beside it has done; None without one
     damaged: str
     """Stages, which count for nothing then, and records that are not as the run left them."""
     next: str  # the command that goes on from here
+    result: Settled | None  # over all members: bands, chaos, and the error beside full runs
 
 
 def read_status(run_folder: Path) -> Status:
@@ -64,13 +58,12 @@ def judge_progress(record: Record) -> Status:
     cycle = int(history.cycle[-1]) if len(history.cycle) else 0
     computed = history.count_computed(cycle)
     state = "running" if is_written(run_folder, "lock") else "stopped"
-    if state == "stopped" and _is_finished(record) and not set(record.run.damaged) - {EVENTS}:
+    damaged = list(record.run.damaged)
+    for one in record.members:
+        damaged += [f"{MEMBERS}/{one.path.name}/{name}" for name in one.run.damaged]
+    if state == "stopped" and _is_finished(record) and all(EVENTS in name for name in damaged):
         state = "finished"
-    at, ratio = find_comparable_cycle(record), nan
-    if record.control is not None and at:
-        full = record.control.history
-        ratio = find_speed_up(full.cpu_s[full.row(at)], history.cpu_s[history.row(at)])
-    band = estimate_band_of_run(record.run)
+    result = judge_members(record)
     procedure = record.scene.procedure if record.scene.loading is not None else None
     verb = {"running": "status", "stopped": "resume", "finished": "report"}[state]
     last = record.run.events[-1] if record.run.events else {}
@@ -85,85 +78,18 @@ def judge_progress(record: Record) -> Status:
         cycles_jumped=cycle - computed,
         jumps=len(record.run.jumps),
         failed_jumps=len(record.run.failed_jumps),
-        loaded_body_m=float(history.loaded_body[-1]) if cycle else None,
-        stiffness_n_per_m=_read_late(history, "stiffness"),
-        elastic_deflection_m=_read_late(history, "elastic_deflection"),
-        mean_grain_m=float(history.settlement[-1]) if cycle else None,
-        speed_up_so_far=float(ratio) if isfinite(ratio) else None,
-        cpu_s=sum(sum_cost(outcome.cost) for outcome in record.run.outcomes),
-        band_m=None if band is None else (band.low, band.high),
+        loaded_body_m=result.loaded_body.value if result else None,
+        stiffness_n_per_m=make_plain(result.stiffness.value) if result else None,
+        elastic_deflection_m=make_plain(history.late_mean("elastic_deflection", cycle)),
+        mean_grain_m=result.mean_grain.value if result else None,
+        speed_up_so_far=make_plain(result.speed_up) if result else None,
+        cpu_s=sum_members_cost(record),
+        band_m=result.mean_grain.band if result else None,
         control_cycle=_find_last_cycle(record.control) if record.control is not None else None,
-        damaged=", ".join(record.run.damaged),
+        damaged=", ".join(damaged),
         next=f"trackbed {verb} {shlex.quote(str(run_folder))}",
+        result=result,
     )
-
-
-def describe_result(record: Record) -> list[str]:
-    """What came out so far, in sentences with millimetres and per cent; none before a cycle."""
-    history = record.run.history
-    if not len(history.cycle):
-        return []
-    cycle, sunk = int(history.cycle[-1]), float(history.loaded_body[-1])
-    computed = history.count_computed(cycle)
-    how = "all of them" if computed == cycle else f"{computed} of them"
-    said = [
-        f"The loaded body settled {_format_millimetres(sunk)} in {cycle} cycles, {how} computed; "
-        f"the mean grain {_format_millimetres(float(history.settlement[-1]))}."
-    ]
-    deflection, stiffness = (
-        history.late_mean(name, cycle) for name in ("elastic_deflection", "stiffness")
-    )
-    if isfinite(deflection) and isfinite(stiffness):
-        said.append(
-            f"Under the load it gives way by {_format_millimetres(deflection)}, a stiffness of "
-            f"{1e-6 * stiffness:#.3g} kN/mm."
-        )
-    band = estimate_band_of_run(record.run)
-    if band is not None:
-        ends = f"{_format_millimetres(band.low)} to {_format_millimetres(band.high)}"
-        said.append(
-            f"With probability {BAND_PROBABILITY:g} the mean grain of a full run settles {ends}."
-        )
-    at = find_comparable_cycle(record)
-    if record.control is not None and at and record.run.jumps:
-        first = list_jumped_spans(record.run.outcomes)[0][0]
-        said.append(compare_with_full(history, record.control.history, at, first))
-    return said
-
-
-def compare_with_full(own: History, full: History, cycle: int, first: int = 0) -> str:
-    """The sentence on the full run beside a run with jumps, at the last cycle that both have; the
-    errors are those of what is gained since cycle ``first``, before the first jump."""
-    mine, truth = own.row(cycle), full.row(cycle)
-    settled, of_full = float(own.loaded_body[mine]), float(full.loaded_body[truth])
-    said = f"In the full run beside it the loaded body settled {_format_millimetres(of_full)}"
-    if cycle != own.cycle[-1]:
-        said += f" in {cycle} cycles, in this one {_format_millimetres(settled)}"
-    errors = [
-        100 * full.gain_error(float(getattr(own, of)[mine]), first, cycle, of)
-        for of in ("loaded_body", "settlement")
-    ]
-    if all(map(isfinite, errors)):
-        off, of_grains = (
-            f"{abs(error):.0f} % {'short' if error < 0 else 'over'}"
-            if abs(error) >= 0.5 else "within 0.5 %" for error in errors
-        )  # fmt: skip
-        since = f" of the gain since cycle {first}" if first else ""
-        said += f": the jumps are {off}{since} (mean grain {of_grains})"
-    spent, of_full_s = float(own.cpu_s[mine]), float(full.cpu_s[truth])
-    if min(spent, of_full_s) > 0:
-        ratio = max(of_full_s / spent, spent / of_full_s)
-        said += f", at {ratio:.1f} times {'less' if spent <= of_full_s else 'more'} computing"
-    return said + "."
-
-
-def _read_late(history: History, name: str) -> float | None:
-    value = history.late_mean(name, int(history.cycle[-1])) if len(history.cycle) else nan
-    return value if isfinite(value) else None
-
-
-def _format_millimetres(length: float) -> str:
-    return f"{1e3 * length:#.3g} mm"
 
 
 def _find_last_cycle(track: Track) -> int:
@@ -171,12 +97,13 @@ def _find_last_cycle(track: Track) -> int:
 
 
 def _is_finished(record: Record) -> bool:
-    """All cycles of the run are done, and of its control when it was asked for one."""
+    """All cycles of the run and its members are done, and of the full runs that were asked for."""
     if record.scene.loading is None or record.scene.procedure is None:
         return record.run.preparation is not None
-    tracks = [record.run, record.control] if record.manifest.get("control") else [record.run]
+    members = (record, *record.members)
+    full = [one.control for one in members] if record.manifest.get("control") else []
     total = record.scene.procedure.total_cycles
-    return all(
-        track is not None and len(track.history.cycle) > 0 and _find_last_cycle(track) == total
-        for track in tracks
+    return len(members) == record.asked and all(
+        track is not None and len(track.history.cycle) > 0 and _find_last_cycle(track) >= total
+        for track in (*(one.run for one in members), *full)
     )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from adapters.bed import FloatArray
-from adapters.procedure import History
+from adapters.procedure import History, Record
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,14 +43,27 @@ def add_legend(figure: Figure, columns: int) -> None:
 
 
 def draw_settlement(
-    run: History, control: History | None, spans: Sequence[tuple[int, int]], title: str
-) -> Figure:
-    """Settlement of the loaded body of a run, its jumped ``spans`` and the full run beside it."""
+    run: History, control: History | None, spans: Sequence[tuple[int, int]], title: str,
+    members: Sequence[Record] = (),
+) -> Figure:  # fmt: skip
+    """Settlement of the loaded body of a run, its jumped ``spans``, the full run beside it, and
+    other ``members``."""
     figure, *panels = make_panels(title)
     for panel in panels:
+        draw_members(panel, members)
         draw_curves(panel, run, control, spans)
     add_legend(figure, 5)
     return figure
+
+
+def draw_members(panel: Axes, members: Sequence[Record]) -> None:
+    """A thin line for the loaded body of each member, and for that of its full run."""
+    for number, one in enumerate(members):
+        tracks = {"full runs of members": one.control, "members": one.run}
+        for (name, track), colour in zip(tracks.items(), (CONTROL, COMPUTED), strict=True):
+            if track is not None:
+                sunk, label = 1e6 * track.history.loaded_body, None if number else name
+                panel.plot(track.history.cycle, sunk, color=colour, lw=0.6, alpha=0.6, label=label)
 
 
 def draw_curves(

@@ -14,8 +14,10 @@ from adapters.jumps import Band
 from adapters.laws import get_law
 from adapters.procedure import (
     Record,
+    Settled,
     estimate_band_of_run,
     find_comparable_cycle,
+    judge_members,
     list_jumped_spans,
     make_plain,
     sum_cost,
@@ -46,6 +48,7 @@ class Numbers:
     stiffness: float  # secant stiffness under it in the same cycles [N/m]
     mean_grain: float  # settlement of the mean grain at ``cycle`` [m]
     band: Band | None  # of the mean grain in a run with a tolerance, and how far it can be off
+    settled: Settled | None  # over all members, of which the other numbers are the first's
     speed_up_most: float
     """Cycles done over cycles computed: a bound on the speed-up, which is one of CPU times."""
     compared_at: int  # cycle at which run and control are compared; 0 without a control
@@ -104,6 +107,7 @@ def gather_numbers(record: Record) -> Numbers:
         stiffness=history.late_mean("stiffness", cycle),
         mean_grain=float(history.settlement[-1]) if cycle else nan,
         band=estimate_band_of_run(run),
+        settled=judge_members(record),
         speed_up_most=cycle / computed if computed else nan,
         compared_at=compared_at,
         error_rows=rows,
@@ -187,6 +191,7 @@ def _format_command(record: Record) -> str:
     """The command that makes the run again, from inside its folder."""
     words = ["trackbed", "run", "scene.toml", "--run-folder", "../again"]
     words += ["--control"] if record.manifest.get("control") else []
+    words += ["--members", str(record.asked)] if record.asked > 1 else []
     for override in record.manifest["overrides"]:
         words += ["--set", override]
     return shlex.join(words)

@@ -8,10 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from html import escape
+from math import nan
 from pathlib import Path
 
 from adapters.files import explain_full_disk
-from adapters.procedure import AVERAGED, Record, list_jumped_spans, read_run_record
+from adapters.procedure import (
+    AVERAGED,
+    Record,
+    describe_result,
+    list_jumped_spans,
+    read_run_record,
+)
 from adapters.report.control import describe_control
 from adapters.report.error import Comparison
 from adapters.report.figure import draw_settlement
@@ -63,7 +70,8 @@ def write_figure(record: Record, numbers: Numbers) -> Path:
     if row is not None:
         title = f"error {100 * row.loaded_body_error:+.1f} % at a speed-up of {row.speed_up:.2f}"
     return save_figure(
-        lambda: draw_settlement(record.run.history, full, spans, title), folder / "settlement.png"
+        lambda: draw_settlement(record.run.history, full, spans, title, record.members),
+        folder / "settlement.png",
     )
 
 
@@ -73,6 +81,8 @@ def list_sections(record: Record, numbers: Numbers, figure: Path | None) -> Iter
     yield from _describe_claim(record, numbers)
     if numbers.cycle:
         yield _describe_settlement(numbers, figure)
+        if record.asked > 1:
+            yield _describe_members(record, numbers.cycle)
         if numbers.error_rows:
             yield _describe_error(numbers)
         yield _describe_cost(numbers)
@@ -96,38 +106,25 @@ def _describe_claim(record: Record, numbers: Numbers) -> Iterator[str]:
         state = "is settled" if numbers.preparation else "is not settled yet"
         yield make_paragraph(f"The bed {state}; no load cycle has been computed.", "claim")
         return
-    begun = (
-        f"{numbers.cycle} load cycles settle the loaded body by {format_um(numbers.loaded_body)} "
-        f"µm (the mean grain by {format_um(numbers.mean_grain)} µm); it gives way by "
-        f"{format_um(numbers.elastic_deflection)} µm under the load, a stiffness of "
-        f"{format_stiffness(numbers.stiffness)} kN/mm"
-    )
+    grains, claim = map(escape, describe_result(record))
     if not numbers.finished:
-        begun = f"Unfinished, at cycle {numbers.cycle} of {numbers.total_cycles}: {begun}"
+        claim = f"Unfinished, at cycle {numbers.cycle} of {numbers.total_cycles}: {claim}"
+    yield make_paragraph(f"{claim}.", "claim")
     if row is None or full is None:
         why = "there is no full run beside it (<code>trackbed run … --control</code> adds it)"
         if record.manifest.get("control"):
             why = "the full run beside it is not past the first jump yet"
-        claim = (
-            f"{begun}, computing {numbers.cycles_computed} of them. The error is unknown: "
-            f"{why}. The speed-up is at most {format_number(numbers.speed_up_most, '.2f')}, cycles "
-            "done over cycles computed."
+        known = (
+            f"The error is unknown: {why}. The speed-up is at most "
+            f"{format_number(numbers.speed_up_most, '.2f')}, cycles done over cycles computed."
         )
     else:
-        at = ""
-        if numbers.compared_at != numbers.cycle:
-            sunk = format_um(row.loaded_body)
-            at = f" At cycle {numbers.compared_at} it has settled by {sunk} µm."
-        claim = (
-            f"{begun}.{at} The full run, every cycle computed, gives "
-            f"{format_um(full.loaded_body)} µm, so the error of what the loaded body gained since "
-            f"the first jump is {format_share(row.loaded_body_error)} (mean grain "
-            f"{format_share(row.settlement_error)}), at a speed-up of "
-            f"{format_number(row.speed_up, '.2f')} ({format_number(row.cpu_s, '.1f')} s of CPU "
-            f"time instead of {format_number(full.cpu_s, '.1f')} s from the start of loading; "
-            f"{format_number(row.speed_up_with_preparation, '.2f')} with preparation)."
+        known = (
+            "Errors are of the gain since the first jump. CPU time is counted from the start of "
+            f"loading; with the preparation the speed-up is "
+            f"{format_number(row.speed_up_with_preparation, '.2f')}."
         )
-    yield make_paragraph(claim, "claim")
+    yield make_paragraph(f"{grains}. {known}")
     if numbers.fails:
         fails = make_list(escape(sentence) + "." for sentence in numbers.fails)
         yield f'<div class="fails"><p>Where it fails:</p>{fails}</div>'
@@ -145,6 +142,27 @@ def _describe_settlement(numbers: Numbers, figure: Path | None) -> str:
             "cycles cut out."
         )
     return make_section("Settlement", make_picture(figure, "Settlement curve", caption))
+
+
+def _describe_members(record: Record, cycle: int) -> str:
+    """Members, and the full runs beside them, at the cycle of the first."""
+    definition = make_paragraph(
+        "Member <i>m</i> goes on from the state after the first cycles with one grain moved by "
+        f"<i>m</i> {TIMES} 10<sup>{MINUS}10</sup> m: what members differ by is chaos, in standard "
+        "deviations. Bands are Student's 90 % intervals of the mean; errors, of each member less "
+        "the full run from the same state, are over the mean gain of the full runs. The rest of "
+        "this page is about member 0; each has a report of its own."
+    )
+    header = ("member", "loaded body (µm)", "its full run", "mean grain (µm)", "its full run")
+    rows = [
+        [str(number)] + [
+            format_um(track.history.gain(0, cycle, of) if track else nan)
+            for of in ("loaded_body", "settlement") for track in (one.run, one.control)
+        ]
+        for number, one in enumerate((record, *record.members))
+    ]  # fmt: skip
+    caption = f"Settlement at cycle {cycle}, as far as it was reached."
+    return make_section("Members", definition, make_table(caption, header, rows))
 
 
 def _describe_error(numbers: Numbers) -> str:

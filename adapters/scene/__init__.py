@@ -2,6 +2,8 @@
 
 from adapters.scene.file import load_scene
 from adapters.scene.model import list_omissions
-from adapters.scene.tables import Procedure, Scene, flatten_keys
+from adapters.scene.tables import MEMBERS_MOST, Procedure, Scene, flatten_keys
 
-__all__ = ["Procedure", "Scene", "flatten_keys", "list_omissions", "load_scene"]
+__all__ = [
+    "MEMBERS_MOST", "Procedure", "Scene", "flatten_keys", "list_omissions", "load_scene",
+]  # fmt: skip

@@ -23,9 +23,10 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
 
     ``overrides`` such as ``procedure.k=10`` replace or add keys, their values in TOML (a bare word
     is a string); an override of one of two alternative keys removes the other, one of
-    procedure.tolerance k, h and another name, one of procedure.name all but total_cycles.  Keys
-    that follow from the procedure's name are put in (`adapters.scene.procedures`).  A relative path
-    of a load series counts from the scene file's folder.
+    procedure.tolerance k, h and another name, one of procedure.name all but total_cycles and
+    members.  Keys that follow from the procedure's name are put in
+    (`adapters.scene.procedures`).  A relative path of a load series counts from the scene file's
+    folder.
 
     Raises `UsageError` when the file or an override can not be read, `SceneError` with all that is
     wrong: file, line, dotted key and sentence of each.
@@ -50,7 +51,7 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
 def _drop_alternatives(data: dict[str, Any], key: str) -> None:
     """Remove what an override of ``key`` stands instead of."""
     if key == "procedure.name":
-        kept = ("name", "total_cycles")
+        kept = ("name", "total_cycles", "members")
         data["procedure"] = {k: v for k, v in data["procedure"].items() if k in kept}
     if key == TOLERANCE_KEY and "name" in data["procedure"]:
         data["procedure"] = {**data["procedure"], "name": "tolerance"}

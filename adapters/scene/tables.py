@@ -45,6 +45,8 @@ Poisson = Annotated[float, Field(ge=0, lt=0.5, allow_inf_nan=False)]
 Restitution = Annotated[float, Field(gt=0.05, le=1, allow_inf_nan=False)]
 ViscousAlpha = Annotated[float, Field(ge=0, lt=contact_law.find_alpha(0.05), allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=1, le=COUNT_GREATEST)]
+MEMBERS_MOST = 1000
+"""Members of a run at most: the mean of so many is known to 5 % of what they differ by."""
 
 
 class GrainRadius(Table):
@@ -179,13 +181,17 @@ class Procedure(Table):
     """How a moved bed gets rid of its overlaps: of `adapters.relaxation.methods.METHODS`, or
     "none"."""
     total_cycles: Count  # cycles computed and jumped at the end
+    members: Annotated[int, Field(ge=1, le=MEMBERS_MOST)] = 1
+    """Runs from states after k_i cycles that differ by chance alone: the result is over them."""
 
     @model_serializer(mode="wrap")
     def _drop_newer_defaults(self, whole: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Stored runs are older than these keys: at their defaults they are left out."""
+        """Stored runs are older than these keys: at their defaults they are left out.  How many
+        runs there are is no parameter of any of them: always left out."""
         newer = {"name": None, "move": MOVE_DEFAULT, "tolerance": None, "settlement": "law"}
         newer |= {"seating": "any", "seating_cycles": None, "jammed": "less"}
         record: dict[str, Any] = whole(self)
+        newer["members"] = record["members"]
         return {k: value for k, value in record.items() if k not in newer or value != newer[k]}
 
     def jump_cycles(self, jump: int) -> int:

@@ -18,9 +18,10 @@ from adapters.bed.sample import GRAVITY
 from adapters.bed.state import FloatArray, State
 from adapters.engines import decks
 from adapters.files.run_folder import RunFolder
-from adapters.files.window import Window
+from adapters.files.window import Window, load_window
 from adapters.moves import Jump
 from adapters.procedure import stages
+from adapters.procedure.status import read_status
 from tests.engine_sample import (
     AFTER,
     FIRST,
@@ -34,7 +35,9 @@ from tests.engine_sample import (
     window_of,
 )
 from tests.forked_commands import Commands, awaited, gone
+from tests.small_bed import read_rows
 from trackbed import command
+from trackbed.scenes import read_template
 
 pytestmark = pytest.mark.engine("liggghts")
 
@@ -219,3 +222,36 @@ def test_dry_run_by_hand(liggghts: Sample, tmp_path: Path) -> None:
     for name in ("history.txt", "states.dump", "contacts.dump"):
         kept = liggghts.run / "preparation" / name
         assert (folder / name).read_bytes() == kept.read_bytes(), name
+
+
+@pytest.mark.long
+def test_members_part_by_chance_alone(tmp_path: Path) -> None:
+    """A grain moved by 1e-10 m: the first five cycles are the same bits, in the next all grains are
+    elsewhere, in full runs too; each full run has the start of its own member."""
+    keys = (
+        "sample.count=60",
+        "material.grain.young=1e9",
+        "procedure.k_i=5",
+        "procedure.k=5",
+        "procedure.h=15",
+    )
+    settings = [word for key in keys for word in ("--set", key)]
+    (tmp_path / "scene.toml").write_text(read_template("karrech-coarse"))
+    words = ["run", str(tmp_path / "scene.toml"), "--engine", "liggghts", "--cycles", "40"]
+    assert command.main([*words, *settings, "--members", "2", "--control"]) == 0
+    (own, full), (other, beside) = (
+        (read_rows(folder), read_rows(folder / "control"))
+        for folder in (tmp_path / "run", tmp_path / "run" / "members" / "1")
+    )
+    assert own[:5] == full[:5] == other[:5] == beside[:5]
+    assert own[:10] == full[:10] != other[:10] == beside[:10]
+    places = [
+        load_window(folder / "window_000005" / "states.npz").position[1]
+        for folder in (tmp_path / "run", tmp_path / "run" / "members" / "1")
+    ]
+    assert (places[0] != places[1]).any(axis=1).all()
+    result = read_status(tmp_path / "run").result
+    assert result is not None
+    assert (result.members, result.pairs, result.cycle) == (2, 2, 40)
+    assert result.loaded_body.chaos > 1e-9
+    assert result.error.chaos > 1e-4

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from adapters.engines.fake import SETTLEMENT
 from adapters.files.run_folder import RunFolder
-from adapters.procedure.outlook import plan_jumps
+from adapters.procedure.progress import plan_jumps
 from adapters.scene.file import load_scene
 from adapters.scene.procedures import NUMBERS, PROCEDURES, fill_procedure
 from adapters.scene.tables import Procedure

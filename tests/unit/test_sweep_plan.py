@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from adapters.errors import EngineMissing, SceneError, UsageError
+from adapters.procedure.members import estimate_mean
 from adapters.procedure.sweep.cluster import check_libraries
 from adapters.procedure.sweep.member import read_sentence
 from adapters.procedure.sweep.plan import NAME_LONGEST, name_member, plan_sweep, split_values
-from adapters.procedure.sweep.results import estimate_mean
 from tests.small_bed import small_bed
 
 
@@ -152,9 +152,10 @@ def test_a_missing_library_is_told_before_anything_starts(
 def test_band_is_students() -> None:
     """Half width t_(n-1) s/sqrt(n): for 1, 2, 3 it is 4.302653 times 1/sqrt(3), one has none; of
     2,000 samples of five the 95 % band misses the mean in 5 %, give or take 1.5."""
-    mean, half = estimate_mean(np.array([[1.0], [2.0], [3.0]]))
+    mean, half = estimate_mean(np.array([[1.0], [2.0], [3.0]]), 0.95)
     assert mean == pytest.approx([2.0])
     assert half == pytest.approx([4.30265273 / 3**0.5], rel=1e-8)
-    assert np.isnan(estimate_mean(np.array([[1.0]]))[1]).all()
-    mean, half = estimate_mean(np.random.default_rng(5).normal(3.0, 2.0, size=(5, 2000)))
+    assert np.isnan(estimate_mean(np.array([[1.0]]), 0.95)[1]).all()
+    samples = np.random.default_rng(5).normal(3.0, 2.0, size=(5, 2000))
+    mean, half = estimate_mean(samples, 0.95)
     assert np.mean(np.abs(mean - 3.0) > half) == pytest.approx(0.05, abs=0.015)

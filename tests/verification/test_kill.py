@@ -86,18 +86,31 @@ def test_killed_at_random_times(commands: Commands, whole: bytes, tmp_path: Path
 
 
 @pytest.mark.long
-def test_killed_at_every_file_operation(commands: Commands, whole: bytes, tmp_path: Path) -> None:
-    """A kill in place of any one change outside partial/: resumed, the table is the same."""
-    assert commands.run(*resume(commands, tmp_path / "0"), root=str(tmp_path)) == 0
-    count = commands.operations
-    assert count > 30
-    for number in range(1, count + 1):
-        run = tmp_path / str(number)
+@pytest.mark.parametrize(("beside", "step"), [((), 1), (("--members", 2, "--control"), 5)])
+def test_killed_at_every_file_operation(
+    beside: tuple[object, ...], step: int, commands: Commands, tmp_path: Path
+) -> None:
+    """A kill in place of any one change outside partial/, beside members and full runs of one in
+    five: resumed, all tables are the same."""
+
+    def go_on(run: Path, **asked: object) -> int:
         words = resume(commands, run)
-        assert commands.run(*words, root=str(tmp_path), crash=number) == -signal.SIGKILL
-        assert whole.startswith(table(run)), f"killed at operation {number} of {count}"
-        assert commands.run(*resume(commands, run)) == 0, commands.output.read_text()
-        assert table(run) == whole, f"killed at operation {number} of {count}"
+        return commands.run(*words, *(beside if words[0] == "run" else ()), **asked)
+
+    def tables(run: Path) -> dict[str, bytes]:
+        return {str(one.relative_to(run)): one.read_bytes() for one in run.rglob("settlement.csv")}
+
+    assert go_on(tmp_path / "0", root=str(tmp_path)) == 0
+    count, whole = commands.operations, tables(tmp_path / "0")
+    assert count > 30
+    assert len(whole) == (4 if beside else 1)
+    for number in range(1, count + 1, step):
+        run = tmp_path / str(number)
+        assert go_on(run, root=str(tmp_path), crash=number) == -signal.SIGKILL
+        killed = tables(run)
+        assert all(whole[name].startswith(found) for name, found in killed.items())
+        assert go_on(run) == 0, commands.output.read_text()
+        assert tables(run) == whole, f"killed at operation {number} of {count}"
         assert not list(run.glob(".*.partial"))
         shutil.rmtree(run)
 

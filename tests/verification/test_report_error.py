@@ -25,8 +25,8 @@ from adapters.procedure.history import (
     make_history,
     sum_cost,
 )
+from adapters.procedure.members import compare_pairs
 from adapters.procedure.record import find_comparable_cycle
-from adapters.procedure.status import compare_with_full
 from adapters.report.error import (
     COORDINATION_BAR,
     HEIGHT_BAR,
@@ -193,8 +193,8 @@ def test_errors_know_no_zero(zero: float) -> None:
     assert row_.settlement_error == pytest.approx(0.02)
     assert row_.loaded_body_error == pytest.approx(-0.03)
     assert isnan(compare_runs("x", own, 100, full, 100, 0.0, before=100).settlement_error)
-    said = compare_with_full(own, full, 100, 50)
-    assert "3 % short of the gain since cycle 50 (mean grain 2 % over)" in said
+    for of, error in (("loaded_body", -0.03), ("settlement", 0.02)):
+        assert compare_pairs([(own, full)], 50, 100, of).value == pytest.approx(error)
 
 
 def test_stages_of_older_runs_know_the_loaded_body_by_its_heights() -> None:
@@ -328,22 +328,6 @@ def test_common_cycle() -> None:
         run = SimpleNamespace(outcomes=outcomes, history=make_history(outcomes))
         record = SimpleNamespace(run=run, control=SimpleNamespace(history=full_run(last)))
         assert find_comparable_cycle(record) == expected  # type: ignore[arg-type]
-
-
-def test_a_sentence_compares_run_and_control() -> None:
-    """13 % less than the closed form, for 323 s instead of 400, as computed by hand."""
-    full = full_run()
-    short = make_history([*PROCEDURE[:4], window(70, 100, settlement=0.87 * settled(100))])
-    for own, of_full, cycle, said in (
-        (short, full, 100, "0.554 mm: the jumps are 13 % short (mean grain 13 % short), "
-         "at 1.2 times less computing."),
-        (short, full, 50, "0.472 mm in 50 cycles, in this one 0.472 mm: the jumps are within "
-         "0.5 % (mean grain within 0.5 %), at 1.0 times less computing."),
-        (full, short, 100, "0.482 mm: the jumps are 15 % over (mean grain 15 % over), "
-         "at 1.2 times more computing."),
-    ):  # fmt: skip
-        begun = "In the full run beside it the loaded body settled "
-        assert compare_with_full(own, of_full, cycle) == begun + said
 
 
 def folder_of(path: Path, outcomes: tuple[Outcome, ...]) -> RunFolder:

@@ -16,7 +16,7 @@ from typing import Any
 
 from adapters.errors import SceneError, UsageError
 from adapters.files import RunFolder
-from adapters.procedure import record_scene, refuse_differences
+from adapters.procedure import record_scene, refuse_differences, refuse_unloaded
 from adapters.scene import Scene, load_scene
 
 SEED = "sample.seed"
@@ -172,11 +172,7 @@ def _load_member(path: Path, overrides: Sequence[str], settings: Mapping[str, st
             f"member {format_settings(settings)} is not valid: {error.what}",
             where=error.where, remedy=error.remedy,
         ) from error  # fmt: skip
-    if scene.loading is None or scene.procedure is None:
-        raise SceneError(
-            "a sweep compares settlements, and this scene has no load cycles",
-            where=str(path), remedy="add the tables [loading] and [procedure]",
-        )  # fmt: skip
+    refuse_unloaded(scene, path)
     return scene
 
 

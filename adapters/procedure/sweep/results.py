@@ -14,7 +14,6 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +21,7 @@ import numpy as np
 
 from adapters.bed import FloatArray
 from adapters.files import COLUMNS, RunFolder
-from adapters.procedure import read_run_record
+from adapters.procedure import estimate_mean, make_plain, read_run_record
 from adapters.procedure.sweep.plan import SEED, Member, Sweep
 from adapters.procedure.sweep.run import Result
 from adapters.scene import flatten_keys
@@ -52,22 +51,7 @@ class Band:
     @property
     def half_at_end(self) -> float | None:
         """`half` at the last cycle [m]; None for a single seed."""
-        return _clean_number(self.half[-1])
-
-
-def estimate_mean(values: FloatArray) -> tuple[Any, Any]:
-    """Mean over axis 0 and half the t interval, t_(n-1) s/sqrt(n); nan for one sample.
-
-    ``values`` of shape (n, ...), a sample in each row; independent and normal.
-    """
-    from scipy.special import stdtrit
-
-    n = len(values)
-    mean = values.mean(axis=0)
-    if n < 2:
-        return mean, np.full_like(mean, np.nan)
-    factor = float(stdtrit(n - 1, 0.5 + CONFIDENCE / 2)) / sqrt(n)
-    return mean, factor * values.std(axis=0, ddof=1)
+        return make_plain(self.half[-1])
 
 
 def convert_settings(member: Member) -> dict[str, Any]:
@@ -98,7 +82,7 @@ def estimate_bands(sweep: Sweep, finished: set[str]) -> list[Band]:
             continue
         cycles = sorted(set.intersection(*map(set, curves)))
         values = np.array([[curve[cycle] for cycle in cycles] for curve in curves])
-        mean, half = estimate_mean(values)
+        mean, half = estimate_mean(values, CONFIDENCE)
         settings = convert_settings(members[0])
         cycle = np.array(cycles, float)
         bands.append(Band(group, settings, len(curves), len(members), cycle, mean, half))
@@ -121,7 +105,7 @@ def write_results(sweep: Sweep, results: Sequence[Result]) -> tuple[list[Band], 
     band_rows = [
         {
             **band.settings, "cycle": int(cycle), "seeds": band.seeds, "loaded_body_m": float(mean),
-            "low_m": _clean_number(mean - half), "high_m": _clean_number(mean + half),
+            "low_m": make_plain(mean - half), "high_m": make_plain(mean + half),
         }
         for band in bands
         for cycle, mean, half in zip(band.cycle, band.mean, band.half, strict=True)
@@ -136,10 +120,6 @@ def write_results(sweep: Sweep, results: Sequence[Result]) -> tuple[list[Band], 
         picture = save_figure(lambda: draw_bands(bands), sweep.folder / "settlement.png")
         paths["picture"] = str(picture)
     return bands, paths
-
-
-def _clean_number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
 
 
 def save_table(stem: Path, rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
