@@ -148,17 +148,16 @@ def run_status(arguments: argparse.Namespace) -> int:
 
     record = read_run_record(arguments.run_folder)
     content = make_plain(asdict(judge_progress(record)))
-    if arguments.json:
-        print_fields(content, as_json=True)
-    else:
+    if not arguments.json:
         del content["result"]  # the sentences say it
-        print_fields(content, as_json=False)
+    print_fields(content, arguments.json)
+    if not arguments.json:
         print("", *describe_result(record), sep="\n")
     return 0
 
 
 def run_report(arguments: argparse.Namespace) -> int:
-    """Write report.html and the figures; print the path."""
+    """Write report.html and the figures; print the path and the result."""
     from adapters.report import write_report
 
     show_page(write_report(arguments.run_folder), arguments.open)

@@ -10,7 +10,6 @@ from adapters.procedure.history import (
     sum_cost,
 )
 from adapters.procedure.members import (
-    Mean,
     Settled,
     describe_result,
     describe_sleeper,
@@ -34,8 +33,8 @@ from adapters.procedure.seating import SEATING, find_hung_cycles, format_spans
 from adapters.procedure.status import judge_progress, read_status
 
 __all__ = [
-    "AVERAGED", "BOUNDS", "CONTROL", "SEATING", "History", "Mean", "Progress", "Record", "Settled",
-    "Track", "describe_result", "describe_sleeper", "estimate_band_of_run", "estimate_mean",
+    "AVERAGED", "BOUNDS", "CONTROL", "SEATING", "History", "Progress", "Record", "Settled", "Track",
+    "describe_result", "describe_sleeper", "estimate_band_of_run", "estimate_mean",
     "find_comparable_cycle", "find_hung_cycles", "find_speed_up", "format_spans", "judge_members",
     "judge_progress", "list_checks", "list_decisions", "list_jumped_spans", "make_plain",
     "read_run_record", "read_status", "record_scene", "refuse_differences", "refuse_unloaded",

@@ -163,11 +163,10 @@ def _run_all(folder: RunFolder, scene: Scene, cycle_by_cycle: bool, progress: Pr
             own = replace(kind, perturbation=number * MEMBER_STEP)
             run_variant(folder, scene, own, progress, asked)
             for other in range(1, members):
-                progress.print_line(f"member {other} of 0 to {members - 1}")
+                progress.print_line(f"member {other} of {members - 1} beside the first")
                 moved = replace(kind, perturbation=other * MEMBER_STEP)
                 with open_member(folder, scene, other) as inner:
-                    ask = inner.keep_cycle_by_cycle(asked)
-                    run_variant(inner, scene, moved, progress, ask)
+                    run_variant(inner, scene, moved, progress, inner.keep_cycle_by_cycle(asked))
         path = shlex.quote(str(folder.path))
         progress.print_line(f"the run is finished: trackbed report {path}")
 
@@ -275,7 +274,8 @@ def prepare_manifest(
     if path.exists():
         manifest = folder.manifest()
         refuse_differences(manifest["scene"], record_scene(scene), folder.path)
-        most = max(members, read_members(folder)[1])
+        number, most = read_members(folder)
+        most = most if number else max(most, members)  # a member has none of its own
         more = manifest | {"control": manifest["control"] or control, "members": most}
         if more != manifest:
             write_whole(path, json.dumps(more, indent=1) + "\n")

@@ -66,9 +66,9 @@ def write_figure(record: Record, numbers: Numbers) -> Path:
     folder.mkdir(exist_ok=True)
     full = None if record.control is None else record.control.history
     spans = list_jumped_spans(record.run.outcomes)
-    row, title = numbers.row(PROCEDURE), ""
-    if row is not None:
-        title = f"error {100 * row.loaded_body_error:+.1f} % at a speed-up of {row.speed_up:.2f}"
+    found, title = numbers.settled, ""
+    if found is not None and found.pairs:
+        title = f"error {100 * found.error.value:+.1f} % at a speed-up of {found.speed_up:.2f}"
     return save_figure(
         lambda: draw_settlement(record.run.history, full, spans, title, record.members),
         folder / "settlement.png",
