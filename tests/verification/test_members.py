@@ -209,15 +209,13 @@ def test_what_is_no_member_is_refused(
          "stiffness 41 kN/mm; 9.6 times cheaper; error +3.0 % (-2.0 ... +8.0), chaos of the full "
          "runs 15.0 %"),
         ({"members": 1, "asked": 1, "loaded_body": Mean(3.41e-4), "stiffness": Mean(nan),
-          "speed_up": nan, "error": Mean(nan)},
-         "sleeper settles 341 um (one member, so no band) by cycle 10,000"),
-        ({"speed_up": 0.5, "error": Mean(-0.25), "stiffness": Mean(nan), "compared_at": 1000},
-         "sleeper settles 3.41 mm (2.9 ... 3.9; 5 members; chaos 0.52) by cycle 10,000; 2.0 times "
-         "dearer; error at cycle 1,000 -25.0 %"),
+          "speed_up": 0.5, "error": Mean(-0.25), "compared_at": 1000},
+         "sleeper settles 341 um (one member, so no band) by cycle 10,000; 2.0 times dearer; error "
+         "at cycle 1,000 -25.0 %"),
     ],
 )  # fmt: skip
 def test_the_sentence_says_what_is_known(changes: dict[str, Any], said: str) -> None:
-    """Millimetres from one on, no band of one member, no cost or error without a full run."""
+    """Millimetres from one on; of one member no band."""
     settled = Settled(
         members=5, asked=5, cycle=10_000, loaded_body=Mean(3.41e-3, (2.9e-3, 3.9e-3), 5.2e-4),
         stiffness=Mean(41e6), mean_grain=Mean(nan), cost=1.0, pairs=5, compared_at=10_000,
