@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import ceil, inf
 from typing import Any
 
-import numpy as np
-
+from adapters.bed.state import FloatArray
 from validation.case import Check
-from validation.studies.settlement.beds import COARSE, CONFINED, FAR, KINDS, UNSEEN, Kind
+from validation.studies.settlement.beds import COARSE, CONFINED, FAR, UNSEEN, Kind
 from validation.studies.settlement.reading import find_errors, find_interval, find_step_speedup
 
 GROWING, DOUBLED = "growing", "growing, step x 2"
@@ -36,8 +36,9 @@ def check_bars(rows: Sequence[dict[str, Any]]) -> list[Check]:
         )  # fmt: skip
         if len(errors) < 2:
             continue
-        stiffness = 100 * abs(float(find_errors(rows, kind, way, "stiffness").mean()))
-        checks.append(check_most(f"{name}: mean stiffness", stiffness, STIFFNESS, why))
+        stiffness = find_errors(rows, kind, way, "stiffness")
+        value = 100 * abs(float(stiffness.mean())) if len(stiffness) else inf
+        checks.append(check_most(f"{name}: mean stiffness", value, STIFFNESS, why))
         if cheaper is not None:
             value = find_step_speedup(rows, kind, way)
             holds = value >= cheaper
@@ -54,12 +55,12 @@ def check_most(name: str, value: float, bar: float, why: str) -> Check:
     return Check(name, value, f"<= {bar:g}", holds, "%", PAGE, "" if holds else why)
 
 
-def describe_reach(errors: np.ndarray[Any, Any], kind: Kind, margin: float) -> str:
+def describe_reach(errors: FloatArray, kind: Kind, margin: float) -> str:
     """How many packings there are, and how many an unbiased way of this scatter would need."""
-    words = f"{len(errors)} of {len(KINDS[kind.name].seeds)} packings measured"
+    words = f"{len(errors)} of {len(kind.seeds)} packings measured"
     if len(errors) < 3:
         return words
     mean, spread = 100 * float(errors.mean()), 100 * float(errors.std(ddof=1))
     room = margin - abs(mean)
-    need = f"{int(np.ceil((1.65 * spread / room) ** 2)):,} would do" if room > 0 else "no number does"
+    need = f"{ceil((1.65 * spread / room) ** 2):,} would do" if room > 0 else "no number would do"
     return f"{words}; mean {mean:+.0f} %, scatter {spread:.0f} % a packing: {need}"

@@ -48,7 +48,9 @@ COARSE = Kind("coarse", "coarse, softer bed: 150 grains", "karrech-coarse", SOFT
 FAR = Kind("far", "the coarse bed, further", "karrech-coarse", SOFT, range(101, 131), 10_000)
 PARTIAL = Kind("partial", "piston on 80 % of the section", "karrech-partial", (), range(1, 10),
                100, k_i=25)  # fmt: skip
-UNSEEN = Kind("unseen", "a box, another grading, stiffness and frequency", "box", (), range(1, 13), 500)
+UNSEEN = Kind(
+    "unseen", "a box, another grading, stiffness and frequency", "box", (), range(1, 13), 500
+)
 KINDS = {kind.name: kind for kind in (CONFINED, COARSE, FAR, PARTIAL, UNSEEN)}
 
 

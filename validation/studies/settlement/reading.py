@@ -36,8 +36,8 @@ def find_errors(rows: Sequence[Row], kind: Kind, way: str, figure: str) -> Float
     pairs = np.array([(mine[seed][figure], full[seed][figure]) for seed in mine if seed in full])
     pairs = pairs.reshape(-1, 2).astype(float)
     pairs = pairs[np.isfinite(pairs).all(axis=1)]
-    errors: FloatArray = (pairs[:, 0] - pairs[:, 1]) / pairs[:, 1].mean()
-    return errors
+    errors: FloatArray = pairs[:, 0] - pairs[:, 1]
+    return errors / pairs[:, 1].mean() if len(errors) else errors
 
 
 def find_interval(errors: FloatArray) -> tuple[float, float]:

@@ -151,8 +151,8 @@ def fit_law(kind: Kind, seed: int) -> Row:
         if kind.k_i < row["cycle"] <= kind.k_i + seen
     )
     gain = predicted - average_block(found, kind.k_i, "loaded_body")
-    return {"bed": kind.name, "way": "law of as many cycles", "seed": seed, "refused": "",
-            "computed": seen, "cost": {"engine": round(engine, 3)}, "loaded_body": gain}  # fmt: skip
+    head = {"bed": kind.name, "way": "law of as many cycles", "seed": seed, "refused": ""}
+    return head | {"computed": seen, "cost": {"engine": round(engine, 3)}, "loaded_body": gain}
 
 
 def list_parts() -> dict[str, Callable[[], Row]]:
