@@ -53,7 +53,7 @@ def test_a_margin_is_met_by_the_whole_interval_alone() -> None:
         rows += [row("growing", seed, 1.04 + spread * (-1) ** seed) for seed in range(101, 105)]
         (check,) = [one for one in check_bars(rows) if one.name.startswith("coarse") and
                     "interval" in one.name]  # fmt: skip
-        assert check.ok is met
+        assert bool(check.ok) is met
 
 
 def test_what_a_way_costs() -> None:
