@@ -13,8 +13,8 @@ from adapters.bed.state import FloatArray
 from adapters.engines.yade import PARAMETERS, YadeEngine, cover_piston
 from adapters.scene.file import load_scene
 from adapters.scene.tables import Scene
-from tests.yade_few_grains import START
 from trackbed.scenes import find_scene_file
+from validation.bench.few_grains_yade import START
 
 SCRIPT = (
     START

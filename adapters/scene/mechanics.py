@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
+from math import hypot, inf
 from pathlib import Path
 
 from adapters.bed import (
@@ -154,6 +155,32 @@ def _warn_of_narrow_bed(scene: Values) -> Iterator[Problem]:
         )
 
 
+def find_wedge_ratio(friction: float) -> float:
+    """Ratio of radii R/r from which friction alone holds a small grain between two large ones [-].
+
+    In the groove between grains that touch a contact makes an angle theta with their axis,
+    cos theta = R/(R + r), and friction holds what is pressed in if tan theta < ``friction``.  There
+    an error of velocity Verlet, which gives friction's spring the half step's velocity and the full
+    step's normal, makes a grain stick that should roll off (Vyas et al. 2025,
+    doi 10.1016/j.cpc.2025.109524; docs/size-ratio.md).
+    """
+    return 1 / (hypot(1, friction) - 1) if friction > 0 else inf
+
+
+def _warn_of_size_ratio(scene: Values) -> Iterator[Problem]:
+    radii, friction = find_radii(scene), scene.need("material.grain.friction")
+    if radii.smallest <= 0:
+        raise NotValid
+    ratio, limit = radii.greatest / radii.smallest, find_wedge_ratio(friction)
+    if ratio > limit:
+        yield Problem(
+            "sample.grain_radius",
+            f"radii differ by a factor of {ratio:.3g}; with friction {friction:g} small grains may "
+            f"stick between large ones above {limit:.3g}, by an error of the engines' integration: "
+            "halve the time step to see whether it matters",
+        )
+
+
 def _warn_of_few_steps(scene: Values) -> Iterator[Problem]:
     longest = _find_rayleigh_share(scene) * _find_rayleigh_time(scene)
     steps = 1 / (scene.need("loading.frequency") * longest)
@@ -203,7 +230,7 @@ def _warn_of_implausible_size(
 IMPLAUSIBLE = tuple(partial(_warn_of_implausible_size, *row) for row in SIZES)
 DOUBTS: tuple[Check, ...] = (
     *IMPLAUSIBLE,
-    _warn_of_long_step, _warn_of_narrow_bed, _warn_of_few_steps,
+    _warn_of_long_step, _warn_of_narrow_bed, _warn_of_few_steps, _warn_of_size_ratio,
     _warn_of_deep_chains, _warn_of_far_jump,
 )  # fmt: skip
 """What is doubtful."""

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from adapters.bed import contact_law as law
-from tests import yade_few_grains
 from tests.driven_contacts import (
     collide,
     drive_contact,
@@ -22,13 +21,13 @@ from tests.driven_contacts import (
     slide_on_mirror,
 )
 from tests.tangential_rules import LOOPS, force_incremental, force_rescaled, force_secant, work
-from validation.bench import few_grains, few_grains_lammps
+from validation.bench import few_grains, few_grains_lammps, few_grains_yade
 from validation.bench.few_grains import PLACE, RADIUS, Track, TrackRun, load_table_1
 
 LIGGGHTS = pytest.param(few_grains.run_grains, marks=pytest.mark.engine("liggghts"), id="liggghts")
 LAMMPS = pytest.param(few_grains_lammps.run_grains, marks=pytest.mark.engine("lammps"), id="lammps")
 YADE = pytest.param(
-    yade_few_grains.track_run, marks=[pytest.mark.engine("yade"), pytest.mark.long], id="yade"
+    few_grains_yade.run_grains, marks=[pytest.mark.engine("yade"), pytest.mark.long], id="yade"
 )
 every_engine = pytest.mark.parametrize("run", [LIGGGHTS, LAMMPS, YADE])
 with_pull = pytest.mark.parametrize("run", [LIGGGHTS, LAMMPS])
@@ -101,7 +100,7 @@ def test_contacts_may_pull() -> None:
 def test_rebound_converges_at_first_order(run: TrackRun) -> None:
     """Half the time step, half the error of the restitution: damping lags by half a step."""
     setting, exact = VISCOUS, law.find_restitution(ALPHA)
-    if run is yade_few_grains.track_run:
+    if run is few_grains_yade.run_grains:
         setting, exact = "material.grain.restitution=0.5", 0.5
     errors = [
         collide(load_table_1(setting), 0.1, steps=n, run=run)[0].restitution / exact - 1
@@ -141,7 +140,7 @@ def test_tangential_force_follows_its_rule_on_closed_loops(
     expected = rule(law.find_tangential_stiffness(overlap, shear, radius), moved)  # type: ignore[operator]
     tangential = -np.array([c.tangential_force[0] for c in track.contacts])[:, 1]
     assert tangential == pytest.approx(expected, abs=3e-3 * expected.max())
-    if run is yade_few_grains.track_run:  # its dump's spring is the force over the stiffness
+    if run is few_grains_yade.run_grains:  # its dump's spring is the force over the stiffness
         spring = np.array([c.tangential_spring[0] for c in track.contacts])[:, 1]
         stiffness = law.find_tangential_stiffness(overlap, shear, radius)
         assert spring * stiffness == pytest.approx(expected, abs=1e-3 * expected.max())

@@ -20,9 +20,9 @@ from adapters.scene.file import load_scene
 from adapters.scene.tables import Scene
 from tests import engine_sample
 from tests.driven_contacts import collide, find_grain_mass
-from tests.yade_few_grains import track_run
 from trackbed.scenes import read_template
 from validation.bench.few_grains import RADIUS, Track, load_table_1
+from validation.bench.few_grains_yade import run_grains
 
 pytestmark = pytest.mark.engine("yade")
 
@@ -46,7 +46,7 @@ def test_alpha_is_the_viscous_force_and_contacts_never_pull(speed: float) -> Non
     the contact the first-order error is 4e-4: bar 2e-3.
     """
     scene = load_table_1(f"material.grain.viscous_alpha={ALPHA}")
-    hit, _ = collide(scene, speed, run=track_run)
+    hit, _ = collide(scene, speed, run=run_grains)
     ratio = law.DAMPING_FACTOR * ALPHA
     expected = law.solve_collision(
         speed, scene.stiffness.grain, RADIUS / 2, PAIR_MASS, ratio, may_pull=False
@@ -62,7 +62,7 @@ def test_alpha_is_the_viscous_force_and_contacts_never_pull(speed: float) -> Non
 def test_restitution_is_the_rebound(restitution: float) -> None:
     """A scene that names a restitution gets it: more damping makes up for the missing pull."""
     scene = load_table_1(f"material.grain.restitution={restitution}")
-    hit, _ = collide(scene, 0.1, run=track_run)
+    hit, _ = collide(scene, 0.1, run=run_grains)
     assert hit.restitution == pytest.approx(restitution, rel=2e-3)
     literal = law.DAMPING_FACTOR * law.find_alpha(restitution)
     assert find_damping_ratio(scene) > literal
@@ -79,7 +79,7 @@ def hit_wall(scene: Scene, place: FloatArray, inward: FloatArray, speed: float) 
     step = expected.contact_time / 500
     start = place + (RADIUS + 2.25 * speed * step) * inward
     motion = ["fix motion all nve/sphere", "run 800"]
-    return track_run(scene, start[None], -speed * inward[None], motion, time_step=step)
+    return run_grains(scene, start[None], -speed * inward[None], motion, time_step=step)
 
 
 @pytest.mark.parametrize("name", ["floor", "cylinder_5", "seam"])

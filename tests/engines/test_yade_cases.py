@@ -13,9 +13,9 @@ import pytest
 from adapters.bed import contact_law as law
 from adapters.engines.yade import YADE
 from tests.engines.test_yade import ALPHA, Bed
-from tests.yade_few_grains import track_run
 from tests.yade_piston import piston_forces, scene_partial
 from validation.bench.few_grains import load_table_1
+from validation.bench.few_grains_yade import run_grains
 
 SCRIPTS = [path for path in files("yade_scripts").iterdir() if path.name.endswith(".py")]
 
@@ -51,7 +51,7 @@ def test_nothing_damps_but_contacts() -> None:
     """A grain that touches nothing keeps velocity and step: no numerical damping, a fixed step."""
     scene = load_table_1(f"material.grain.viscous_alpha={ALPHA}")
     step, speed = 1e-6, 0.3
-    track = track_run(
+    track = run_grains(
         scene,
         np.array([[0.02, 0.02, 0.03]]),
         np.array([[0.0, speed, 0.0]]),

@@ -73,17 +73,18 @@ TrackRun = Callable[..., Track]
 def run_grains(
     scene: Scene, position: FloatArray, velocity: FloatArray, motion: Sequence[str], *,
     time_step: float, every: int = 1, materials: Callable[[str], str] = str,
+    radius: FloatArray | None = None,
 ) -> Track:  # fmt: skip
     """Run LIGGGHTS, without gravity, from ``position`` [m] and ``velocity`` [m/s], shape (n, 3).
 
     ``motion`` are the deck's lines that move the grains, each in a group ``grain_1``, ...;
     ``time_step`` [s]; ``every`` steps between two instants; ``materials`` may change the text of
-    ``scene.in``.  Raises as `LiggghtsEngine.run`.
+    ``scene.in``; ``radius`` [m] of the grains, `RADIUS` for None.  Raises as `LiggghtsEngine.run`.
     """
     blocks = [[letter + axis for axis in "xyz"] for letter in ("", "v", "omega", "f")]
     return run_deck(
         LiggghtsEngine(), DECK, " %.17g" * 12, "grains.dump", blocks, scene, position, velocity,
-        motion, time_step, every, materials,
+        motion, time_step, every, materials, radius,
     )  # fmt: skip
 
 
@@ -91,6 +92,7 @@ def run_deck(
     engine: DeckEngine, text: str, columns: str, dump: str, blocks: Sequence[Sequence[str]],
     scene: Scene, position: FloatArray, velocity: FloatArray, motion: Sequence[str],
     time_step: float, every: int, materials: Callable[[str], str],
+    radius: FloatArray | None,
 ) -> Track:  # fmt: skip
     """Run ``text``, an engine's deck, with its ``columns`` in; those of position, velocity, spin
     and force in ``dump`` are ``blocks``."""
@@ -104,7 +106,7 @@ def run_deck(
     with TemporaryDirectory() as temporary:
         folder = Path(temporary)
         height = float(position[:, 2].max())
-        radius = np.full(len(position), RADIUS)
+        radius = np.full(len(position), RADIUS) if radius is None else radius
         digests = engine.write_preparation(scene, position, radius, height, folder)
         (folder / "in.few").write_text(deck)
         scene_part = folder / "scene.in"

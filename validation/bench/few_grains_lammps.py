@@ -33,6 +33,7 @@ VECTORS = ("x y z", "vx vy vz", "omegax omegay omegaz", "fx fy fz")
 def run_grains(
     scene: Scene, position: FloatArray, velocity: FloatArray, motion: Sequence[str], *,
     time_step: float, every: int = 1, materials: Callable[[str], str] = str,
+    radius: FloatArray | None = None,
 ) -> Track:  # fmt: skip
     """Run LAMMPS, without gravity; as `validation.bench.few_grains.run_grains`.
 
@@ -40,5 +41,5 @@ def run_grains(
     """
     return run_deck(
         LammpsEngine(), DECK, " ".join(VECTORS), "states.dump", [v.split() for v in VECTORS], scene,
-        position, velocity, motion, time_step, every, materials,
+        position, velocity, motion, time_step, every, materials, radius,
     )  # fmt: skip

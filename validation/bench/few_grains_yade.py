@@ -42,9 +42,9 @@ SCRIPT = (
     START
     + """\
 states = [O.bodies[number].state for number in range(count)]
-for state, velocity in zip(states, few["velocity"]):
+for number, (state, velocity) in enumerate(zip(states, few["velocity"]), 1):
     state.vel = Vector3(*velocity)
-    if not few["free"]:
+    if not few["free"] or number in few["held"]:
         state.blockedDOFs = "xyzXYZ"
 if few["push"]:
     O.forces.setPermF(0, Vector3(*few["push"]))
@@ -74,7 +74,7 @@ print(f"COMPLETE step {O.iter}", flush=True)
 )
 
 
-def track_run(
+def run_grains(
     scene: Scene,
     position: FloatArray,
     velocity: FloatArray,
@@ -83,23 +83,26 @@ def track_run(
     time_step: float,
     every: int = 1,
     materials: Callable[[str], str] = str,
+    radius: FloatArray | None = None,
 ) -> Track:
-    """Run YADE, without gravity; as `validation.bench.few_grains.track_run`.
+    """Run YADE, without gravity; as `validation.bench.few_grains.run_grains`.
 
-    ``motion`` are the same lines of a LIGGGHTS deck: ``fix ... nve/sphere`` frees the grains,
-    ``addforce`` pushes the first one, ``move linear`` drives it, ``run`` steps.  ``materials``
-    may change the parameters' text.  Velocities are those of the half step before an instant.
-    Raises as `YadeEngine.run`.
+    ``motion`` are the same lines of a LIGGGHTS deck: ``fix ... nve/sphere`` frees the grains, but
+    those of ``group held id ...``; ``addforce`` pushes the first one, ``gravity`` all, ``move
+    linear`` drives the first, ``run`` steps.  ``materials`` may change the parameters' text.
+    Velocities are those of the half step before an instant.  Raises as `YadeEngine.run`.
     """
     engine = YadeEngine()
     with TemporaryDirectory() as temporary:
         folder = Path(temporary)
         height = float(position[:, 2].max())
-        radius = np.full(len(position), RADIUS)
+        radius = np.full(len(position), RADIUS) if radius is None else radius
         digests = engine.write_preparation(scene, position, radius, height, folder)
         content = json.loads((folder / PARAMETERS).read_text())
-        content |= {"gravity": 0.0, "time_step": time_step, "grain_count": len(radius)}
-        content["few"] = {"velocity": velocity.tolist(), "every": every, **_motion(motion)}
+        few = parse_motion(motion)
+        content |= {"gravity": few.pop("gravity"), "time_step": time_step,
+                    "grain_count": len(radius)}  # fmt: skip
+        content["few"] = {"velocity": velocity.tolist(), "every": every, **few}
         (folder / PARAMETERS).write_text(materials(json.dumps(content)))
         (folder / "few.py").write_text(SCRIPT)
         engine.run(scene, "few.py", folder, lambda: None, digests)
@@ -114,17 +117,21 @@ def track_run(
     return Track(time, position, velocity, spin, force, contacts)
 
 
-def _motion(lines: Sequence[str]) -> dict[str, Any]:
+def parse_motion(lines: Sequence[str]) -> dict[str, Any]:
     """Lines of a LIGGGHTS deck as what the script understands."""
-    free, push, leg, legs = False, [], [], []
+    free, gravity, held, push, leg, legs = False, 0.0, [], [], [], []
     for line in lines:
         words = line.split()
         if "nve/sphere" in words:
             free = True
+        elif words[:3] == ["group", "held", "id"]:
+            held = [int(word) for word in words[3:]]
+        elif "gravity" in words:
+            gravity = float(words[4])
         elif "addforce" in words:
             push = [float(word) for word in words[-3:]]
         elif "linear" in words:
             leg = [float(word) for word in words[5:8]]
         elif words[0] == "run":
             legs.append([leg, int(words[1])])
-    return {"free": free, "push": push, "legs": legs}
+    return {"free": free, "gravity": gravity, "held": held, "push": push, "legs": legs}
