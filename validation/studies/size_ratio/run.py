@@ -76,7 +76,7 @@ def measure(engine: str, ratio: float, friction: float, share: float) -> Row:
     reached = float(np.interp(JUDGED, roll(ratio, time), time))
     end = 2 * reached + 2 * sqrt(2 * PLACE[2] / GRAVITY)
     every = ceil(end / step / FRAMES)
-    aside = PLACE + [[-LARGE, 0, 0], [LARGE, 0, 0]]
+    aside = PLACE + np.array([[-LARGE, 0, 0], [LARGE, 0, 0]])
     top = PLACE + height * np.array([0, sin(START), cos(START)])
     motion = [
         "group held id 1 2", "group free id 3", "fix hold held freeze",
