@@ -6,8 +6,8 @@
     of one length.  Overlaps go by the smallest move: eq. 29 as printed
     (``relaxation = "karrech2007"``) may move a bed by millimetres.
 ``growing``
-    Jumps whose ends are evenly spaced in ln N, by all cycles computed so far, moved by a profile of
-    settlement by height: the best fixed schedule of docs/settlement.md, and the default.
+    Jumps whose ends are evenly spaced in ln N, by all cycles computed so far, every grain with its
+    neighbours: the best fixed schedule of docs/settlement.md, and the default.
 ``tolerance``
     Jumps that choose themselves by their error (docs/jumps.md).
 """
@@ -65,7 +65,7 @@ def plan_growing(given: Mapping[str, Any]) -> dict[str, Any]:
         with suppress(ValueError):
             h = schedule_jumps(jumps, total, first, k, healing)
             break
-    return {"k": k, "h": h, "settlement": "history", "move": "profile", "seating": "waits"}
+    return {"k": k, "h": h, "settlement": "history", "move": "smoothed", "seating": "waits"}
 
 
 def plan_tolerance(given: Mapping[str, Any]) -> dict[str, Any]:

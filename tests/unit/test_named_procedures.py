@@ -63,7 +63,7 @@ def test_a_scene_without_a_procedure_of_its_own_grows(tmp_path: Path) -> None:
                      rest.split("[engine]")[1], encoding="utf-8")  # fmt: skip
     found = load_scene(scene, ['engine.name="fake"']).procedure
     assert found is not None
-    assert (found.name, found.settlement, found.move) == ("growing", "history", "profile")
+    assert (found.name, found.settlement, found.move) == ("growing", "history", "smoothed")
     skipped = sum(end - start for start, end in plan_jumps(found))
     assert found.total_cycles - skipped == 240
     assert load().name is None

@@ -10,7 +10,7 @@ import numpy as np
 
 from adapters.bed.state import FloatArray
 from adapters.procedure.history import sum_cost
-from validation.studies.settlement.bars import check_bars
+from validation.studies.settlement.bars import GROWING, check_bars
 from validation.studies.settlement.beds import EVERY, KINDS, Kind, list_methods
 from validation.studies.settlement.reading import (
     LEVEL,
@@ -88,6 +88,20 @@ def tabulate_ways(rows: Sequence[Row]) -> str:
     return format_table(head, lines)
 
 
+def describe_answer(rows: Sequence[Row]) -> str:
+    """What growing jumps say of the loaded body, a line a bed that has two packings or more."""
+    lines = []
+    for kind in KINDS.values():
+        errors = find_errors(rows, kind, GROWING, "loaded_body")
+        if len(errors) > 1:
+            cheaper = find_step_speedup(rows, kind, GROWING)
+            lines.append(
+                f"* **{kind.title}**, {len(errors)} of {len(kind.seeds)} packings: growing jumps "
+                f"err by {format_error(errors).strip('*')} at {cheaper:.1f} times less cost."
+            )
+    return "\n".join(lines) or "No bed has two packings yet."
+
+
 def list_failed(rows: Sequence[Row]) -> str:
     """Which ways did not reach the end in how many of their runs."""
     words = []
@@ -106,6 +120,7 @@ def describe(rows: Sequence[Row]) -> dict[str, str]:
     machines = "; ".join(dict.fromkeys(row["origin"]["machine"] for row in rows))
     commits = describe_commits(row["origin"]["commit"] for row in rows)
     return {
+        "ANSWER": describe_answer(rows),
         "REFERENCE": tabulate_reference(rows),
         "WAYS": tabulate_ways(rows),
         "FAILED": list_failed(rows),
