@@ -52,7 +52,6 @@ lint:
 
 bench:
 	@./setup.sh bench
-	$(bin)/trackbed validate dump-speed
 	$(bin)/python -m validation.study qdem-cost run --only speed
 
 validate:

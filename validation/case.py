@@ -70,17 +70,10 @@ class Check:
         return bool(self.ok) and isfinite(self.value)
 
 
-BENCH = Path(__file__).with_name("bench")
-
-
 def list_live_cases() -> dict[str, str]:
-    """Modules that measure now, by name: files of ``validation/cases``, and those of
-    ``validation/bench`` that have a function ``run(quick)``."""
-    found = {part.name: f"validation.cases.{part.name}" for part in iter_modules(cases.__path__)}
-    for path in BENCH.glob("*.py"):
-        if "\ndef run(quick: bool)" in path.read_text(encoding="utf-8"):
-            found[path.stem] = f"validation.bench.{path.stem}"
-    return {name.replace("_", "-"): module for name, module in found.items()}
+    """Modules that measure now, by name: files of ``validation/cases``."""
+    names = [part.name for part in iter_modules(cases.__path__)]
+    return {name.replace("_", "-"): f"validation.cases.{name}" for name in names}
 
 
 def list_cases() -> list[str]:

@@ -298,7 +298,7 @@ def test_validate_lists_cases(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["validate"]) == 0
     home = ROOT / "validation"
     names = {path.parent.name for path in (home / "studies").glob("*/__init__.py")}
-    names |= {path.stem for path in (home / "cases").glob("[!_]*.py")} | {"dump_speed"}
+    names |= {path.stem for path in (home / "cases").glob("[!_]*.py")}
     text = capsys.readouterr().out
     assert text.split() == sorted(name.replace("_", "-") for name in names)
     module = [sys.executable, "-m", "validation"]
