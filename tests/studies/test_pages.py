@@ -19,10 +19,10 @@ def test_page_and_bars(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", [name for name in list_studies() if name.startswith("qdem")])
-def test_every_part_is_recorded_and_no_bar_is_missed(name: str) -> None:
+def test_every_part_is_recorded_and_a_missed_bar_says_why(name: str) -> None:
     rows = read_record(find_record(name))
     parts = list(import_part(name, "run").PARTS)
     measured = [row["part"] for row in rows]
     assert measured == [part for part in parts if part in measured]
     assert measured == parts or name in list_excuses()  # which its page repeats
-    assert all(check.holds for check in import_part(name, "bars").check_bars(rows))
+    assert all(one.holds or one.known for one in import_part(name, "bars").check_bars(rows))

@@ -17,9 +17,10 @@ RANGE = re.compile(r"(\S+) to (\S+)")
 WITHIN = re.compile(r"= (\S+) within (\S+) %")
 
 
-def check_below(name: str, value: float, bar: float, unit: str = "") -> Check:
-    """A value that must stay below its bar."""
-    return Check(name, float(value), f"< {bar:g}", bool(value < bar), unit)
+def check_below(name: str, value: float, bar: float, unit: str = "", why: str = "") -> Check:
+    """A value that must stay below its bar; ``why`` it does not, where that is known."""
+    holds = bool(value < bar)
+    return Check(name, float(value), f"< {bar:g}", holds, unit, why="" if holds else why)
 
 
 def check_near(name: str, value: float, target: float, share: float, unit: str = "") -> Check:

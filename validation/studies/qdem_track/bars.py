@@ -14,6 +14,7 @@ from validation.studies.qdem_track.bogie import FRICTIONS, SEEDS
 from validation.study import Row
 
 PAGE = "docs/qdem-track.md"
+LASTING = "a rough rail has many peaks of force, the slow pulse one: more of the way is lasting"
 
 
 def check_bars(rows: Sequence[Row]) -> list[Check]:
@@ -28,7 +29,9 @@ def check_runs(runs: Sequence[dict[str, Any]]) -> Iterator[Check]:
         name = f"packing {run['seed']}, friction {run['friction']:g}"
         ratio = run["points"]["sleeper"]["greatest"] / run["trial"]["way"]
         yield check_below(f"{name}: missing in the account of energies", run["imbalance"], 1e-3)
-        yield check_below(f"{name}: sleeper under the bogie over the slow pulse", ratio, 2.0)
+        yield check_below(
+            f"{name}: sleeper under the bogie over the slow pulse", ratio, 2.0, why=LASTING
+        )
     for point, key in product(("sleeper", "B2"), ("greatest", "lateral")):
         ratio = compare_frictions(runs, point, key)
         name = f"300 grains, friction 1.73 over 0.577: {key} of {point}, mean of packings"
