@@ -10,7 +10,7 @@ import numpy as np
 
 from adapters.bed.state import FloatArray
 from adapters.procedure.history import sum_cost
-from validation.studies.settlement.bars import GROWING, check_bars
+from validation.studies.settlement.bars import GROWING, MARGINS, check_bars
 from validation.studies.settlement.beds import EVERY, KINDS, Kind, list_methods
 from validation.studies.settlement.reading import (
     LEVEL,
@@ -125,6 +125,12 @@ def describe(rows: Sequence[Row]) -> dict[str, str]:
         "WAYS": tabulate_ways(rows),
         "FAILED": list_failed(rows),
         "BARS": summarise_bars(check_bars(rows)),
+        "LEFT": "; ".join(
+            f"{kind.name}, {way}"
+            for kind, way, *_ in MARGINS
+            if len(find_errors(rows, kind, way, "loaded_body")) < 2
+        )
+        or "nothing",
         "SPENT": f"{spent / 3600:.1f}",
         "ORIGIN": f"{engines}; {machines}; commits {commits}.",
     }
