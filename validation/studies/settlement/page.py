@@ -143,8 +143,8 @@ def draw(rows: Sequence[Row], picture: Path) -> None:
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    measured = {row["bed"] for row in rows if row["way"] != EVERY}
-    kinds = [kind for kind in KINDS.values() if kind.name in measured]
+    kinds = [kind for kind in KINDS.values()
+             if len(find_errors(rows, kind, GROWING, "loaded_body"))]  # fmt: skip
     figure, panels = plt.subplots(
         1, max(len(kinds), 1), figsize=(5 * max(len(kinds), 1), 4.5), squeeze=False,
         layout="constrained", sharey=True,
