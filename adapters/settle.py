@@ -67,7 +67,7 @@ def settle(
     folder = path.parent / "run" if run_folder is None else Path(run_folder)
     named = {key if "." in key else f"procedure.{key}": value for key, value in settings.items()}
     named |= {"procedure.members": members} if members != 1 else {}
-    overrides = [f"{key}={json.dumps(value)}" for key, value in named.items()]
+    overrides = [f"{key}={json.dumps(value, default=int)}" for key, value in named.items()]
     procedure.refuse_unloaded(load_scene(path, overrides), path)
     procedure.run_scene(path, folder, control=control, overrides=overrides)
     record = read_run_record(folder)

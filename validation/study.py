@@ -123,7 +123,8 @@ def summarise_bars(checks: Iterable[Check]) -> str:
     if not missed:
         return f"All {len(barred)} bars are met."
     lines = [f"- {one.name}: {one.value:.3g}, bar {one.asked}; {one.why}" for one in missed]
-    head = f"Of {len(barred)} bars {len(barred) - len(missed)} are met.  Missed:"
+    met = len(barred) - len(missed)
+    head = f"Of {len(barred)} bars {met} {'is' if met == 1 else 'are'} met.  Missed:"
     return "\n".join([head, "", *lines])
 
 

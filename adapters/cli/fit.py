@@ -95,10 +95,13 @@ def run_fit(arguments: argparse.Namespace) -> int:
             "what tests on fresh ballast did is known to auto, from the first load on",
             where="--frequency", remedy="take --law auto without --load-change, or leave it out",
         )  # fmt: skip
-    if (picture := arguments.figure) and picture.suffix not in (".png", ".svg"):
+    if (picture := arguments.figure) and not (
+        picture.suffix in (".png", ".svg") and picture.parent.is_dir()
+    ):
         raise UsageError(
-            "a figure is written as .png or .svg", where=str(picture), remedy="name it so"
-        )
+            "a figure is written as .png or .svg, into a folder that is there",
+            where=str(picture), remedy="name it so",
+        )  # fmt: skip
     series = fit.read_series(
         arguments.paths, arguments.steps_per_cycle, arguments.columns, arguments.unit
     )
@@ -149,7 +152,7 @@ def run_fit(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print_json(fitted)
         return 0
-    unit = "(unit as given)" if series.unit == UNKNOWN else series.unit
+    unit = {UNKNOWN: "(unit as given)", "1": ""}.get(series.unit, series.unit)
     read = f" of {series.columns}" if series.columns else ""
     print(f"law {fitted['law']}, fitted to {len(series.cycle)} cycles{read}")
     print(*fit.describe_formula(None if auto else law, found, series, ahead, unit), sep="\n")
@@ -158,8 +161,9 @@ def run_fit(arguments: argparse.Namespace) -> int:
         agreeing = ", ".join(name for name, said in found.laws.items() if said.agrees)
         print(f"laws that agree to {fit.AGREE:.0%} of the increment: {agreeing or 'none'}")
     low, high = fitted["band"]
-    print(f"settlement at cycle {to_cycle:.10g}: {fitted['prediction']:.6g} {unit}")
-    print(f"  with probability {arguments.probability:g} in {low:.6g} ... {high:.6g} {unit}")
+    print(f"settlement at cycle {to_cycle:.10g}: {fitted['prediction']:.6g} {unit}".rstrip())
+    said = f"  with probability {arguments.probability:g} in {low:.6g} ... {high:.6g} {unit}"
+    print(said.rstrip())
     if found.failure_excluded is False:
         print(f"  so that failure at {arguments.fail_at:g} is not excluded")
     return 0

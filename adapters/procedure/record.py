@@ -159,15 +159,21 @@ def read_members(folder: RunFolder) -> tuple[int, int]:
 def refuse_other_member(whole: dict[str, Any], inner: RunFolder, number: int) -> None:
     """Raise `SceneError` where a folder is not member ``number`` of the run that has the manifest
     ``whole``."""
-    there = inner.manifest()
+    try:
+        there = inner.manifest()
+    except UsageError as error:
+        raise UsageError(error.what, where=error.where, remedy=AWAY) from error
     old = {"scene": there["scene"], "member": there.get("member")}
     new = {"scene": whole["scene"], "member": number}
     if lines := list(list_differences("", old, new, LENGTHS)):
         raise SceneError(
             f"this is not member {number} of the run that it lies in:\n  " + "\n  ".join(lines),
             where=str(inner.path),
-            remedy="move this folder away: trackbed resume computes the member again",
+            remedy=AWAY,
         )
+
+
+AWAY = "move this folder away: trackbed resume computes the member again"
 
 
 def read_track(folder: RunFolder) -> Track:

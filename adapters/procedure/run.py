@@ -73,6 +73,8 @@ def run_scene(
         scene = load_scene(scene_path, overrides)
         progress.print_line(f"engine: {scene.engine.name}")
     refuse_large(scene)
+    if control:
+        refuse_unloaded(scene, scene_path)
     for warning in (*scene.warnings, *warn_without_jumps(scene)):
         progress.print_line(f"warning: {warning}")
     if dry_run:
@@ -138,7 +140,7 @@ def refuse_unloaded(scene: Scene, path: Path) -> None:
     """Raise `SceneError` for a scene at ``path`` that has no load cycles to settle in."""
     if scene.loading is None or scene.procedure is None:
         raise SceneError(
-            "this is about settlements, and this scene has no load cycles",
+            "this scene has no load cycles, so there is no settlement to ask for",
             where=str(path), remedy="add the tables [loading] and [procedure]",
         )  # fmt: skip
 

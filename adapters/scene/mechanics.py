@@ -164,7 +164,8 @@ def find_wedge_ratio(friction: float) -> float:
     step's normal, makes a grain stick that should roll off (Vyas et al. 2025,
     doi 10.1016/j.cpc.2025.109524; docs/size-ratio.md).
     """
-    return 1 / (hypot(1, friction) - 1) if friction > 0 else inf
+    square = friction**2
+    return (hypot(1, friction) + 1) / square if square else inf
 
 
 def _warn_of_size_ratio(scene: Values) -> Iterator[Problem]:
@@ -176,8 +177,8 @@ def _warn_of_size_ratio(scene: Values) -> Iterator[Problem]:
         yield Problem(
             "sample.grain_radius",
             f"radii differ by a factor of {ratio:.3g}; with friction {friction:g} small grains may "
-            f"stick between large ones above {limit:.3g}, by an error of the engines' integration: "
-            "halve the time step to see whether it matters",
+            f"stick between large ones above {limit:.3g}, by an error of the engines' integration "
+            "(docs/size-ratio.md): leave the smallest out to see whether it matters",
         )
 
 

@@ -18,7 +18,8 @@ def test_at_the_wedge_ratio_the_contact_force_is_on_the_friction_cone(friction: 
     small = LARGE / find_wedge_ratio(friction)
     normal = np.array([LARGE, np.sqrt((LARGE + small) ** 2 - LARGE**2)]) / (LARGE + small)
     assert normal[1] / normal[0] == pytest.approx(friction)
-    assert find_wedge_ratio(0.0) == np.inf
+    assert find_wedge_ratio(0.0) == find_wedge_ratio(1e-200) == np.inf
+    assert find_wedge_ratio(1e-8) == pytest.approx(2e16)
 
 
 @pytest.mark.parametrize("ratio", [1.0, 3.0, 20.0])

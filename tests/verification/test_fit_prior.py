@@ -79,5 +79,11 @@ def test_fit_shows_its_formula_and_a_picture(tmp_path: Path, capsys) -> None:
     assert re.search(r"N\).*\n.* mm\n.* mm\n  tau = \S+ cycles", capsys.readouterr().out)
     assert main([*words, "auto", "--fail-at", "20"]) == 6
     assert "<!-- refused: collapse -->" in picture.read_text()
-    for wrong in ("--figure fit.pdf", "--frequency 2", "--load-change 9 --frequency 9"):
+    for wrong in (
+        "--figure fit.pdf",
+        "--figure none/fit.png",
+        "--to-cycle 0",
+        "--frequency 2",
+        "--load-change 9 --frequency 9",
+    ):
         assert main([*words, "auto", *wrong.split()]) == 2

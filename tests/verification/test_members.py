@@ -202,6 +202,15 @@ def test_what_is_no_member_is_refused(
     assert re.search(rf"{re.escape(said)}.*\n  -> ", capsys.readouterr().err, re.DOTALL)
 
 
+def test_a_damaged_member_is_named_with_its_remedy(copy: Path, capsys) -> None:
+    """Status and resume alike: the member's folder, not the whole run, is what to move away."""
+    _, one, _ = list_folders(copy)
+    (one / "manifest.json").write_text("{")
+    for verb in ("status", "resume"):
+        assert main([verb, str(copy)]) == 2
+        assert re.search(r"members/1.*\n  -> move this folder away", capsys.readouterr().err)
+
+
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
@@ -247,6 +256,10 @@ def test_settlement_from_python(copy: Path) -> None:
     scene.write_text(SCENE.partition("[loading]")[0] + SCENE[SCENE.index("[engine]") :])
     with pytest.raises(trackbed.errors.SceneError, match="no load cycles"):
         trackbed.settle(scene, run_folder=copy.parent / "unloaded")
+    assert (
+        main(["run", str(scene), "--control", "--run-folder", str(copy.parent / "unloaded")]) == 3
+    )
+    assert not (copy.parent / "unloaded").exists()
     loaded = "'adapters' in sys.modules"
     code = f"import sys, trackbed\nassert not {loaded}\ntrackbed.settle\nassert {loaded}"
     subprocess.run([sys.executable, "-c", code], check=True)

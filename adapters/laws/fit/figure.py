@@ -25,7 +25,7 @@ def draw_forecast(
 
     begin, last = series.counted_from, float(series.cycle[-1])
     cycles, found, refused = [last], [], None
-    for cycle in np.geomspace(last, to_cycle, POINTS)[1:]:
+    for cycle in np.geomspace(last, to_cycle, POINTS)[1:] if to_cycle > last else ():
         try:
             found.append(predict(float(cycle)))
         except JumpRefused as refusal:

@@ -272,8 +272,9 @@ def describe_formula(
         beta, x = round(found.parameters["exponent"], 2), f"(N / {last:.10g})"
         column = ((to_cycle / last) ** beta - 1) / beta if beta else log(to_cycle / last)
         form = f"({x}^{beta:g} - 1) / ({beta:g})" if beta else f"ln {x}"
-        slope = f"{(found.prediction - reading) / column:.6g} {unit}"
+        slope = f"{(found.prediction - reading) / column:.6g} {unit}".rstrip()
         ends = "from the last reading to the prediction"
-        yield f"u(N) = {reading:.6g} {unit} + {slope} {form}{cycles}: {ends}"
+        start = f"{reading:.6g} {unit}".rstrip()
+        yield f"u(N) = {start} + {slope} {form}{cycles}: {ends}"
     for name, value in found.parameters.items():
         yield f"  {name} = {value:.6g} {'' if name.startswith('exponent') else unit}".rstrip()
