@@ -119,9 +119,14 @@ def end_process(child: subprocess.Popen[bytes]) -> None:
 
 
 def find_last_change(folder: Path) -> int:
-    """Time of the last change of a file in a folder [ns]."""
+    """Time of the last change of a file in a folder [ns]; one that the engine removes counts no
+    longer."""
+    last = 0
     with os.scandir(folder) as entries:
-        return max((one.stat(follow_symlinks=False).st_mtime_ns for one in entries), default=0)
+        for one in entries:
+            with suppress(FileNotFoundError):
+                last = max(last, one.stat(follow_symlinks=False).st_mtime_ns)
+    return last
 
 
 def explain_silence(folder: Path, silent_s: float) -> EngineFailed:

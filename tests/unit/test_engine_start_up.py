@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import os
+from contextlib import nullcontext
+from pathlib import Path
+from typing import Any
+
 import pytest
 
+from adapters.engines import process
 from adapters.engines.contract import get_engine
 from adapters.engines.process import ProcessEngine
 
@@ -28,3 +34,22 @@ def test_start_up_is_cpu_time(name: str, text: str, cpu_s: float, start_up: floa
     engine = get_engine(name)
     assert isinstance(engine, ProcessEngine)
     assert engine.find_start_up(cpu_s, "Step\n" + text + "COMPLETE step 9\n") == start_up
+
+
+def test_a_file_that_an_engine_removes_is_no_fault(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Between the list of a folder and the look at its files one may go: YADE's start does."""
+    for name, changed in (("gone", 9e9), ("stays", 1e9)):
+        (tmp_path / name).touch()
+        os.utime(tmp_path / name, (changed, changed))
+    scan = os.scandir
+
+    def remove_behind(folder: Path) -> Any:
+        entries = scan(folder)
+        found = list(entries)
+        (tmp_path / "gone").unlink()
+        return nullcontext(found)
+
+    monkeypatch.setattr(process.os, "scandir", remove_behind)
+    assert process.find_last_change(tmp_path) == 1e18

@@ -152,7 +152,7 @@ def test_long_tables_are_read_fast(tmp_path: Path) -> None:
         least.append(time.process_time() - read)
         seconds.append(read - start)
     assert len(said) == len(series.settlement)
-    assert min(seconds) < 4.0 * min(least)
+    assert np.median(seconds) < 4.0 * np.median(least)
     np.testing.assert_allclose(series.settlement, cycle / 7, rtol=1e-8)
 
 
