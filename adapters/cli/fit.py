@@ -79,7 +79,6 @@ def run_fit(arguments: argparse.Namespace) -> int:
     from adapters.errors import JumpRefused
     from adapters.files import UNKNOWN
     from adapters.laws import fit, get_law
-    from trackbed.report import save_figure
 
     for flag in ("to_cycle", "from_cycle", "load_change"):
         value = getattr(arguments, flag)
@@ -134,6 +133,8 @@ def run_fit(arguments: argparse.Namespace) -> int:
         return fit.fit_series(series, law, *asked)
 
     if picture and series.cycle.max(initial=0.0) > 0:
+        from trackbed.report import save_figure
+
         save_figure(lambda: fit.draw_forecast(series, predict, ahead), picture)
     try:
         found = predict(ahead)

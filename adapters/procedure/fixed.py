@@ -43,7 +43,7 @@ def settle_fixed(run: Run, bed: Bed) -> Bed:
         bed = seat_piston(run, bed, p.carried_cycles + k)
         shortest = max(p.healing_cycles, 1) if find_count_start(run, bed) else min(p.h or (0,))
         longest = p.total_cycles - bed.cycle - p.healing_cycles - k
-        h = 0 if run.variant.still else min(p.jump_cycles(number), longest)
+        h = min(p.jump_cycles(number), longest)
         if longest < shortest:
             break
         warn_if_hung(run, bed)

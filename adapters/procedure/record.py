@@ -32,6 +32,7 @@ MEMBERS = "members"
 """Folder inside a run that holds the members beside it, number 0: ``members/1``, and so on."""
 LENGTHS = ("scene.procedure.total_cycles", "scene.procedure.h")
 """What may differ between a run that was extended and its members, until they go on."""
+AWAY = "move this folder away: trackbed resume computes the member again"
 
 
 @dataclass(frozen=True)
@@ -168,12 +169,8 @@ def refuse_other_member(whole: dict[str, Any], inner: RunFolder, number: int) ->
     if lines := list(list_differences("", old, new, LENGTHS)):
         raise SceneError(
             f"this is not member {number} of the run that it lies in:\n  " + "\n  ".join(lines),
-            where=str(inner.path),
-            remedy=AWAY,
-        )
-
-
-AWAY = "move this folder away: trackbed resume computes the member again"
+            where=str(inner.path), remedy=AWAY,
+        )  # fmt: skip
 
 
 def read_track(folder: RunFolder) -> Track:

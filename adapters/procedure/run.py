@@ -43,7 +43,7 @@ def settle(run: Run) -> Bed:
     bed = stages.prepare(run)
     bed = stages.compute(run, bed, p.k_i)
     bed = replace(bed, start=replace(bed.start, perturbation=run.variant.perturbation))
-    if p.tolerance is not None and run.variant.jumps and not run.variant.still:
+    if p.tolerance is not None and run.variant.jumps:
         return settle_controlled(run, bed)
     return settle_fixed(run, bed)
 
@@ -277,10 +277,14 @@ def prepare_manifest(
         manifest = folder.manifest()
         refuse_differences(manifest["scene"], record_scene(scene), folder.path)
         number, most = read_members(folder)
-        most = most if number else max(most, members)  # a member has none of its own
-        more = manifest | {"control": manifest["control"] or control, "members": most}
-        if more != manifest:
-            write_whole(path, json.dumps(more, indent=1) + "\n")
+        if number:
+            raise UsageError(
+                f"this is member {number} of another run", where=str(folder.path),
+                remedy="trackbed resume goes on with it; members are those of the run around it",
+            )  # fmt: skip
+        more = {"control": manifest["control"] or control, "members": max(most, members)}
+        if not more.items() <= manifest.items():
+            write_whole(path, json.dumps(manifest | more, indent=1) + "\n")
         folder.add_event("resumed")
         return
     refuse_strangers(folder)

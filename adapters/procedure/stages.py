@@ -52,8 +52,6 @@ class Variant:
 
     name: str = "procedure"
     jumps: bool = True  # false computes every cycle: the control
-    still: bool = False
-    """True jumps over no cycle: dump, relax, resubmit, which shows what that alone costs."""
     perturbation: float = 0.0
     """Displacement [m] of one grain after the first k_i cycles: how far two equal runs part."""
 

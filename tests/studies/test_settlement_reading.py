@@ -11,7 +11,14 @@ from scipy.stats import t as student
 from validation.studies.settlement.bars import check_bars
 from validation.studies.settlement.beds import COARSE, EVERY, KINDS, list_methods, list_runs
 from validation.studies.settlement.reading import find_errors, find_interval, find_step_speedup
-from validation.studies.settlement.run import GAINS, LAW_CYCLES, PARTS, average_block, thin_table
+from validation.studies.settlement.run import (
+    GAINS,
+    JUDGED_LAWS,
+    PARTS,
+    average_block,
+    count_computed,
+    thin_table,
+)
 
 pytestmark = pytest.mark.studies
 
@@ -73,14 +80,13 @@ def test_every_way_starts_at_the_packings_state_and_ends_with_the_full_runs() ->
             assert p.k_i == kind.k_i
             if method.family == "growing":
                 assert p.h is not None
-                windows = p.window_cycles + len(p.h) * (p.healing_cycles + p.window_cycles)
-                assert kind.k_i + windows + sum(p.h) == kind.last
+                assert kind.k_i + count_computed(kind) + sum(p.h) == kind.last
 
 
 def test_every_run_has_one_name() -> None:
     """As many parts as runs, and a law for each full run of two beds; full runs come first."""
     runs = [run for kind in KINDS.values() for run in list_runs(kind)]
-    laws = sum(len(KINDS[name].seeds) for name in LAW_CYCLES)
+    laws = sum(len(KINDS[name].seeds) for name in JUDGED_LAWS)
     assert len(PARTS) == len(runs) + laws
     assert next(iter(PARTS)) == f"confined-1, {EVERY}"
 

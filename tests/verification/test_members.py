@@ -167,7 +167,9 @@ def test_members_later_and_longer(
     assert not (run / "members").exists()
     assert [run_scene(tmp_path), read_tables(run)] == [run, read_tables(finished)]
     assert main(["resume", str(run / "members" / "1"), "--cycles", "24"]) == 2
-    assert "this is member 1 of another run" in capsys.readouterr().err
+    inner = ["--run-folder", str(run / "members" / "1"), "--members", "3", "--control"]
+    assert main(["run", str(tmp_path / "scene.toml"), *inner]) == 2
+    assert capsys.readouterr().err.count("this is member 1 of another run") == 2
     assert main(["resume", str(run), "--cycles", "24"]) == 0
     (tmp_path / "whole").mkdir()
     assert read_tables(run) == read_tables(run_scene(tmp_path / "whole", "--cycles", "24"))

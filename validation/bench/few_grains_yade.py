@@ -30,7 +30,6 @@ import record
 
 O = Omega()
 parameters = bed.read_parameters()
-few = parameters["few"]
 bed.add_materials(parameters)
 bed.add_grains(parameters)
 bed.add_walls(parameters)
@@ -41,6 +40,7 @@ count = parameters["grain_count"]
 SCRIPT = (
     START
     + """\
+few = parameters["few"]
 states = [O.bodies[number].state for number in range(count)]
 for number, (state, velocity) in enumerate(zip(states, few["velocity"]), 1):
     state.vel = Vector3(*velocity)

@@ -25,25 +25,12 @@ from adapters.files.dump_reader import read_frames
 from adapters.scene.tables import Scene
 from validation.bench import few_grains, few_grains_lammps
 from validation.bench.few_grains_lammps import VECTORS
+from validation.bench.few_grains_yade import START
 
-YADE_SCRIPT = """\
-import os
-import sys
-
-import numpy as np
-from yade import Omega, Vector3
-
-sys.path.insert(0, os.getcwd())
-import bed
-import record
-
-O = Omega()
-parameters = bed.read_parameters()
+YADE_SCRIPT = (
+    START
+    + """\
 start = parameters["impacts"]
-bed.add_materials(parameters)
-bed.add_grains(parameters)
-bed.add_walls(parameters)
-count = parameters["grain_count"]
 states = [O.bodies[number].state for number in range(count)]
 for state, velocity, spin, share in zip(
     states, start["velocity"], start["spin"], start["mass_factor"]
@@ -70,6 +57,7 @@ record.save_scene()
 force.close()
 print(f"COMPLETE step {O.iter}", flush=True)
 """
+)
 
 
 @dataclass(frozen=True)

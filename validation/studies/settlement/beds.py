@@ -22,7 +22,7 @@ class Kind:
 
     name: str
     title: str
-    scene_name: str
+    path: Path  # of its scene file
     settings: tuple[str, ...]
     """Keys of the scene that differ, beside the seed."""
     seeds: range
@@ -36,21 +36,18 @@ class Kind:
         """The scene of a packing on LIGGGHTS, with ``settings`` on top."""
         own = [f"procedure.total_cycles={self.last}", f"sample.seed={seed}",
                'engine.name="liggghts"', f"procedure.k_i={self.k_i}", "procedure.k=10"]  # fmt: skip
-        box = Path(__file__).with_name("box.toml")
-        path = box if self.scene_name == "box" else find_scene_file(self.scene_name)
-        return load_scene(path, [*self.settings, *own, *settings])
+        return load_scene(self.path, [*self.settings, *own, *settings])
 
 
 SOFT = ("material.grain.young=1e9",)
-CONFINED = Kind("confined", "paper's bed: 1,085 grains", "karrech", (), range(1, 10), 500)
-COARSE = Kind("coarse", "coarse, softer bed: 150 grains", "karrech-coarse", SOFT,
-              range(101, 201), 500)  # fmt: skip
-FAR = Kind("far", "the coarse bed, further", "karrech-coarse", SOFT, range(101, 131), 10_000)
-PARTIAL = Kind("partial", "piston on 80 % of the section", "karrech-partial", (), range(1, 10),
-               100, k_i=25)  # fmt: skip
-UNSEEN = Kind(
-    "unseen", "a box, another grading, stiffness and frequency", "box", (), range(1, 13), 500
-)
+PAPER, SMALL, PART = map(find_scene_file, ("karrech", "karrech-coarse", "karrech-partial"))
+BOX = Path(__file__).with_name("box.toml")
+CONFINED = Kind("confined", "paper's bed: 1,085 grains", PAPER, (), range(1, 10), 500)
+COARSE = Kind("coarse", "coarse, softer bed: 150 grains", SMALL, SOFT, range(101, 201), 500)
+FAR = Kind("far", "the coarse bed, further", SMALL, SOFT, range(101, 131), 10_000)
+PARTIAL = Kind("partial", "piston on 80 % of the section", PART, (), range(1, 10), 100, k_i=25)
+UNSEEN = Kind("unseen", "a box, another grading, stiffness and frequency", BOX, (), range(1, 13),
+              500)  # fmt: skip
 KINDS = {kind.name: kind for kind in (CONFINED, COARSE, FAR, PARTIAL, UNSEEN)}
 
 

@@ -19,7 +19,7 @@ from adapters.procedure.progress import Progress
 from adapters.procedure.run import CONTROL, settle
 from adapters.procedure.stages import Run, Variant, compute, prepare
 from adapters.scene.tables import Scene
-from validation.studies.settlement.beds import EVERY, KINDS, Kind, Method, list_runs
+from validation.studies.settlement.beds import EVERY, KINDS, Kind, Method, list_methods, list_runs
 
 Row = dict[str, Any]
 BLOCK = 10
@@ -30,8 +30,8 @@ GAINS = ("loaded_body", "settlement")
 """Columns whose gain since k_i [m] is judged: the loaded body's, and the mean grain's."""
 STATES = ("stiffness", "elastic_deflection", "coordination_number")
 """Columns that are means of the last block."""
-LAW_CYCLES = {"coarse": 90, "confined": 90}
-"""Cycles behind k_i that a law sees, on beds where it is judged: as many as *growing* computes."""
+JUDGED_LAWS = ("confined", "coarse")
+"""Beds beside which a law is fitted to as many first cycles as *growing* computes."""
 
 
 class Reset(LiggghtsEngine):
@@ -137,10 +137,18 @@ def thin_table(found: Mapping[int, Mapping[str, Any]]) -> dict[str, list[float]]
     return {"cycle": wanted, **columns}
 
 
+def count_computed(kind: Kind) -> int:
+    """Cycles that *growing*, the first way of every bed, computes behind k_i."""
+    p = kind.scene(kind.seeds[0], *list_methods(kind)[0].settings).procedure
+    assert p is not None
+    assert p.h is not None
+    return p.window_cycles + len(p.h) * (p.healing_cycles + p.window_cycles)
+
+
 def fit_law(kind: Kind, seed: int) -> Row:
     """Gain of the loaded body by `find_outlook` from a full run's first cycles: no bed is left."""
     run, _ = run_to_end(kind, None, seed)
-    found, seen = tabulate_cycles(run), LAW_CYCLES[kind.name]
+    found, seen = tabulate_cycles(run), count_computed(kind)
     cycle = np.arange(1, kind.k_i + seen + 1)
     path = np.array([found[one]["loaded_body"] for one in cycle.tolist()])
     predicted = float(find_outlook(cycle.astype(float), path[:, None], kind.last).prediction[0])
@@ -162,7 +170,7 @@ def list_parts() -> dict[str, Callable[[], Row]]:
         for method, seed in list_runs(kind):
             name = f"{kind.name}-{seed}, {method.name if method else EVERY}"
             parts[name] = partial(compute_way, kind, method, seed)
-        for seed in kind.seeds if kind.name in LAW_CYCLES else ():
+        for seed in kind.seeds if kind.name in JUDGED_LAWS else ():
             parts[f"{kind.name}-{seed}, law of as many cycles"] = partial(fit_law, kind, seed)
     return parts
 
