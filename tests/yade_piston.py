@@ -19,6 +19,7 @@ from validation.bench.few_grains_yade import START
 SCRIPT = (
     START
     + """\
+few = parameters["few"]
 piston = bed.Piston(parameters)
 rows = []
 for places in few:
