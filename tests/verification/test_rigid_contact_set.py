@@ -186,6 +186,15 @@ def test_a_part_of_a_step_is_half_of_what_meets(speed, gap, parts):
     assert count_parts(*make_world(scene), h) == parts
 
 
+def test_what_gravity_adds_within_a_step_counts():
+    """A disc at rest above a plate of thickness d meets it within the step: its way is g h^2, and a
+    part of d / 2 is a part of the step."""
+    scene, h, d = Scene(2, [0, -GRAVITY]), 0.1, 0.005
+    scene.add(Polygon.rectangle(1.0, d), fixed=True)
+    scene.add(Disc(0.01), density=1.0, position=[0, d / 2 + 0.01 + 0.03])
+    assert count_parts(*make_world(scene), h) == np.ceil(GRAVITY * h**2 / (d / 2))
+
+
 def test_a_step_too_long_for_bodies_that_meet_is_refused():
     """With the bodies, their speed and the step to take; that step is then enough."""
     scene = Scene(2, [0, 0])
