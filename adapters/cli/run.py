@@ -68,6 +68,11 @@ def register_run(parser: argparse.ArgumentParser) -> None:
         "settlement, such as 0.02; short for --set procedure.tolerance=T, instead of k and h",
     )  # fmt: skip
     parser.add_argument(
+        "--fast", action="store_true",
+        help="twice the usual time step, at half of the cost (errors: docs/engines.md); short for "
+        '--set engine.rayleigh_share="fast"',
+    )  # fmt: skip
+    parser.add_argument(
         "--cycles", type=int, metavar="N", help="short for --set procedure.total_cycles=N"
     )
     parser.add_argument(
@@ -79,8 +84,8 @@ def register_run(parser: argparse.ArgumentParser) -> None:
 
 
 def list_jump_overrides(arguments: argparse.Namespace) -> list[str]:
-    """KEY=VALUE of ``--tolerance``, ``--cycles`` and ``--members``; `UsageError` beside a k or h by
-    hand."""
+    """KEY=VALUE of ``--tolerance``, ``--cycles``, ``--members`` and ``--fast``; `UsageError` beside
+    a k or h by hand."""
     overrides = []
     if arguments.tolerance is not None:
         if arguments.procedure not in (None, "tolerance"):
@@ -97,6 +102,8 @@ def list_jump_overrides(arguments: argparse.Namespace) -> list[str]:
         overrides.append(f"procedure.tolerance={arguments.tolerance!r}")
     if arguments.cycles is not None:
         overrides.append(f"procedure.total_cycles={arguments.cycles}")
+    if arguments.fast:
+        overrides.append('engine.rayleigh_share="fast"')
     if arguments.members is not None:
         overrides.append(f"procedure.members={arguments.members}")
     return overrides

@@ -11,6 +11,7 @@ from pydantic import BaseModel
 
 from adapters.jumps import schedule_jumps
 from adapters.scene.checks import ALTERNATIVES, JUMP_KEYS, TOLERANCE_KEY, find_problems
+from adapters.scene.mechanics import DOUBTFUL
 from adapters.scene.procedures import fill_procedure
 from adapters.scene.tables import Procedure, Scene, flatten_keys
 from trackbed.scene_files import Guide, Problem, find_model, read_scene
@@ -38,6 +39,9 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
         loading["series"] = str(text.path.parent.absolute() / loading["series"])
     if isinstance(data.get("procedure"), dict):
         data["procedure"] = fill_procedure(data["procedure"])
+    engine = data.get("engine")
+    if isinstance(engine, dict) and engine.get("rayleigh_share") == "fast":
+        engine["rayleigh_share"] = DOUBTFUL.rayleigh_share
     problems = list(_expand_schedule(data))
     text.check(Scene)
     if text.problems:

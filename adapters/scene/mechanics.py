@@ -31,7 +31,9 @@ COUNT_GREATEST = 10**8
 class DoubtfulNumbers:
     """Ends of what is free of doubt."""
 
-    rayleigh_share: float = 0.4  # greatest time step over the Rayleigh time [-]
+    rayleigh_share: float = 0.4
+    """Greatest time step over the Rayleigh time [-], which the scene's word "fast" stands for: what
+    it costs in accuracy is measured in docs/engines.md."""
     width: int = 8  # least one of a container [mean grain diameters]
     steps: int = 100  # least number of time steps a cycle
     jump: int = 10  # most cycles of one for each cycle fitted: above, noise is extrapolated

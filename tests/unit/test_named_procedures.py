@@ -135,3 +135,12 @@ def test_a_named_run_ends_at_its_last_cycle(
     assert float(rows[-1]["mean_grain_settlement"]) == pytest.approx(truth, rel=0.02)
     assert RunFolder(run).manifest()["scene"]["procedure"]["name"] == name
     assert any(row["kind"] == "jumped" for row in rows)
+
+
+def test_a_fast_run_takes_twice_the_usual_time_step(tmp_path: Path) -> None:
+    usual, fast = load_scene(COARSE), load_scene(COARSE, ["engine.rayleigh_share=fast"])
+    assert fast.steps_per_cycle == pytest.approx(usual.steps_per_cycle / 2, abs=100)
+    assert not fast.warnings
+    words = ["run", str(COARSE), "--engine", "fake", "--cycles", "30", "--fast"]
+    assert main([*words, "--run-folder", str(tmp_path / "run")]) == 0
+    assert RunFolder(tmp_path / "run").manifest()["scene"]["engine"]["rayleigh_share"] == 0.4

@@ -37,6 +37,9 @@ LAST = 10
 NO_PULL = ("damping coeff_restitution", "damping coeff_restitution limit_damping")
 """Words of LAMMPS' decks, and those with which no contact pulls."""
 
+FAST = ('engine.rayleigh_share="fast"',)
+"""Twice the time step, as `trackbed run --fast` has it."""
+
 SEEDS = tuple(range(1, 9))
 
 
@@ -76,6 +79,9 @@ WAYS = (
     Way("liggghts, piston of 0.1 kg", "liggghts", ("loading.piston_mass=0.1",)),
     Way("lammps, mindlin/force, no pull", "lammps", rule="mindlin/force", pulls=False),
     Way("yade, rebound e", "yade", ("material.grain.restitution=0.2145",)),
+    Way("liggghts, fast", "liggghts", FAST),
+    Way("lammps, fast", "lammps", FAST),
+    Way("yade, fast", "yade", FAST),
 )
 """The three engines, then one setting at a time."""
 
@@ -96,6 +102,10 @@ class Figures:
     """Relative density below 0.9 of the common start's height, mean of the last cycle ends."""
     deflection: float
     """Elastic deflection of the piston in a cycle, mean of the last `LAST` [m]."""
+    stiffness: float
+    """Secant stiffness under the piston, of the same cycles [N/m]."""
+    dissipated: float
+    """Work of the piston on the bed in a cycle, mean of the last `LAST` [J]."""
     curve: tuple[float, ...]
     """Settlement after cycles 0, 1, ..., `CYCLES` [m]."""
 
@@ -118,14 +128,18 @@ def measure(window: Window, start: FloatArray, scene: Scene) -> Figures:
     for position in window.position[-LAST:]:
         pairs.append(int((find_pairs(position, window.radius, walls).second >= 0).sum()))
         density.append(measure_relative_density(position, window.radius, scene.container, top))
-    deflection = window.piston.elastic_deflection(scene.steps_per_cycle)[-LAST:]
+    steps, piston = scene.steps_per_cycle, window.piston
+    force = (piston.contact_force[1:] + piston.contact_force[:-1]) / 2
+    work = np.bincount(piston.cycles(steps)[1:], -force * np.diff(piston.height))
     return Figures(
         settlement=float(curve[-1]),
         settlement_after_first=float(curve[-1] - curve[1]),
         settlement_of_start=float(start[:, 2].mean() - mean_height[0]),
         coordination=2 * float(np.mean(pairs)) / len(window.radius),
         density=float(np.mean(density)),
-        deflection=float(np.mean(deflection)),
+        deflection=float(np.mean(piston.elastic_deflection(steps)[-LAST:])),
+        stiffness=float(np.mean(piston.stiffness(steps)[-LAST:])),
+        dissipated=float(np.mean(work[-LAST:])),
         curve=tuple(curve.tolist()),
     )
 

@@ -21,6 +21,8 @@ FIGURES = {
     "deflection": ("elastic deflection, µm", 1e6, 2),
 }
 """Key of a row: words, factor, decimals."""
+FAST = ("settlement", "stiffness", "dissipated")
+"""What a time step twice as long is judged by."""
 JUDGED = ("settlement", "coordination", "density")
 """Figures that the protocol judges."""
 LEVEL = 1 - 0.05 / 9
