@@ -10,7 +10,8 @@ setup:
 	@./setup.sh
 
 demo: setup
-	$(bin)/trackbed run trackbed/scenes/karrech-coarse.toml --control --run-folder demo-bed/run
+	$(bin)/trackbed run trackbed/scenes/karrech-coarse.toml --fast --members 2 --control \
+		--run-folder demo-bed/run
 	$(bin)/trackbed report demo-bed/run --open
 	$(bin)/trackbed status demo-bed/run
 

@@ -12,6 +12,10 @@ def read_rows(run: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(stream))
 
 
+BY_HAND = ("procedure.k_i=20", "procedure.k=20", "procedure.h=20", "procedure.total_cycles=100")
+"""A procedure of its keys alone, in place of a scene's by name."""
+
+
 def small_bed(k: int, h: int, total_cycles: int) -> str:
     """Its scene file: windows of 2 cycles, then of ``k``, jumps of ``h``, so many in all."""
     return f"""\

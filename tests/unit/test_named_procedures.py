@@ -15,7 +15,7 @@ from adapters.procedure.progress import plan_jumps
 from adapters.scene.file import load_scene
 from adapters.scene.procedures import NUMBERS, PROCEDURES, fill_procedure
 from adapters.scene.tables import Procedure
-from tests.small_bed import read_rows
+from tests.small_bed import BY_HAND, read_rows
 from trackbed.command import main
 from trackbed.scenes import find_scene_file
 
@@ -54,19 +54,13 @@ def test_growing_windows_end_evenly_in_ln_n(total: int) -> None:
     assert (total / ends[0]) ** (1 / max(len(jumps) - 1, 1)) > NUMBERS.ratio or len(jumps) == 1
 
 
-def test_a_scene_without_a_procedure_of_its_own_grows(tmp_path: Path) -> None:
+def test_a_scene_without_a_procedure_of_its_own_grows() -> None:
     """Ten thousand cycles, 240 of them computed; keys by hand are a procedure without a name."""
-    text = COARSE.read_text(encoding="utf-8")
-    begin, rest = text.split("[procedure]")
-    scene = tmp_path / "scene.toml"
-    scene.write_text(begin + "[procedure]\ntotal_cycles = 10000\n\n[engine]" +
-                     rest.split("[engine]")[1], encoding="utf-8")  # fmt: skip
-    found = load_scene(scene, ['engine.name="fake"']).procedure
-    assert found is not None
+    found = load("procedure.total_cycles=10000")
     assert (found.name, found.settlement, found.move) == ("growing", "history", "smoothed")
     skipped = sum(end - start for start, end in plan_jumps(found))
     assert found.total_cycles - skipped == 240
-    assert load().name is None
+    assert load(*BY_HAND).name is None
 
 
 def test_a_name_replaces_the_keys_of_the_scene() -> None:

@@ -30,7 +30,7 @@ from adapters.procedure.progress import Progress
 from adapters.procedure.stages import Run, Variant
 from adapters.scene.file import load_scene
 from adapters.scene.tables import Scene
-from tests.small_bed import read_rows, small_bed
+from tests.small_bed import BY_HAND, read_rows, small_bed
 from trackbed.command import main
 from trackbed.scenes import find_scene_file
 
@@ -43,7 +43,7 @@ def settle(folder: Path, *overrides: str, control: bool = False) -> list[dict[st
         find_scene_file("karrech-coarse"),
         folder,
         control=control,
-        overrides=['engine.name="fake"', "procedure.h=20", *overrides],
+        overrides=['engine.name="fake"', *BY_HAND, *overrides],
         progress=QUIET,
     )
     return read_rows(folder)

@@ -25,9 +25,6 @@ from adapters.scene.tables import Scene
 from trackbed.scenes import find_scene_file
 
 CYCLES = 50
-SETTINGS = ("material.grain.young=1e9",)
-"""What differs from ``karrech-coarse.toml``: softer by ten, for a step longer by three."""
-
 TWIN = 1e-9
 """By how much the first grain of the twin is aside [m]."""
 
@@ -111,8 +108,8 @@ class Figures:
 
 
 def load_bed(seed: int, *extra: str) -> Scene:
-    """The coarse scene of a seed under `SETTINGS` and more."""
-    return load_scene(find_scene_file("karrech-coarse"), [*SETTINGS, f"sample.seed={seed}", *extra])
+    """The coarse scene of a seed, with ``extra`` keys."""
+    return load_scene(find_scene_file("karrech-coarse"), [f"sample.seed={seed}", *extra])
 
 
 def measure(window: Window, start: FloatArray, scene: Scene) -> Figures:

@@ -35,16 +35,16 @@ class Kind:
     def scene(self, seed: int, *settings: str) -> Scene:
         """The scene of a packing on LIGGGHTS, with ``settings`` on top."""
         own = [f"procedure.total_cycles={self.last}", f"sample.seed={seed}",
-               'engine.name="liggghts"', f"procedure.k_i={self.k_i}", "procedure.k=10"]  # fmt: skip
+               'engine.name="liggghts"', f"procedure.k_i={self.k_i}", "procedure.k=10",
+               "procedure.h=35"]  # fmt: skip
         return load_scene(self.path, [*self.settings, *own, *settings])
 
 
-SOFT = ("material.grain.young=1e9",)
 PAPER, SMALL, PART = map(find_scene_file, ("karrech", "karrech-coarse", "karrech-partial"))
 BOX = Path(__file__).with_name("box.toml")
 CONFINED = Kind("confined", "paper's bed: 1,085 grains", PAPER, (), range(1, 10), 500)
-COARSE = Kind("coarse", "coarse, softer bed: 150 grains", SMALL, SOFT, range(101, 201), 500)
-FAR = Kind("far", "the coarse bed, further", SMALL, SOFT, range(101, 131), 10_000)
+COARSE = Kind("coarse", "coarse, softer bed: 150 grains", SMALL, (), range(101, 201), 500)
+FAR = Kind("far", "the coarse bed, further", SMALL, (), range(101, 131), 10_000)
 PARTIAL = Kind("partial", "piston on 80 % of the section", PART, (), range(1, 10), 100, k_i=25)
 UNSEEN = Kind("unseen", "a box, another grading, stiffness and frequency", BOX, (), range(1, 13),
               500)  # fmt: skip
