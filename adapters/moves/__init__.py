@@ -9,9 +9,7 @@ __all__ = ["DEFAULT", "RETIRED", "Jump", "get_move", "list_moves"]
 
 DEFAULT = "smoothed"
 """The way of a scene that names none."""
-RETIRED = {
-    "robust": "smoothed", "shrunk": "smoothed", "modes": "profile", "smooth-field": "profile",
-}  # fmt: skip
+RETIRED = dict.fromkeys(("robust", "shrunk", "modes", "smooth-field"), "smoothed")
 """Ways that left trackbed, and the nearest one that is here."""
 
 

@@ -1,4 +1,4 @@
-"""Ways to move grains in a jump: those that left, the noise of a window, profiles, in scenes."""
+"""Ways to move grains in a jump: those that left, those that are here, in scenes."""
 
 from __future__ import annotations
 
@@ -12,14 +12,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adapters.bed.container import Container
 from adapters.engines.fake import SETTLEMENT
 from adapters.errors import SceneError, UsageError
 from adapters.files.run_folder import RunFolder
 from adapters.laws import get_law
 from adapters.moves import RETIRED, get_move
 from adapters.moves.contract import Jump, restore_mean
-from adapters.moves.profile import extrapolate_blocks, weigh_grains
 from adapters.moves.smoothed import clip_moves, smooth_moves
 from adapters.procedure.run import record_scene, resume, run_scene
 from adapters.procedure.status import read_status
@@ -58,51 +56,6 @@ def test_a_run_by_a_way_that_left_is_not_resumed(tmp_path: Path) -> None:
     for use in (resume, read_status):
         with pytest.raises(SceneError, match="is the last to have it; use 'smoothed'"):
             use(run)
-
-
-# --- the noise of a window, and the profile ------------------------------------------------------
-
-
-def test_blocks_share_the_window_and_the_law() -> None:
-    """Four parts of five cycles; where the law goes on unchanged each says what the whole says."""
-    position, radius = bed(noise=0.0)
-    jump = Jump(CYCLE, position, radius, LOG, 30, QUARTER)
-    parts = extrapolate_blocks(jump)
-    assert parts.shape == (4, 120, 3)
-    np.testing.assert_allclose(parts, [jump.extrapolate_grains()] * 4, atol=1e-12)
-    for states, blocks in ((4, 2), (3, 0)):
-        short = replace(jump, cycle=CYCLE[:states], position=position[:states])
-        assert len(extrapolate_blocks(short)) == blocks
-    np.testing.assert_array_equal(weigh_grains(np.empty((0, 5, 3))), np.ones(5))
-
-
-def test_weights_are_those_of_noisy_means() -> None:
-    """A grain whose four parts scatter nine times as far weighs 2 / (1 + 81) of the others."""
-    parts = (
-        np.random.default_rng(0).standard_normal((4, 1, 3)) * np.array([1.0] * 20 + [9.0])[:, None]
-    )
-    weight = weigh_grains(parts)
-    assert weight.mean() == pytest.approx(1)
-    assert weight[20] / weight[0] == pytest.approx(2 / 82)
-
-
-@pytest.mark.parametrize(
-    ("container", "axis"),
-    [(QUARTER, (0, 0)), (Container("box", ("y",), size_x=0.03, size_y=0.05), (0.015, 0))],
-)
-def test_profile_keeps_fluctuations(container: Container, axis: tuple[float, float]) -> None:
-    """Grains at one height move down alike; outwards they move in proportion to their distance
-    from the axis, in a box from its mirror or its middle."""
-    position, radius = bed(4, count=300)
-    move = moved(get_move("profile"), position, radius, container=container)
-    ratio = move[:, :2] / (position[-1, :, :2] - axis)
-    np.testing.assert_allclose(ratio, ratio[0, 0], rtol=1e-9)
-    order = np.argsort(position[-1, :, 2])
-    height, drop = position[-1, order, 2], move[order, 2]
-    slope = np.diff(drop) / np.diff(height)
-    assert (
-        len(np.unique(np.round(slope / np.abs(slope).max(), 6))) <= 12
-    )  # 4 layers, rounding apart
 
 
 # --- the paper's estimate, and what the smoothed one adds to it ----------------------------------
@@ -224,11 +177,11 @@ def test_scene_without_the_key_is_the_scene_of_older_runs(tmp_path: Path) -> Non
     scene.write_text(small_bed(k=4, h=2, total_cycles=12))
     usual, named, other = (
         record_scene(load_scene(scene, overrides))["procedure"]
-        for overrides in ([], ['procedure.move="smoothed"'], ['procedure.move="profile"'])
+        for overrides in ([], ['procedure.move="smoothed"'], ['procedure.move="still"'])
     )
     assert "move" not in usual
     assert usual == named
-    assert other == usual | {"move": "profile"}
+    assert other == usual | {"move": "still"}
     run_scene(scene, tmp_path / "run", progress=QUIET)
-    with pytest.raises(SceneError, match=r'procedure\.move: nothing there, "profile" now'):
-        run_scene(scene, tmp_path / "run", overrides=['procedure.move="profile"'], progress=QUIET)
+    with pytest.raises(SceneError, match=r'procedure\.move: nothing there, "still" now'):
+        run_scene(scene, tmp_path / "run", overrides=['procedure.move="still"'], progress=QUIET)
