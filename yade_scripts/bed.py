@@ -8,27 +8,8 @@ import json
 import sys
 from math import atan, pi
 
-from yade import Omega, Vector3
+from yade import Omega, Vector3, wrapper
 from yade.utils import facet, sphere, wall
-from yade.wrapper import (
-    Bo1_Facet_Aabb,
-    Bo1_Sphere_Aabb,
-    Bo1_Wall_Aabb,
-    ForceResetter,
-    FrictMat,
-    HarmonicForceEngine,
-    Ig2_Facet_Sphere_ScGeom,
-    Ig2_Sphere_Sphere_ScGeom,
-    Ig2_Wall_Sphere_ScGeom,
-    InsertionSortCollider,
-    InteractionLoop,
-    InterpolatingDirectedForceEngine,
-    Ip2_FrictMat_FrictMat_MindlinPhys,
-    Law2_ScGeom_MindlinPhys_Mindlin,
-    LinearDragEngine,
-    MatchMaker,
-    NewtonIntegrator,
-)
 
 O = Omega()
 GRAIN_MASK, WALL_MASK, BALLAST_MASK = 1, 3, 4
@@ -50,7 +31,9 @@ def add_materials(parameters):
     """Materials by name: grain, wall, and mirror where the scene has one."""
     return {
         name: O.materials.append(
-            FrictMat(young=m["young"], poisson=m["poisson"], density=m["density"], label=name)
+            wrapper.FrictMat(
+                young=m["young"], poisson=m["poisson"], density=m["density"], label=name
+            )
         )
         for name, m in parameters["materials"].items()
     }
@@ -191,32 +174,34 @@ def make_contact_law(parameters):
             (O.materials[p["first"]].id, O.materials[p["second"]].id, value(p[key]))
             for p in parameters["pairs"]
         ]
-        return MatchMaker(matches=matches, algo="zero")
+        return wrapper.MatchMaker(matches=matches, algo="zero")
 
-    physics = Ip2_FrictMat_FrictMat_MindlinPhys(
+    physics = wrapper.Ip2_FrictMat_FrictMat_MindlinPhys(
         betan=of_pairs("damping_normal"),
         betas=of_pairs("damping_tangential"),
         frictAngle=of_pairs("friction", atan),
     )
     # hertzian: a wall is flat; by itself YADE takes it for a sphere like the one that touches it.
     shapes = [
-        Ig2_Sphere_Sphere_ScGeom(),
-        Ig2_Wall_Sphere_ScGeom(hertzian=True),
-        Ig2_Facet_Sphere_ScGeom(hertzian=True),
+        wrapper.Ig2_Sphere_Sphere_ScGeom(),
+        wrapper.Ig2_Wall_Sphere_ScGeom(hertzian=True),
+        wrapper.Ig2_Facet_Sphere_ScGeom(hertzian=True),
     ]
-    return InteractionLoop(shapes, [physics], [Law2_ScGeom_MindlinPhys_Mindlin()])
+    return wrapper.InteractionLoop(shapes, [physics], [wrapper.Law2_ScGeom_MindlinPhys_Mindlin()])
 
 
 def set_engines(parameters, forces=(), watch=(), behind=()):
     """The engines of a step: neighbours, contacts, ``forces``, ``watch``, motion, ``behind``."""
-    collider = InsertionSortCollider(
-        [Bo1_Sphere_Aabb(), Bo1_Wall_Aabb(), Bo1_Facet_Aabb()],
+    collider = wrapper.InsertionSortCollider(
+        [wrapper.Bo1_Sphere_Aabb(), wrapper.Bo1_Wall_Aabb(), wrapper.Bo1_Facet_Aabb()],
         verletDist=parameters["verlet_distance"],
         avoidSelfInteractionMask=WALL_MASK & ~GRAIN_MASK,
     )
-    motion = NewtonIntegrator(damping=0, gravity=(0, 0, -parameters["gravity"]), kinSplit=True)
+    motion = wrapper.NewtonIntegrator(
+        damping=0, gravity=(0, 0, -parameters["gravity"]), kinSplit=True
+    )
     O.engines = [
-        ForceResetter(),
+        wrapper.ForceResetter(),
         collider,
         make_contact_law(parameters),
         *forces,
@@ -244,13 +229,13 @@ def renew_forces(forces=()):
 def make_load_engine(load, piston):
     """What the load adds to its mean force, in C++; cycles start at multiples of the period."""
     if load["waveform"] == "sine":
-        return HarmonicForceEngine(
+        return wrapper.HarmonicForceEngine(
             ids=[piston.clump],
             A=(0, 0, load["amplitude"] / 2),
             f=(0, 0, load["frequency"]),
             fi=(0, 0, pi / 2),
         )
-    return InterpolatingDirectedForceEngine(
+    return wrapper.InterpolatingDirectedForceEngine(
         ids=[piston.clump],
         times=load["time"],
         magnitudes=load["force"],
@@ -265,4 +250,4 @@ def make_drag_engine(piston, coefficient):
     YADE's Stokes drag 6 pi nu r v needs a sphere: the piston's ballast.
     """
     radius = O.bodies[piston.ballast].shape.radius
-    return LinearDragEngine(ids=[piston.ballast], nu=coefficient / (6 * pi * radius))
+    return wrapper.LinearDragEngine(ids=[piston.ballast], nu=coefficient / (6 * pi * radius))

@@ -23,17 +23,8 @@ from pathlib import Path
 from typing import Any
 
 from adapters.errors import UsageError
+from trackbed import run_files
 from trackbed.memory import read_bounded
-from trackbed.run_files import (
-    append_text,
-    digest_file,
-    lock_folder,
-    read_object,
-    refuse_format,
-    seal_file,
-    sync_folder,
-    write_whole,
-)
 
 COLUMNS = {
     "cycle": "cycle", "loaded_body_settlement": "loaded_body", "stiffness": "stiffness",
@@ -106,7 +97,7 @@ class RunFolder:
     @contextmanager
     def lock(self) -> Iterator[None]:
         """Hold the folder's only writer's lock; see `trackbed.run_files.lock_folder`."""
-        with lock_folder(self.path, "lock"):
+        with run_files.lock_folder(self.path, "lock"):
             self._listing = self._list_stages()
             try:
                 yield
@@ -125,7 +116,7 @@ class RunFolder:
         now = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
         record = json.loads(json.dumps({"time": now, "event": what, **details}))
         line = json.dumps(record | {SEAL: _digest(record)})
-        append_text(self.path / EVENTS, line + "\n")
+        run_files.append_text(self.path / EVENTS, line + "\n")
 
     def keep_cycle_by_cycle(self, now: bool) -> bool:
         """Whether this run was asked to compute where it may not jump, ``now`` or ever before."""
@@ -182,7 +173,9 @@ class RunFolder:
             found = _list_sizes(folder)
             whole = outcome.notes.get("files", found) == found
             digests = outcome.notes.get("digests", {}) if verify and whole else {}
-            whole &= all(digest_file(folder / one) == digest for one, digest in digests.items())
+            whole &= all(
+                run_files.digest_file(folder / one) == digest for one, digest in digests.items()
+            )
         except (OSError, ValueError, TypeError, AttributeError):
             whole = False
         if not whole:
@@ -220,12 +213,12 @@ class RunFolder:
         """Why a jump was given up, or an empty text."""
         if not (self.path / name / "failed.json").exists():
             return ""
-        why = read_object(self.path / name / "failed.json") or {}
+        why = run_files.read_object(self.path / name / "failed.json") or {}
         return str(why.get("why", "the record of its failure is damaged"))
 
     def failure_details(self, name: str) -> dict[str, Any]:
         """What `give_up` noted of a failed jump besides the reason; empty when that is all."""
-        details = read_object(self.path / name / "failed.json") or {}
+        details = run_files.read_object(self.path / name / "failed.json") or {}
         return {key: value for key, value in details.items() if key != "why"}
 
     def give_up(self, name: str, why: str, **details: object) -> None:
@@ -235,7 +228,7 @@ class RunFolder:
         """
         folder = self.path / name
         folder.mkdir(exist_ok=True)
-        write_whole(folder / "failed.json", json.dumps({"why": why, **details}) + "\n")
+        run_files.write_whole(folder / "failed.json", json.dumps({"why": why, **details}) + "\n")
         if self._listing is not None:
             self._listing.finished.pop(name, None)
             if name not in self._listing.names:
@@ -268,15 +261,15 @@ class RunFolder:
         for; all of it is on the disk when the stage is in its place.
         """
         sizes = _list_sizes(folder)
-        digests = {name: seal_file(folder / name) for name in sizes}
+        digests = {name: run_files.seal_file(folder / name) for name in sizes}
         outcome = replace(outcome, notes=outcome.notes | {"files": sizes, "digests": digests})
         record = json.loads(json.dumps(asdict(outcome)))
         text = json.dumps(record | {SEAL: _digest(record)}, indent=1)
-        write_whole(folder / "outcome.json", text + "\n")
-        sync_folder(folder)
+        run_files.write_whole(folder / "outcome.json", text + "\n")
+        run_files.sync_folder(folder)
         place = self.path / folder.name
         folder.rename(place)
-        sync_folder(self.path)
+        run_files.sync_folder(self.path)
         self._known.pop(folder.name, None)
         self._add_rows(folder.name)
         return place
@@ -301,7 +294,7 @@ class RunFolder:
         listing = self._listing or self._list_stages()
         rows = [self._known[name][3] for name in listing.finished]
         path = self.path / "settlement.csv"
-        write_whole(path, ",".join(COLUMNS) + "\n" + "".join(rows))
+        run_files.write_whole(path, ",".join(COLUMNS) + "\n" + "".join(rows))
         listing.table = _identify(str(path))
 
     def _add_rows(self, name: str) -> None:
@@ -312,21 +305,21 @@ class RunFolder:
             listing.names.append(name)
             listing.finished[name] = found
             if listing.table and path.exists() and _identify(str(path)) == listing.table:
-                append_text(path, self._known[name][3])
+                run_files.append_text(path, self._known[name][3])
                 listing.table = _identify(str(path))
                 return
         self.write_settlement()
 
     def manifest(self) -> dict[str, Any]:
         """The manifest; raises `UsageError` when this is no run folder."""
-        content = read_object(self.path / "manifest.json") or {}
+        content = run_files.read_object(self.path / "manifest.json") or {}
         if not content.keys() >= set(MANIFEST):
             raise UsageError(
                 "this is not a run folder (no readable manifest.json)", where=str(self.path),
                 remedy="give the folder that trackbed run made; if it was stopped in its first "
                 "second, start it again: trackbed run SCENE",
             )  # fmt: skip
-        refuse_format(self.path, content)
+        run_files.refuse_format(self.path, content)
         return content
 
     def share_start(self, other: RunFolder, last_cycle: int) -> None:

@@ -7,14 +7,7 @@ from math import isnan
 from adapters.procedure import SEATING, Record, find_hung_cycles, format_spans
 from adapters.report.error import COORDINATION_BAR, HEIGHT_BAR
 from adapters.report.numbers import Numbers
-from trackbed.report import (
-    format_share,
-    format_um,
-    format_verdict,
-    make_paragraph,
-    make_section,
-    make_table,
-)
+from trackbed import report
 
 HEADER = (
     "cycles jumped", "loaded body", "full run's, same cycles", "mean grain by the law",
@@ -27,29 +20,29 @@ HEADER = (
 def describe_jumps(record: Record, numbers: Numbers) -> str:
     """What each step of a jump adds to the error, and what the bed made of it."""
     if not numbers.jumps:
-        return make_section(
+        return report.make_section(
             "Jumps and relaxation",
-            make_paragraph("No jump was made."),
+            report.make_paragraph("No jump was made."),
             describe_hung_cycles(record),
         )
     rows = [
         (
             f"{jump.first_cycle} → {jump.last_cycle}",
-            format_um(jump.loaded_body),
-            format_um(jump.loaded_body_truth),
-            format_um(jump.estimated),
-            format_um(jump.truth),
-            format_um(jump.law_error, "+.1f"),
-            format_um(jump.relaxation_change, "+.3f"),
-            format_um(jump.healing_error, "+.1f"),
+            report.format_um(jump.loaded_body),
+            report.format_um(jump.loaded_body_truth),
+            report.format_um(jump.estimated),
+            report.format_um(jump.truth),
+            report.format_um(jump.law_error, "+.1f"),
+            report.format_um(jump.relaxation_change, "+.3f"),
+            report.format_um(jump.healing_error, "+.1f"),
             show_with_verdict(jump.coordination_change, "+.2f", COORDINATION_BAR),
             show_with_verdict(jump.height_change, ".2f", HEIGHT_BAR),
         )
         for jump in numbers.jumps
     ]
-    return make_section(
+    return report.make_section(
         "Jumps and relaxation",
-        make_table(
+        report.make_table(
             "By what a jump lowers the loaded body and the mean grain, and what each of its "
             "steps adds to the error of the mean grain (µm, positive: too much). The full run is "
             "no twin of this one after the first jump: where the beds have parted, its increment "
@@ -68,9 +61,9 @@ def describe_jumps(record: Record, numbers: Numbers) -> str:
 def show_with_verdict(share: float, form: str, bar: float) -> str:
     """A share in per cent, and whether it meets its bar."""
     return (
-        format_share(share, form)
+        report.format_share(share, form)
         + " "
-        + format_verdict(None if isnan(share) else abs(share) <= bar)
+        + report.format_verdict(None if isnan(share) else abs(share) <= bar)
     )
 
 
@@ -94,7 +87,7 @@ def describe_hung_cycles(record: Record) -> str:
         if early
         else f"No jump was made {behind}."
     )
-    return make_paragraph(
+    return report.make_paragraph(
         f"<strong>The piston hung on few grains in cycles {format_spans(cycles)}:</strong> it gave "
         f"way by more than {SEATING.hung:g} times what the mean field of Walton (1987) gives a bed "
         f"of such grains. {advice}"
@@ -107,8 +100,9 @@ def describe_shortfall(record: Record) -> str:
     left = notes[-1]["asked"] - notes[-1]["gain"] if notes else 0.0
     if left == 0:
         return ""
-    return make_paragraph(
-        f"<strong>The bed has settled {format_um(left)} µm less than its jumps were to move it:"
-        "</strong> no room for more was found without overlaps. The settlement predicted is that "
-        "much greater; shorter jumps, or more of them, leave the bed the cycles to make room."
+    return report.make_paragraph(
+        f"<strong>The bed has settled {report.format_um(left)} µm less than its jumps were to "
+        "move it:</strong> no room for more was found without overlaps. The settlement predicted "
+        "is that much greater; shorter jumps, or more of them, leave the bed the cycles to make "
+        "room."
     )

@@ -8,15 +8,7 @@ from functools import partial
 from math import hypot, inf
 from pathlib import Path
 
-from adapters.bed import (
-    CHAIN_FACTOR,
-    OVERLAP_BOUND,
-    combine_moduli,
-    expect_grains,
-    find_overlap_under_force,
-    find_radius_that_fits,
-    find_rayleigh_time,
-)
+from adapters import bed
 from adapters.errors import SceneError
 from adapters.files import read_load_series
 from adapters.scene.values import Check, NotValid, Values, find_geometry, find_radii
@@ -44,7 +36,7 @@ DOUBTFUL = DoubtfulNumbers()
 
 def _check_room(scene: Values) -> Iterator[Problem]:
     largest_grain = find_radii(scene).greatest
-    room = find_radius_that_fits(find_geometry(scene))
+    room = bed.find_radius_that_fits(find_geometry(scene))
     if largest_grain > room:
         yield Problem(
             "sample.grain_radius.mean",
@@ -67,7 +59,7 @@ def _find_rayleigh_time(scene: Values) -> float:
     if radii.smallest <= 0:
         raise NotValid
     named = (scene.need(f"material.grain.{one}") for one in ("density", "young", "poisson"))
-    return find_rayleigh_time(radii.smallest, *named)
+    return bed.find_rayleigh_time(radii.smallest, *named)
 
 
 def _find_rayleigh_share(scene: Values) -> float:
@@ -88,7 +80,7 @@ def _check_time_step(scene: Values) -> Iterator[Problem]:
 
 def _check_fill_height(scene: Values) -> Iterator[Problem]:
     height = scene.need("sample.fill_height")
-    count = expect_grains(find_radii(scene), find_geometry(scene), height)
+    count = bed.expect_grains(find_radii(scene), find_geometry(scene), height)
     if not 1 <= count <= COUNT_GREATEST:
         yield Problem("sample.fill_height", f"{height:g} m would take {count:.3g} grains")
 
@@ -112,18 +104,18 @@ def _find_overlap_share(scene: Values) -> tuple[str, float, float]:
     if radii.smallest <= 0:
         raise NotValid
     young, poisson = scene.need(grain + "young"), scene.need(grain + "poisson")
-    modulus = combine_moduli(young, poisson, young, poisson)
-    overlap = find_overlap_under_force(stress * (2 * radii.mean) ** 2, modulus, radii.mean / 2)
+    modulus = bed.combine_moduli(young, poisson, young, poisson)
+    overlap = bed.find_overlap_under_force(stress * (2 * radii.mean) ** 2, modulus, radii.mean / 2)
     return key, stress, float(overlap) / radii.smallest
 
 
 def _check_load(scene: Values) -> Iterator[Problem]:
     key, stress, share = _find_overlap_share(scene)
-    if share > OVERLAP_BOUND:
+    if share > bed.OVERLAP_BOUND:
         yield Problem(
             key,
             f"a stress of {stress:.3g} Pa presses grains {share:.2g} of the smallest radius into "
-            f"one another; Hertz contact is a law up to {OVERLAP_BOUND:g}: "
+            f"one another; Hertz contact is a law up to {bed.OVERLAP_BOUND:g}: "
             "a smaller load, or stiffer grains",
         )
 
@@ -193,12 +185,12 @@ def _warn_of_few_steps(scene: Values) -> Iterator[Problem]:
 
 def _warn_of_deep_chains(scene: Values) -> Iterator[Problem]:
     key, stress, share = _find_overlap_share(scene)
-    deepest = CHAIN_FACTOR ** (2 / 3) * share
-    if deepest > OVERLAP_BOUND:
+    deepest = bed.CHAIN_FACTOR ** (2 / 3) * share
+    if deepest > bed.OVERLAP_BOUND:
         yield Problem(
             key,
             f"under {stress:.3g} Pa overlaps reach about {deepest:.2g} of the smallest radius in "
-            f"force chains; above {OVERLAP_BOUND:g} a run is refused",
+            f"force chains; above {bed.OVERLAP_BOUND:g} a run is refused",
         )
 
 

@@ -16,15 +16,7 @@ from scipy.optimize import brentq
 from scipy.spatial import ConvexHull
 
 from qdem_fem.files import Floats, Integers, MeshError
-from qdem_fem.grains.measures import (
-    find_edge_angles,
-    find_roundness,
-    find_sphericity,
-    find_surface_area,
-    find_surface_edges,
-    integrate_polyhedron,
-    quarter_faces,
-)
+from qdem_fem.grains import measures
 from qdem_fem.grains.meshing import find_radius_ratios, make_grain_elements, place_apex_and_spokes
 
 
@@ -149,9 +141,9 @@ def make_flat_form(points: Floats) -> GrainForm:
             f"not each of the {count} points is a corner of their hull", where="grain shape",
             remedy="leave out those inside it, on its edges and on its faces",
         )  # fmt: skip
-    edges = find_surface_edges(corner_faces)
+    edges = measures.find_surface_edges(corner_faces)
     surface = np.vstack([points, points[edges.nodes].mean(axis=1)])
-    faces = quarter_faces(corner_faces, edges)
+    faces = measures.quarter_faces(corner_faces, edges)
     inner = place_apex_and_spokes(surface, faces, count)
     nodes = np.vstack([surface, inner]) - inner[0]
     worst = find_radius_ratios(nodes, make_grain_elements(nodes, corner_faces)).min()
@@ -160,9 +152,9 @@ def make_flat_form(points: Floats) -> GrainForm:
             f"its flattest tetrahedron has a radius ratio of {worst:.2g}", where="grain shape",
             remedy=f"keep the corners farther apart: {HULLS.ratio:g} is the least",
         )  # fmt: skip
-    volume, _ = integrate_polyhedron(nodes, faces)
-    psi = find_sphericity(volume, find_surface_area(nodes, faces))
-    return GrainForm(corner_faces, nodes, psi, find_roundness(surface, faces))
+    volume, _ = measures.integrate_polyhedron(nodes, faces)
+    psi = measures.find_sphericity(volume, measures.find_surface_area(nodes, faces))
+    return GrainForm(corner_faces, nodes, psi, measures.find_roundness(surface, faces))
 
 
 class _Drawn:
@@ -171,14 +163,14 @@ class _Drawn:
     def __init__(self, generator: np.random.Generator, count: int) -> None:
         points = place_corners_apart(generator, count)
         self.corner_faces = find_hull_faces(points)
-        edges = find_surface_edges(self.corner_faces)
+        edges = measures.find_surface_edges(self.corner_faces)
         middles = points[edges.nodes].mean(axis=1)
         self.count = count
         generator.random(len(middles))  # of no use without dents; seeds keep their grains
         self.flat = np.vstack([points, middles])
         self.outward = middles / np.linalg.norm(middles, axis=1)[:, None] - middles
-        self.faces = quarter_faces(self.corner_faces, edges)
-        self.edges = find_surface_edges(self.faces)
+        self.faces = measures.quarter_faces(self.corner_faces, edges)
+        self.edges = measures.find_surface_edges(self.faces)
         kind = generator.uniform(-0.5, 1)  # -1/2: a rod, 1: a disc (Zingg 1935)
         self.axes = np.array([1.0, kind, -1.0 - kind])
         self.turn = np.linalg.qr(generator.standard_normal((3, 3)))[0]
@@ -190,7 +182,7 @@ class _Drawn:
         for _ in range(1000):
             nodes = self.flat.copy()
             nodes[self.count :] += lifts[:, None] * self.outward
-            _, angle = find_edge_angles(nodes, self.faces, self.edges)
+            _, angle = measures.find_edge_angles(nodes, self.faces, self.edges)
             inward = np.unique(self.edges.opposite[angle < -HULLS.bent_inward])
             inward = inward[inward >= self.count] - self.count
             if not len(inward):
@@ -203,11 +195,11 @@ class _Drawn:
 
         Stretches keep the volume.
         """
-        volume, _ = integrate_polyhedron(nodes, self.faces)
+        volume, _ = measures.integrate_polyhedron(nodes, self.faces)
 
         def find_excess(size: float) -> float:
-            area = find_surface_area(nodes * np.exp(size * self.axes), self.faces)
-            return find_sphericity(volume, area) - psi
+            area = measures.find_surface_area(nodes * np.exp(size * self.axes), self.faces)
+            return measures.find_sphericity(volume, area) - psi
 
         if find_excess(0.0) < 0 or find_excess(HULLS.greatest_stretch) > 0:
             return None
@@ -224,7 +216,7 @@ class _Drawn:
             nodes = self.stretch_nodes(self.lift_nodes(lift), psi)
             if nodes is None:
                 return None
-            reached.append(find_roundness(nodes, self.faces, self.edges))
+            reached.append(measures.find_roundness(nodes, self.faces, self.edges))
             return reached[-1] - roundness, nodes
 
         below: float | None = None

@@ -10,17 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from qdem_fem.files import Floats, Integers, MeshError, warn_user
-from qdem_fem.mesh.checks import (
-    Problem,
-    convert_elements,
-    convert_nodes,
-    convert_sets,
-    find_flat_elements,
-    find_index_problems,
-    find_repeated_elements,
-    name_some,
-    raise_problems,
-)
+from qdem_fem.mesh import checks
 from qdem_fem.mesh.doubts import find_doubts
 from qdem_fem.mesh.sources import MeshParts, read_mesh_parts
 
@@ -84,26 +74,26 @@ def read_mesh(source: Any, *, where: str = "") -> TetMesh:
     else:
         parts = read_mesh_parts(source, where)
 
-    nodes, problems = convert_nodes(parts.nodes)
-    elements, found = convert_elements(parts.elements)
+    nodes, problems = checks.convert_nodes(parts.nodes)
+    elements, found = checks.convert_elements(parts.elements)
     problems += found
     if len(nodes) == 0 and not problems:
-        problems.append(Problem("there are no nodes", "give coordinates (n, 3) in metres"))
+        problems.append(checks.Problem("there are no nodes", "give coordinates (n, 3) in metres"))
     if len(nodes) == 0 or len(elements) == 0:
-        raise_problems(problems, where)
+        checks.raise_problems(problems, where)
 
-    sound, found = find_index_problems(elements, len(nodes))
+    sound, found = checks.find_index_problems(elements, len(nodes))
     problems += found
-    problems += find_repeated_elements(elements, sound)
+    problems += checks.find_repeated_elements(elements, sound)
     lost = np.flatnonzero(~np.isfinite(nodes).all(axis=1))
     if len(lost):
         sound &= ~np.isin(elements, lost).any(axis=1)
-    volume, found = find_flat_elements(nodes, elements, sound)
+    volume, found = checks.find_flat_elements(nodes, elements, sound)
     problems += found
-    node_sets, found = convert_sets(parts.node_sets, "node", len(nodes))
+    node_sets, found = checks.convert_sets(parts.node_sets, "node", len(nodes))
     problems += found
-    element_sets, found = convert_sets(parts.element_sets, "element", len(elements))
-    raise_problems(problems + found, where)
+    element_sets, found = checks.convert_sets(parts.element_sets, "element", len(elements))
+    checks.raise_problems(problems + found, where)
 
     flipped = np.flatnonzero(volume < 0)
     elements[flipped, 2:] = elements[flipped, :1:-1]
@@ -147,7 +137,7 @@ def find_gradients(nodes: Floats, elements: Integers) -> tuple[Floats, Floats]:
     bad = np.flatnonzero(~(volumes > 0))
     if len(bad):
         raise MeshError(
-            f"no positive volume: {name_some('element', bad)}; "
+            f"no positive volume: {checks.name_some('element', bad)}; "
             f"element {bad[0]} has {volumes[bad[0]]:.3g} m^3",
             where="mesh", remedy="pass the mesh through read_mesh first",
         )  # fmt: skip

@@ -8,30 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
+from qdem_fem import tables
 from qdem_fem.element import MEASURES
 from qdem_fem.files import Integers, MeshError
-from qdem_fem.tables import (
-    BodyTable,
-    Condition,
-    ContactTable,
-    Mesh,
-    Nodes,
-    Output,
-    Periodic,
-    Prepared,
-    Scene,
-    SimulationTable,
-    Step,
-    WrongKey,
-    find_contact_faults,
-    find_named_nodes,
-    find_output_faults,
-    list_named_files,
-    list_tables,
-    make_body_mesh,
-    make_series,
-    make_unit_vector,
-)
 from trackbed.scene_files import (
     Guide,
     Problem,
@@ -50,7 +29,7 @@ TRACK_GUIDE = Guide("track-small", "simulation.duration=0.1")
 """Of scenes with a table ``[track]``."""
 
 
-def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Prepared:
+def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> tables.Prepared:
     """Read and check a whole scene with its meshes and series.
 
     Raises `SceneError` with all that is wrong (file, line, key and sentence of each), `UsageError`
@@ -63,14 +42,14 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Prepared:
         text.guide = TRACK_GUIDE
         text.check(TrackScene)
         return check_track(text)
-    text.check(Scene)
+    text.check(tables.Scene)
     problems = list(text.problems)
     folder = text.path.parent
     meshes, found = _make_meshes(text, folder)
     problems += found
     names = [entry["name"] for _, entry in _list_named_bodies(text)]
-    conditions: list[Step] = []
-    for key, table in list_tables(text, Condition, Periodic):
+    conditions: list[tables.Step] = []
+    for key, table in tables.list_tables(text, tables.Condition, tables.Periodic):
         if names and table.body not in names:
             near = suggest_word(table.body, names)
             problems.append(Problem(f"{key}.body", f"there is no body {table.body!r}{near}"))
@@ -81,16 +60,18 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Prepared:
             else:
                 conditions.append(step)
     probes: dict[str, tuple[str, Integers]] = {}
-    for _, output in list_tables(text, Output):
+    for _, output in tables.list_tables(text, tables.Output):
         problems += _fill_probes(output, names, meshes, probes)
-    problems += find_output_faults(text)
+    problems += tables.find_output_faults(text)
     problems += find_motion_faults(text)
-    for _, contact in list_tables(text, ContactTable):
-        faults = find_contact_faults(contact, text.tables.get("simulation"), names)
+    for _, contact in tables.list_tables(text, tables.ContactTable):
+        faults = tables.find_contact_faults(contact, text.tables.get("simulation"), names)
         problems += [Problem(*fault) for fault in faults]
     text.refuse(problems)
-    scene = Scene.model_validate(text.data)
-    return Prepared(scene, text, meshes, conditions, probes, dict(list_named_files(text, folder)))
+    scene = tables.Scene.model_validate(text.data)
+    return tables.Prepared(
+        scene, text, meshes, conditions, probes, dict(tables.list_named_files(text, folder))
+    )
 
 
 def _list_named_bodies(text: SceneText) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -108,7 +89,7 @@ def _make_meshes(text: SceneText, folder: Path) -> tuple[dict[str, TetMesh], lis
     seen: dict[str, str] = {}
     for key, entry in _list_named_bodies(text):
         try:
-            table = Mesh.model_validate(entry.get("mesh"))
+            table = tables.Mesh.model_validate(entry.get("mesh"))
         except ValidationError:
             continue  # its faults are known
         name, body = entry["name"], text.tables.get(key)
@@ -118,15 +99,15 @@ def _make_meshes(text: SceneText, folder: Path) -> tuple[dict[str, TetMesh], lis
             continue
         seen[name] = key
         try:
-            mesh = make_body_mesh(table, folder, f"{key}.mesh")
-        except WrongKey as wrong:
+            mesh = tables.make_body_mesh(table, folder, f"{key}.mesh")
+        except tables.WrongKey as wrong:
             problems.append(wrong.problem)
             continue
         except MeshError as error:
             file = error.where if error.where.startswith("mesh file") else ""
             problems.append(Problem(f"{key}.mesh", describe_error(error), file))
             continue
-        for region in body.regions if isinstance(body, BodyTable) else ():
+        for region in body.regions if isinstance(body, tables.BodyTable) else ():
             if region not in mesh.element_sets:
                 near = suggest_word(region, mesh.element_sets) or "; the mesh has none"
                 what = f"there is no element set {region!r}{near}"
@@ -137,30 +118,30 @@ def _make_meshes(text: SceneText, folder: Path) -> tuple[dict[str, TetMesh], lis
 
 def _check_condition(
     key: str, table: Any, mesh: TetMesh | None, folder: Path
-) -> Iterator[Step | Problem]:
+) -> Iterator[tables.Step | Problem]:
     """The call that a condition stands for, or everything that is wrong with it."""
     found: list[Problem] = []
     arguments: list[Any] = []  # of the method, in the order of the table's keys
     for name, value in dict(table).items():
         where = f"{key}.{name}"
         try:
-            if isinstance(value, Nodes):
-                value = None if mesh is None else find_named_nodes(value, mesh, where)
+            if isinstance(value, tables.Nodes):
+                value = None if mesh is None else tables.find_named_nodes(value, mesh, where)
             elif name == "normal":
-                value = make_unit_vector(value, where)
+                value = tables.make_unit_vector(value, where)
             elif name in ("force", "pressure", "value"):
-                value = make_series(value, where, folder, vector=name == "force")
-        except WrongKey as wrong:
+                value = tables.make_series(value, where, folder, vector=name == "force")
+        except tables.WrongKey as wrong:
             found.append(wrong.problem)
         if name != "body":
             arguments.append(value)
     yield from found
     if not found and mesh is not None:
-        yield Step(key, type(table).__name__.lower(), table.body, tuple(arguments))
+        yield tables.Step(key, type(table).__name__.lower(), table.body, tuple(arguments))
 
 
 def _fill_probes(
-    output: Output,
+    output: tables.Output,
     names: Sequence[str],
     meshes: dict[str, TetMesh],
     probes: dict[str, tuple[str, Integers]],
@@ -178,19 +159,19 @@ def _fill_probes(
                 yield Problem(f"{key}.body", f"there is no body {body!r}{near}")
         elif body in meshes:
             try:
-                probes[name] = (body, find_named_nodes(probe, meshes[body], key))
-            except WrongKey as wrong:
+                probes[name] = (body, tables.find_named_nodes(probe, meshes[body], key))
+            except tables.WrongKey as wrong:
                 yield wrong.problem
 
 
 def find_motion_faults(text: SceneText) -> Iterator[Problem]:
     """Bodies said to move at the start of what has no motion, or to turn in what can not."""
     simulation = text.tables.get("simulation")
-    if not isinstance(simulation, SimulationTable):
+    if not isinstance(simulation, tables.SimulationTable):
         return
-    joined = {table.body for _, table in list_tables(text, Periodic)}
+    joined = {table.body for _, table in tables.list_tables(text, tables.Periodic)}
     turns = MEASURES[simulation.strain].OBJECTIVE
-    for key, body in list_tables(text, BodyTable):
+    for key, body in tables.list_tables(text, tables.BodyTable):
         if simulation.method == "static" and body.moves:
             name = "velocity" if body.velocity is not None else "spin"
             yield Problem(f"{key}.{name}", 'a static answer has no motion: method = "dynamic"')

@@ -11,21 +11,11 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
+from rigid_lcp import shapes
 from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import ShapeError
 from rigid_lcp.motion import Loads, Motion, Scene
 from rigid_lcp.scene.types import BodyTable, Grains, Load, SceneTables, find_faults
-from rigid_lcp.shapes import (
-    FLATNESS,
-    Disc,
-    HalfSpace,
-    Polygon,
-    Polyhedron,
-    Sphere,
-    get_shape,
-    make_box,
-    make_rotation,
-)
 from trackbed.plausible import describe_implausible
 from trackbed.scene_files import Guide, read_scene
 
@@ -71,7 +61,7 @@ def build_scene(file: SceneFile) -> Scene:
 
     for i, ground in enumerate(tables.ground):
         with name_shape(f"ground {i}"):
-            plane = HalfSpace(ground.normal, ground.offset)
+            plane = shapes.HalfSpace(ground.normal, ground.offset)
         scene.add(plane, name=f"ground {i}", **merge(ground))
     for body in tables.body:
         keys = {"density", "position", "angle", "velocity", "spin", "fixed", "name"}
@@ -93,7 +83,7 @@ def place_grains(grains: Grains, dim: int) -> Iterator[tuple[Any, Floats, Any]]:
     The grid fills ``region`` row by row from below, and goes on above it.  The same seed gives the
     same grains.
     """
-    random, draw = np.random.default_rng(grains.seed), get_shape(grains.shape)
+    random, draw = np.random.default_rng(grains.seed), shapes.get_shape(grains.shape)
     low, high = np.array(grains.region_low), np.array(grains.region_high)
     cell = GRID_SPACING * grains.size[1]
     across = np.maximum(1, np.floor((high - low)[:-1] / cell).astype(int))
@@ -107,7 +97,7 @@ def place_grains(grains: Grains, dim: int) -> Iterator[tuple[Any, Floats, Any]]:
         if dim == 2:
             angle = random.uniform(0, 2 * np.pi)
             # what was drawn lies in its cell, not the centroid
-            yield stone, position + make_rotation(np.array([angle])) @ stone.centroid, angle
+            yield stone, position + shapes.make_rotation(np.array([angle])) @ stone.centroid, angle
         else:
             yield stone, position, random.normal(size=4)
 
@@ -125,22 +115,22 @@ def make_shape(body: BodyTable, dim: int) -> Any:
     """The shape that a body's table names.  Raises `ShapeError` with the body's name."""
     with name_shape(f"body {body.name}"):
         if body.radius is not None:
-            return Disc(body.radius) if dim == 2 else Sphere(body.radius)
+            return shapes.Disc(body.radius) if dim == 2 else shapes.Sphere(body.radius)
         if body.box is not None:
-            return Polygon.rectangle(*body.box) if dim == 2 else make_box(*body.box)
+            return shapes.Polygon.rectangle(*body.box) if dim == 2 else shapes.make_box(*body.box)
         given = np.array(body.vertices)
         if dim == 2:
-            return Polygon(given)
-        shape = Polyhedron(given)
+            return shapes.Polygon(given)
+        shape = shapes.Polyhedron(given)
         refuse_lost_vertices(given, shape)
         return shape
 
 
-def refuse_lost_vertices(given: Floats, shape: Polyhedron) -> None:
+def refuse_lost_vertices(given: Floats, shape: shapes.Polyhedron) -> None:
     """Raise `ShapeError` for vertices (n, 3) [m] that are no corners of their hull ``shape``: mass
     and inertia would be those of another body, as of a channel with its lid on."""
     apart, _ = cKDTree(shape.vertices + shape.centroid).query(given)
-    lost = np.flatnonzero(apart > FLATNESS * shape.reach)
+    lost = np.flatnonzero(apart > shapes.FLATNESS * shape.reach)
     if len(lost):
         raise ShapeError(
             f"it is not convex, or has needless vertices: {', '.join(map(str, lost[:5]))} "

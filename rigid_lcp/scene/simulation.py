@@ -14,6 +14,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rigid_lcp import motion
 from rigid_lcp.arrays import Floats
 from rigid_lcp.contact import ContactForces
 from rigid_lcp.errors import (
@@ -23,26 +24,6 @@ from rigid_lcp.errors import (
     SceneError,
     ShapeError,
     UsageError,
-)
-from rigid_lcp.motion import (
-    BOUNDS,
-    Loads,
-    Motion,
-    Pace,
-    Scene,
-    advance_runge_kutta,
-    check_loads,
-    count_parts,
-    explain_overflow,
-    explain_step_limit,
-    is_finite,
-    make_contact_forces,
-    make_world,
-    require_line,
-    require_number_in,
-    require_seconds,
-    require_whole_in,
-    step_moreau,
 )
 from rigid_lcp.unique import find_unique_forces
 from rigid_lcp.wear import (
@@ -88,14 +69,14 @@ class Simulation:
     """
 
     def __init__(
-        self, scene: Scene, method: Method = "time-stepping", *, step: float = 1e-3,
-        tolerance: float = 1e-12, loads: Loads | None = None, wear: Wear | None = None,
+        self, scene: motion.Scene, method: Method = "time-stepping", *, step: float = 1e-3,
+        tolerance: float = 1e-12, loads: motion.Loads | None = None, wear: Wear | None = None,
         breakage: Breakage | None = None,
     ) -> None:  # fmt: skip
         check_run(scene, method, loads, wear, breakage)
-        step = require_seconds(step, "step", least=SIMULATION.shortest_step)
+        step = motion.require_seconds(step, "step", least=SIMULATION.shortest_step)
         remedy = "give a positive number, say 1e-9"
-        tolerance = require_number_in(
+        tolerance = motion.require_number_in(
             tolerance, 0.0, inf, "tolerance", "Simulation", remedy, above=True
         )
         self.wear, self.breakage = wear, breakage
@@ -103,10 +84,10 @@ class Simulation:
         """What corners have lost; None without wear."""
         self.broken: list[Broken] = []
         """Grains that broke; by `fragment` at a tension of NaN."""
-        self.world, self.motion = make_world(scene)
+        self.world, self.motion = motion.make_world(scene)
         self.method, self.step, self.tolerance = method, step, tolerance
-        self.loads = None if loads is None else partial(check_loads, loads)
-        self.pace = Pace(step, step)
+        self.loads = None if loads is None else partial(motion.check_loads, loads)
+        self.pace = motion.Pace(step, step)
         """Step control of ``acceleration``, and its counts."""
         self.time = 0.0
         """Time since the start [s]."""
@@ -121,13 +102,13 @@ class Simulation:
         self.steps_cut_off = 0
         """Steps (at acceleration level collisions) whose collisions ran out of rounds: the rest was
         closed without restitution, which costs energy also at restitution 1."""
-        self.contacts: ContactForces = make_contact_forces(
+        self.contacts: ContactForces = motion.make_contact_forces(
             self.world.contacts(self.motion, 0.0)[np.zeros(0, np.int64)],
             np.zeros((0, scene.dim)), None, 1.0,
         )  # fmt: skip
         """Contacts of the last step and the forces in it."""
-        if not is_finite(self.world, self.motion):
-            raise explain_overflow(self.world, self.motion, None, 0.0, 0.0)
+        if not motion.is_finite(self.world, self.motion):
+            raise motion.explain_overflow(self.world, self.motion, None, 0.0, 0.0)
         self._refuse_overlap()
 
     def advance(self, seconds: float) -> None:
@@ -141,10 +122,10 @@ class Simulation:
         loads that are none, for a state or an energy that would not be finite, or for grains that
         break without end.
         """
-        seconds = require_seconds(seconds, "the time to go on")
-        if seconds / self.step > BOUNDS.steps:
+        seconds = motion.require_seconds(seconds, "the time to go on")
+        if seconds / self.step > motion.BOUNDS.steps:
             raise UsageError(
-                explain_step_limit("the time to go on", seconds / self.step),
+                motion.explain_step_limit("the time to go on", seconds / self.step),
                 remedy="go on for less, or give a longer step",
             )
         if seconds <= SIMULATION.time_round_off * self.step:
@@ -155,7 +136,7 @@ class Simulation:
                 return
             count = max(ceil(seconds / self.step - SIMULATION.time_round_off), 1)
             for _ in range(count):
-                parts = count_parts(self.world, self.motion, seconds / count)
+                parts = motion.count_parts(self.world, self.motion, seconds / count)
                 for _ in range(parts):
                     self._take_step(seconds / count / parts)
 
@@ -170,13 +151,13 @@ class Simulation:
         """
         last = len(self.motion.position) - 1
         remedy = f"give a whole number, 0 to {last}, as Scene.add returned it"
-        body = require_whole_in(body, 0, "the body", "fragment", remedy, last)
-        line = require_line(line, self.motion.dim)
+        body = motion.require_whole_in(body, 0, "the body", "fragment", remedy, last)
+        line = motion.require_line(line, self.motion.dim)
         scene = split_body(self.world.scene, self.motion, body, *line)
         return self._go_on_broken(scene, body, nan, nan)
 
-    def _go_on_broken(self, scene: Scene, body: int, tension: float, strength: float) -> int:
-        self.world, self.motion = make_world(scene)
+    def _go_on_broken(self, scene: motion.Scene, body: int, tension: float, strength: float) -> int:
+        self.world, self.motion = motion.make_world(scene)
         if self.worn is not None:
             self.worn = split_wear(self.worn, scene, body)
         whole = (self.contacts.body_a == body) | (self.contacts.body_b == body)
@@ -230,13 +211,15 @@ class Simulation:
             middle = self.world.move_freely(self.motion, h / 2)
             loads = self.loads(self.time + h / 2, middle)
         try:
-            made = step_moreau(
+            made = motion.step_moreau(
                 self.world, self.motion, loads, h, self.contacts, self.tolerance, SIMULATION.accept
             )
         except ProblemError as error:
-            raise explain_overflow(self.world, self.motion, loads, h, self.time, error) from error
-        if not is_finite(self.world, made.motion):
-            raise explain_overflow(self.world, self.motion, loads, h, self.time)
+            raise motion.explain_overflow(
+                self.world, self.motion, loads, h, self.time, error
+            ) from error
+        if not motion.is_finite(self.world, made.motion):
+            raise motion.explain_overflow(self.world, self.motion, loads, h, self.time)
         self._judge(made.residual, made.message)
         self.steps_scaled += made.scaled
         self.steps_cut_off += made.cut_off
@@ -245,7 +228,7 @@ class Simulation:
         self.steps += 1
         self._wear_and_break(before, h)
 
-    def _wear_and_break(self, before: Motion, h: float) -> None:
+    def _wear_and_break(self, before: motion.Motion, h: float) -> None:
         """What the forces of the last step do to the bodies (section 8, end, and section 10)."""
         if self.worn is not None and self.wear is not None:
             step_wear(self.worn, self.wear, self.contacts, before, self.motion, h)
@@ -257,7 +240,7 @@ class Simulation:
                     raise error.relocate(f"{error.where} at {self.time:.6g} s") from error
             if cut is not None:
                 scene, self.worn = cut
-                self.world, self.motion = make_world(scene)
+                self.world, self.motion = motion.make_world(scene)
         if self.breakage is not None and self.steps % self.breakage.every == 0:
             forces = self.unique_forces() if self.breakage.unique else self.contacts
             found = find_breaks(self.world.scene, self.motion, forces, self.breakage)
@@ -270,7 +253,7 @@ class Simulation:
                 refuse_dust(self.breakage, grains, len(self.broken), self.time)
 
     def _integrate(self, seconds: float) -> None:
-        self.motion, self.contacts = advance_runge_kutta(
+        self.motion, self.contacts = motion.advance_runge_kutta(
             self.world, self.motion, self.time, seconds, self.pace, self.loads, self.tolerance
         )
         self.time += seconds
@@ -314,7 +297,7 @@ def check_run(scene: Any, method: Any, loads: Any, wear: Any, breakage: Any) -> 
     """
     if method not in get_args(Method):
         raise UsageError(f"method is {method!r}", remedy="give 'time-stepping' or 'acceleration'")
-    if not isinstance(scene, Scene):
+    if not isinstance(scene, motion.Scene):
         raise SceneError(f"the scene is {scene!r}", remedy="give a rigid_lcp.Scene")
     for given, kind, what in ((wear, Wear, "wear"), (breakage, Breakage, "breakage")):
         if given is not None and not isinstance(given, kind):

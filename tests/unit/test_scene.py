@@ -88,7 +88,8 @@ def test_shipped_scenes_load_without_doubts() -> None:
 
 def test_new_names_the_verb_that_reads_the_scene() -> None:
     """`trackbed new` says which verb goes on: that whose reader takes the scene."""
-    from qdem_fem.scene.checks import GUIDE, Scene, read_scene
+    from qdem_fem.scene.checks import GUIDE, read_scene
+    from qdem_fem.tables import Scene
     from rigid_lcp.scene.file import load_scene as rigid_scene
 
     def check_qdem(path: Path) -> None:

@@ -364,7 +364,7 @@ FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         ("adapters.procedure.stages.save_state", "state.npz", []),
         ("adapters.procedure.stages.save_window", "states.npz", ["preparation"]),
         ("adapters.procedure.stages.save_state", "relaxed.npz", ["preparation", FIRST, SECOND]),
-        ("adapters.files.run_folder.write_whole", "outcome.json", []),
+        ("trackbed.run_files.write_whole", "outcome.json", []),
         ("adapters.engines.fake.write_dump", "states.dump", []),
     ],
 )
