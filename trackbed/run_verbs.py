@@ -16,16 +16,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from trackbed import run_files
 from trackbed.errors import UsageError
-from trackbed.run_files import (
-    MANIFEST,
-    RESULT,
-    is_written,
-    list_changed_tables,
-    read_object,
-    refuse_format,
-    refuse_links,
-)
 
 RUN_VERBS = ("status", "report", "export", "resume")
 
@@ -52,7 +44,7 @@ KINDS = (
 
 def find_kind(path: Path) -> Kind | None:
     """The kind of the run in a folder; None where there is no manifest to tell it by."""
-    manifest = read_object(path / MANIFEST) or {}
+    manifest = run_files.read_object(path / run_files.MANIFEST) or {}
     scene = manifest.get("scene")
     return find_scene_kind(scene) if isinstance(scene, dict) else None
 
@@ -68,7 +60,7 @@ def choose_command(arguments: argparse.Namespace) -> Callable[[argparse.Namespac
     if arguments.verb not in RUN_VERBS:
         return command
     refuse_no_run(arguments.run_folder)
-    refuse_links(arguments.run_folder)
+    run_files.refuse_links(arguments.run_folder)
     kind = find_kind(arguments.run_folder)
     if kind is None or not kind.states:
         return command
@@ -78,15 +70,17 @@ def choose_command(arguments: argparse.Namespace) -> Callable[[argparse.Namespac
 def refuse_no_run(path: Path) -> None:
     """Raise `UsageError` for a folder that is not there or holds no run, and say what is near."""
     if not path.is_dir():
-        near = [f"{one.parent}" for one in sorted(path.parent.glob(f"*/{MANIFEST}"))[:3]]
+        near = [f"{one.parent}" for one in sorted(path.parent.glob(f"*/{run_files.MANIFEST}"))[:3]]
         raise UsageError(
             "this is a file, not a run folder" if path.exists() else "there is no such folder",
             where=str(path), remedy=f"the runs beside it: {', '.join(near) or 'none'}",
         )  # fmt: skip
-    if (path / MANIFEST).exists():
+    if (path / run_files.MANIFEST).exists():
         return
-    runs = [str(one.parent) for one in sorted(path.glob(f"*/{MANIFEST}"))[:3]]
-    outer = next((one for one in path.absolute().parents if (one / MANIFEST).exists()), None)
+    runs = [str(one.parent) for one in sorted(path.glob(f"*/{run_files.MANIFEST}"))[:3]]
+    outer = next(
+        (one for one in path.absolute().parents if (one / run_files.MANIFEST).exists()), None
+    )
     if runs or outer:
         remedy = f"its runs: {', '.join(runs)}" if runs else f"it is a part of the run {outer}"
         raise UsageError("this is not a run folder", where=str(path), remedy=remedy)
@@ -94,15 +88,15 @@ def refuse_no_run(path: Path) -> None:
 
 def describe_run(path: Path, kind: Kind) -> dict[str, Any]:
     """How far a run is, by names that JSON and people read."""
-    manifest = read_object(path / MANIFEST) or {}
-    refuse_format(path, manifest)
-    summary = read_object(path / RESULT) or {}
+    manifest = run_files.read_object(path / run_files.MANIFEST) or {}
+    run_files.refuse_format(path, manifest)
+    summary = run_files.read_object(path / run_files.RESULT) or {}
     states = len(list(path.glob(kind.states)))
-    state = "running" if is_written(path) else "finished" if summary else "stopped"
+    state = "running" if run_files.is_written(path) else "finished" if summary else "stopped"
     said = {
         "run_folder": str(path), "kind": kind.verb, "title": manifest["scene"].get("title", ""),
         "state": state, "saved_states": states,
-        "damaged": ", ".join(list_changed_tables(path, summary)),
+        "damaged": ", ".join(run_files.list_changed_tables(path, summary)),
     }  # fmt: skip
     said |= {key: summary[key] for key in ("time", "steps") if key in summary}
     next_step = {

@@ -11,14 +11,8 @@ from html import escape
 from math import nan
 from pathlib import Path
 
+from adapters import procedure
 from adapters.files import explain_full_disk
-from adapters.procedure import (
-    AVERAGED,
-    Record,
-    describe_result,
-    list_jumped_spans,
-    read_run_record,
-)
 from adapters.report.control import describe_control
 from adapters.report.error import Comparison
 from adapters.report.figure import draw_settlement
@@ -50,7 +44,7 @@ def write_report(run_folder: Path) -> Path:
     Raises `UsageError` when ``run_folder`` is no run folder.  Only reads what finished stages
     left, so it may be called while the run goes on.
     """
-    record = read_run_record(run_folder)
+    record = procedure.read_run_record(run_folder)
     numbers = gather_numbers(record)
     with explain_full_disk(run_folder):
         figure = write_figure(record, numbers) if numbers.cycle else None
@@ -60,12 +54,12 @@ def write_report(run_folder: Path) -> Path:
     return run_folder / "report.html"
 
 
-def write_figure(record: Record, numbers: Numbers) -> Path:
+def write_figure(record: procedure.Record, numbers: Numbers) -> Path:
     """Draw the settlement; the picture's path."""
     folder = record.path / "figures"
     folder.mkdir(exist_ok=True)
     full = None if record.control is None else record.control.history
-    spans = list_jumped_spans(record.run.outcomes)
+    spans = procedure.list_jumped_spans(record.run.outcomes)
     found, title = numbers.settled, ""
     if found is not None and found.pairs:
         title = f"error {100 * found.error.value:+.1f} % at a speed-up of {found.speed_up:.2f}"
@@ -75,7 +69,7 @@ def write_figure(record: Record, numbers: Numbers) -> Path:
     )
 
 
-def list_sections(record: Record, numbers: Numbers, figure: Path | None) -> Iterator[str]:
+def list_sections(record: procedure.Record, numbers: Numbers, figure: Path | None) -> Iterator[str]:
     """All sections; those that the run has not reached are left out."""
     yield f'<h1>Settlement under cyclic load</h1><p class="scene">{escape(numbers.scene)}</p>'
     yield from _describe_claim(record, numbers)
@@ -98,7 +92,7 @@ def list_sections(record: Record, numbers: Numbers, figure: Path | None) -> Iter
     )
 
 
-def _describe_claim(record: Record, numbers: Numbers) -> Iterator[str]:
+def _describe_claim(record: procedure.Record, numbers: Numbers) -> Iterator[str]:
     """One falsifiable sentence, and where it fails."""
     row = numbers.row(PROCEDURE)
     full = numbers.row(FULL)
@@ -106,7 +100,7 @@ def _describe_claim(record: Record, numbers: Numbers) -> Iterator[str]:
         state = "is settled" if numbers.preparation else "is not settled yet"
         yield make_paragraph(f"The bed {state}; no load cycle has been computed.", "claim")
         return
-    grains, claim = map(escape, describe_result(record))
+    grains, claim = map(escape, procedure.describe_result(record))
     if not numbers.finished:
         claim = f"Unfinished, at cycle {numbers.cycle} of {numbers.total_cycles}: {claim}"
     yield make_paragraph(f"{claim}.", "claim")
@@ -144,7 +138,7 @@ def _describe_settlement(numbers: Numbers, figure: Path | None) -> str:
     return make_section("Settlement", make_picture(figure, "Settlement curve", caption))
 
 
-def _describe_members(record: Record, cycle: int) -> str:
+def _describe_members(record: procedure.Record, cycle: int) -> str:
     """Members, and the full runs beside them, at the cycle of the first."""
     definition = make_paragraph(
         "Member <i>m</i> goes on from the state after the first cycles with one grain moved by "
@@ -203,8 +197,8 @@ def _describe_error(numbers: Numbers) -> str:
         make_table(
             "Errors are signed and relative to the full run at the same cycle; of a settlement, "
             "to its gain since the state before the first jump. Coordination number "
-            f"(contacts with grains) and deflection are means over the last {AVERAGED} computed "
-            f"cycles. “{NOTHING}” is the full run after as many cycles as this run "
+            f"(contacts with grains) and deflection are means over the last {procedure.AVERAGED} "
+            f"computed cycles. “{NOTHING}” is the full run after as many cycles as this run "
             f"computed: the null hypothesis. “{FITTED}” extrapolates the full run's curve "
             "from there by the scene's law: a settlement, but no bed. E<sub>r</sub> of eq. 22 of "
             "the displacements since the state before the first jump: 1 is the error of leaving "

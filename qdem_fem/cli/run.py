@@ -50,17 +50,10 @@ def _run(
     prepared: Prepared, path: Path, arguments: argparse.Namespace, said: list[str]
 ) -> dict[str, Any]:
     """The whole run with its report; its summary.  ``said``: warnings so far."""
-    from qdem_fem.scene import (
-        RunFolder,
-        make_simulation,
-        run_dynamic,
-        run_static,
-        summarise_run,
-        write_report,
-    )
+    from qdem_fem import scene
     from trackbed.run_files import record_provenance, write_result
 
-    folder = RunFolder(path)
+    folder = scene.RunFolder(path)
     manifest = {
         "scene": prepared.scene.parameters(),
         "files": prepared.files,
@@ -70,14 +63,16 @@ def _run(
     given = {"resume": arguments.resume, "force": arguments.force}
     if finished := folder.look_ahead(manifest, **given):
         return finished | {"folder": str(path)}
-    run, bodies = make_simulation(prepared)  # what it refuses must not leave a folder behind
+    run, bodies = scene.make_simulation(prepared)  # what it refuses must not leave a folder behind
     with folder.lock():
         goes_on = folder.prepare(manifest, prepared.text.text, **given)
         if prepared.scene.simulation.method == "static":
-            done = run_static(prepared, run, bodies, folder)
+            done = scene.run_static(prepared, run, bodies, folder)
         else:
-            done = run_dynamic(prepared, run, bodies, folder, resume=goes_on, progress=Progress())
-        summary = summarise_run(prepared, done, folder) | {"warnings": said}
+            done = scene.run_dynamic(
+                prepared, run, bodies, folder, resume=goes_on, progress=Progress()
+            )
+        summary = scene.summarise_run(prepared, done, folder) | {"warnings": said}
         more: Iterable[tuple[Path, str]] = ()
         if "track" in prepared.text.data:  # other scenes do not pay for its import
             from qdem_fem.report import draw_track_pictures, list_track_facts
@@ -87,7 +82,7 @@ def _run(
             summary["track"] = list_track_facts(path, prepared.load)
             summary["bed"] = prepared.trial
             more = draw_track_pictures(path, prepared.load)
-        write_report(folder, manifest, summary, None if arguments.no_pictures else done, more)
+        scene.write_report(folder, manifest, summary, None if arguments.no_pictures else done, more)
         write_result(path, summary)
     return summary | {"folder": str(path)}
 
@@ -100,15 +95,8 @@ def _show_warning(said: list[str], message: Warning | str, *_args: Any, **_optio
 
 def _preview_run(prepared: Prepared) -> dict[str, Any]:
     """What a run would be: bodies, steps, and the cost as a short trial tells it."""
+    from qdem_fem import scene
     from qdem_fem.files import StepWarning
-    from qdem_fem.scene import (
-        describe_critical_step,
-        list_body_facts,
-        list_mass_scaling_facts,
-        make_plan,
-        make_simulation,
-        warn_of_bending,
-    )
 
     outlook: dict[str, Any] = {
         "title": prepared.scene.title,
@@ -121,15 +109,15 @@ def _preview_run(prepared: Prepared) -> dict[str, Any]:
         assert isinstance(prepared, TrackPrepared)
         if bed := preview_bed(prepared):  # what follows it is known when it stands
             return outlook | {"bed": bed}
-    run, bodies = make_simulation(prepared)
-    warn_of_bending(bodies)
+    run, bodies = scene.make_simulation(prepared)
+    scene.warn_of_bending(bodies)
     outlook |= {
-        "bodies": list_body_facts(bodies),
-        "critical_step": describe_critical_step(run),
-        "mass_scaling": list_mass_scaling_facts(run),
+        "bodies": scene.list_body_facts(bodies),
+        "critical_step": scene.describe_critical_step(run),
+        "mass_scaling": scene.list_mass_scaling_facts(run),
     }
     if prepared.scene.simulation.method == "dynamic":
-        plan = make_plan(prepared, float(run.step))
+        plan = scene.make_plan(prepared, float(run.step))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", StepWarning)  # the outlook has its text
             seconds = time_step(run.advance, float(run.step), plan.total)

@@ -81,25 +81,18 @@ def make_grain_file(arguments: argparse.Namespace) -> int:
 def make_train_file(arguments: argparse.Namespace) -> int:
     """Write the made-up record of a passing train."""
     from qdem_fem.files import UsageError
-    from qdem_fem.track.loads import (
-        Roughness,
-        Track,
-        Train,
-        WheelFlat,
-        make_train_record,
-        write_load_record,
-    )
+    from qdem_fem.track import loads
 
     _refuse_name(arguments.out, ".csv")
-    train = Train(**_select_given(arguments, "cars", "speed", "axle_load", "first_share"))
-    track, rough = Track(**_select_given(arguments, "modulus")), None
+    train = loads.Train(**_select_given(arguments, "cars", "speed", "axle_load", "first_share"))
+    track, rough = loads.Track(**_select_given(arguments, "modulus")), None
     if arguments.roughness is not None:
-        rough = Roughness(arguments.roughness, **_select_given(arguments, "seed"))
+        rough = loads.Roughness(arguments.roughness, **_select_given(arguments, "seed"))
     elif arguments.seed is not None:
         raise UsageError("--seed is that of a roughness", remedy="give --roughness, too")
-    flats = [WheelFlat(axle, peak, duration) for axle, peak, duration in arguments.flat]
-    record = make_train_record(train, track, arguments.area, flats, roughness=rough)
-    write_load_record(arguments.out, record)
+    flats = [loads.WheelFlat(axle, peak, duration) for axle, peak, duration in arguments.flat]
+    record = loads.make_train_record(train, track, arguments.area, flats, roughness=rough)
+    loads.write_load_record(arguments.out, record)
     print(f"{arguments.out}: {record.time[-1]:.3f} s at {record.rate:g} Hz")
     return 0
 

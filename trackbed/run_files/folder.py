@@ -18,13 +18,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from trackbed.errors import UsageError
-from trackbed.run_files.whole import (
-    digest_file,
-    open_unlinked,
-    read_object,
-    refuse_writing,
-    write_whole,
-)
+from trackbed.run_files import whole
 
 MANIFEST, RESULT = "manifest.json", "result.json"
 TABLES = "*.csv"
@@ -82,10 +76,10 @@ def lock_folder(path: Path, name: str = ".lock") -> Iterator[os.stat_result]:
     Raises `UsageError` when another process has it, when there is a symbolic link, or when the
     folder can not be written, and `DiskFull` when there is no room.
     """
-    with refuse_writing(path):
+    with whole.refuse_writing(path):
         path.mkdir(parents=True, exist_ok=True)
     refuse_links(path)
-    with refuse_writing(path):
+    with whole.refuse_writing(path):
         flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
         stream = os.open(path / name, flags, 0o666)
     try:
@@ -102,7 +96,7 @@ def lock_folder(path: Path, name: str = ".lock") -> Iterator[os.stat_result]:
                 f"the disk of this folder has no locks ({error.strerror})", where=str(path),
                 remedy="give a folder on another disk: without a lock two runs could mix",
             ) from error  # fmt: skip
-        with refuse_writing(path):
+        with whole.refuse_writing(path):
             os.truncate(stream, 0)
             os.write(stream, f"pid {os.getpid()} on {socket.gethostname()}".encode())
             for leftover in path.glob(".*.partial"):  # of a killed writer
@@ -120,7 +114,7 @@ def is_written(path: Path, name: str = ".lock") -> bool:
     for its instant, a writer that starts.
     """
     try:
-        with open_unlinked(path / name, "rb") as stream:
+        with whole.open_unlinked(path / name, "rb") as stream:
             owner = stream.read(200).decode(errors="replace").strip()
             holder = re.fullmatch(r"pid (\d+) on (.+)", owner)
             here = holder is not None and holder[2] == socket.gethostname()
@@ -154,7 +148,7 @@ class RunFolder:
     @property
     def summary(self) -> dict[str, Any] | None:
         """What the run came to; None where it has not come to its end, report and all."""
-        return read_object(self.path / RESULT) or None
+        return whole.read_object(self.path / RESULT) or None
 
     @contextmanager
     def lock(self) -> Iterator[None]:
@@ -191,13 +185,13 @@ class RunFolder:
         """
         if self._judge(manifest, resume=resume, force=force):
             return True
-        with refuse_writing(self.path):
+        with whole.refuse_writing(self.path):
             for pattern in self.own:
                 for path in self.path.glob(pattern):
                     path.unlink()
-        write_whole(self.path / "scene.toml", scene)
+        whole.write_whole(self.path / "scene.toml", scene)
         content = {"format": FORMAT, **manifest}
-        write_whole(self.path / MANIFEST, json.dumps(content, indent=1) + "\n")
+        whole.write_whole(self.path / MANIFEST, json.dumps(content, indent=1) + "\n")
         return False
 
     def look_ahead(
@@ -211,7 +205,7 @@ class RunFolder:
             return self.summary if self._judge(manifest, resume=resume, force=force) else None
 
     def _judge(self, manifest: Mapping[str, Any], *, resume: bool, force: bool) -> bool:
-        there = read_object(self.path / MANIFEST)
+        there = whole.read_object(self.path / MANIFEST)
         if there is None:
             self._refuse_strangers()
             if any(self.path.glob(self.states) if self.states else ()):
@@ -276,13 +270,13 @@ def _shorten(value: Any) -> str:
 
 def write_result(path: Path, summary: dict[str, Any]) -> None:
     """Write the ``summary`` of a finished run in a folder, with digests of its tables."""
-    digests = {one.name: digest_file(one) for one in sorted(path.glob(TABLES))}
-    write_whole(path / RESULT, json.dumps(summary | {"digests": digests}, indent=1) + "\n")
+    digests = {one.name: whole.digest_file(one) for one in sorted(path.glob(TABLES))}
+    whole.write_whole(path / RESULT, json.dumps(summary | {"digests": digests}, indent=1) + "\n")
 
 
 def list_changed_tables(path: Path, summary: dict[str, Any]) -> list[str]:
     """Tables of the run in ``path`` that are not as they were when its ``summary`` was written."""
     known = summary.get("digests")
-    now = {one.name: digest_file(one) for one in path.glob(TABLES) if one.is_file()}
+    now = {one.name: whole.digest_file(one) for one in path.glob(TABLES) if one.is_file()}
     kept = known.items() if isinstance(known, dict) else ()
     return [str(name) for name, digest in kept if now.get(name) != digest]
