@@ -8,7 +8,6 @@ from collections.abc import Callable
 
 from numpy.random import Generator
 
-from rigid_lcp.shapes.disc import Disc
 from rigid_lcp.shapes.half_space import HalfSpace
 from rigid_lcp.shapes.numbers import require_real, require_vector
 from rigid_lcp.shapes.polygon import Polygon
@@ -24,7 +23,7 @@ from rigid_lcp.shapes.rotations import (
     rotate_back,
     turn_quaternion,
 )
-from rigid_lcp.shapes.sphere import Sphere
+from rigid_lcp.shapes.round_grains import Disc, Sphere
 from trackbed.choices import find_choice
 
 __all__ = [

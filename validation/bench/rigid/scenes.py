@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rigid_lcp.motion.state import Motion
 from rigid_lcp.motion.world import Scene
 from rigid_lcp.scene.simulation import Method, Simulation
-from rigid_lcp.shapes.disc import Disc
+from rigid_lcp.shapes import Disc
 from rigid_lcp.shapes.half_space import HalfSpace
 from rigid_lcp.shapes.polygon import Polygon
 

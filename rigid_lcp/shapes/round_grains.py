@@ -1,8 +1,9 @@
-"""Spheres: round grains in space."""
+"""Round grains: discs in the plane and spheres in space."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import pi
 
 import numpy as np
 
@@ -11,14 +12,14 @@ from rigid_lcp.shapes.numbers import require_length
 
 
 @dataclass(frozen=True)
-class Sphere:
-    """A sphere of the given radius [m].  Raises `ShapeError` unless the radius is positive."""
+class RoundGrain:
+    """A grain of ``radius`` [m].  Raises `ShapeError` for a radius that is not positive."""
 
     radius: float
-    dim = 3
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "radius", require_length(self.radius, "radius", "sphere"))
+        kind = type(self).__name__.lower()
+        object.__setattr__(self, "radius", require_length(self.radius, "radius", kind))
 
     @property
     def reach(self) -> float:
@@ -29,6 +30,23 @@ class Sphere:
     def width(self) -> float:
         """Diameter [m]."""
         return 2 * self.radius
+
+
+class Disc(RoundGrain):
+    """Disc of ``radius`` [m]."""
+
+    dim = 2
+
+    def mass_properties(self, density: float) -> tuple[float, float]:
+        """Mass [kg] and moment of inertia [kg m^2] at ``density`` [kg/m^2]."""
+        mass = density * (pi * self.radius**2)
+        return mass, mass * self.radius**2 / 2
+
+
+class Sphere(RoundGrain):
+    """Sphere of ``radius`` [m]."""
+
+    dim = 3
 
     def mass_properties(self, density: float) -> tuple[float, Floats]:
         """Mass [kg] and inertia tensor (3, 3) [kg m^2] at ``density`` [kg/m^3]."""
