@@ -92,16 +92,6 @@ def find_normal_force(
     return 4 / 3 * modulus * np.sqrt(radius) * np.maximum(overlap, 0.0) ** 1.5
 
 
-def find_normal_stiffness(
-    overlap: float | FloatArray, modulus: float, radius: float | FloatArray
-) -> FloatArray:
-    """Tangent stiffness S_n = dF_n/d delta = 2 E* sqrt(R* delta) [N/m]; zero without overlap.
-
-    ``overlap`` delta [m], ``modulus`` E* [Pa], ``radius`` R* [m]; arrays broadcast.
-    """
-    return 2 * modulus * np.sqrt(radius * np.maximum(overlap, 0.0))
-
-
 def find_tangential_stiffness(
     overlap: float | FloatArray, shear: float, radius: float | FloatArray
 ) -> FloatArray:

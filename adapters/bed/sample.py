@@ -105,18 +105,15 @@ def measure_volume_below(position: FloatArray, radius: FloatArray, height: float
 
 
 def measure_relative_density(
-    position: FloatArray, radius: FloatArray, container: Container, height: float,
-    bottom: float = 0.0,
-) -> float:  # fmt: skip
-    """Share of the container's volume between ``bottom`` and ``height`` [m] that grains fill.
+    position: FloatArray, radius: FloatArray, container: Container, height: float
+) -> float:
+    """Share of the container's volume below ``height`` [m] that grains fill.
 
     ``position`` [m], shape (n, 3); ``radius`` [m], shape (n,).  Exact for grains within the walls;
     the overlap of two grains counts twice (a part in 1e8 of a bed of stiff grains).
     """
-    volume = measure_volume_below(position, radius, height) - measure_volume_below(
-        position, radius, bottom
-    )
-    return volume / (container.area * (height - bottom))
+    below, outside = (measure_volume_below(position, radius, z) for z in (height, 0.0))
+    return (below - outside) / (container.area * height)
 
 
 def measure_bed_height(position: FloatArray, radius: FloatArray) -> float:

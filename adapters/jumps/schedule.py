@@ -10,17 +10,13 @@ from __future__ import annotations
 import numpy as np
 
 
-def schedule_jumps(
-    jumps: int, last: int, k_i: int, window: int, healing: int, growing: bool = True
-) -> list[int]:
+def schedule_jumps(jumps: int, last: int, k_i: int, window: int, healing: int) -> list[int]:
     """Cycles h of each of so many jumps, that the last window ends at cycle ``last``.
 
     From k_i a ``window``; behind each jump ``healing`` cycles and a window.  Ends of windows are
-    evenly spaced in ln N where jumps are ``growing``, else in N.  ValueError where the first jump
-    is of no cycle.
+    evenly spaced in ln N.  ValueError where the first jump is of no cycle.
     """
-    spaced = np.geomspace if growing else np.linspace
-    ends = np.rint(spaced(k_i + window, max(last, 1), jumps + 1)).astype(int)
+    ends = np.rint(np.geomspace(k_i + window, max(last, 1), jumps + 1)).astype(int)
     lengths = np.diff(ends) - healing - window
     if lengths.min() < 1:
         raise ValueError(f"{jumps} jumps to cycle {last} begin with one of no cycle")

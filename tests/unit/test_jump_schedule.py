@@ -1,4 +1,4 @@
-"""Schedules of jumps: they end where they are to, evenly in ln N or in N."""
+"""Schedules of jumps: they end where they are to, evenly in ln N."""
 
 from __future__ import annotations
 
@@ -21,24 +21,23 @@ def test_growing_jumps_have_one_ratio(jumps: int) -> None:
 
 
 def test_jumps_without_room_are_refused() -> None:
-    for growing in (True, False):
-        with pytest.raises(ValueError, match="no cycle"):
-            schedule_jumps(40, 1_000, 100, 20, 5, growing)
+    with pytest.raises(ValueError, match="no cycle"):
+        schedule_jumps(40, 1_000, 100, 20, 5)
     with pytest.raises(ValueError, match="no cycle"):
         schedule_jumps(1, 0, 100, 20, 5)
 
 
 @given(
     st.integers(1, 40), st.integers(2, 1_000_000), st.integers(1, 1000), st.integers(2, 100),
-    st.integers(0, 20), st.booleans(),
+    st.integers(0, 20),
 )  # fmt: skip
 def test_any_schedule_ends_at_the_last_cycle(
-    jumps: int, last: int, k_i: int, window: int, healing: int, growing: bool
+    jumps: int, last: int, k_i: int, window: int, healing: int
 ) -> None:
     """k_i, a window, and of each jump h, healing and a window; growing ones never shrink by more
     than rounding."""
     try:
-        lengths = schedule_jumps(jumps, last, k_i, window, healing, growing)
+        lengths = schedule_jumps(jumps, last, k_i, window, healing)
     except ValueError:
         return
     assert len(lengths) == jumps
