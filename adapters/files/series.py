@@ -61,13 +61,11 @@ def read_series(
             where=str(tables[0]),
             remedy="give one CSV file, or one run folder, or dumps",
         )
+    path = paths[0]
+    if unit not in (None, "m") and (path.is_dir() or not tables):
+        whose = "a run's settlement is" if tables else "dumps are"
+        raise UsageError(f"{whose} in m, not in {unit}", where=str(path), remedy="leave --unit out")
     if tables:
-        path = tables[0]
-        if path.is_dir() and unit not in (None, "m"):
-            raise UsageError(
-                f"a run's settlement is in m, not in {unit}", where=str(path),
-                remedy="leave --unit out",
-            )  # fmt: skip
         table = path / "settlement.csv" if path.is_dir() else path
         if path.is_dir() and (kind := find_kind(path)) and kind.states:
             raise UsageError(
@@ -83,14 +81,10 @@ def read_series(
         return replace(read_table_series(table, columns, unit), where=str(table))
     if columns:
         raise UsageError(
-            "dumps have no columns of cycles and settlement", where=str(paths[0]),
+            "dumps have no columns of cycles and settlement", where=str(path),
             remedy=f"leave --columns out; tables are named {', '.join(SUFFIXES)}",
         )  # fmt: skip
-    if unit not in (None, "m"):
-        raise UsageError(
-            f"dumps are in m, not in {unit}", where=str(paths[0]), remedy="leave --unit out"
-        )
-    return replace(read_dump_series(paths, steps_per_cycle), where=str(paths[0]))
+    return replace(read_dump_series(paths, steps_per_cycle), where=str(path))
 
 
 def read_dump_series(paths: Sequence[Path], steps_per_cycle: float | None = None) -> Series:

@@ -58,9 +58,7 @@ def write_state_file(state: State, path: Path) -> None:
     if path.suffix == ".npz":
         save_state(state, path)
         return
-    columns = tuple(
-        ["id", "x", "y", "z", "vx", "vy", "vz", "omegax", "omegay", "omegaz", "radius", "mass"]
-    )
+    columns = ("id", *"xyz", "vx", "vy", "vz", "omegax", "omegay", "omegaz", "radius", "mass")
     values = np.column_stack(
         [state.identifier, state.position, state.velocity, state.spin, state.radius, state.mass]
     )
