@@ -37,10 +37,10 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--fail-at", type=float, metavar="S",
-        help="settlement or strain of failure, in the series' unit, of either sign: a series or a "
-        "prediction that reaches it is refused as collapse (exit code 6); failure_excluded in the "
-        "JSON: the band (of --probability, 90 %% at least) does not reach it, where the regime is "
-        "steady or shakedown and the prediction at most ten times ahead",
+        help="settlement or strain of failure, above zero, in the series' unit: a series or a "
+        "prediction that reaches it, up or down, is refused as collapse (exit code 6); "
+        "failure_excluded in the JSON: the band (of --probability, 90 %% at least) does not reach "
+        "it, where the regime is steady or shakedown and the prediction at most ten times ahead",
     )  # fmt: skip
     parser.add_argument(
         "--to-cycle", type=float, metavar="N", help="cycle to predict; default: the last one given"

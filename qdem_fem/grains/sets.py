@@ -21,7 +21,7 @@ from qdem_fem.grains.meshing import make_grain_tetrahedra
 from qdem_fem.grains.sieve import find_sieve_size
 from qdem_fem.mesh import TetMesh
 from trackbed.choices import find_choice
-from trackbed.memory import refuse_more_memory
+from trackbed.memory import read_arrays, refuse_more_memory
 from trackbed.run_files import write_whole
 
 GRAINS_FORMAT = 1
@@ -123,10 +123,9 @@ def load_grains(path: str | os.PathLike[str]) -> GrainSet:
     where = f"grains {os.fspath(path)!r}"
     remedy = "give a file that save_grains or trackbed grains wrote"
     try:
-        with open(path, "rb") as stream, np.load(stream, allow_pickle=False) as file:
-            number = int(file["format"])
-            corners = file["corners"].astype(np.int64)
-            nodes, faces, shape = file["nodes"], file["corner_faces"], file["shape"]
+        file = read_arrays(Path(path))
+        number, corners = int(file["format"]), file["corners"].astype(np.int64)
+        nodes, faces, shape = file["nodes"], file["corner_faces"], file["shape"]
     except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
         raise MeshError(f"not a set of grains ({error})", where=where, remedy=remedy) from error
     total, count = corners.sum(), len(corners)

@@ -11,6 +11,7 @@ import pytest
 
 from adapters.bed.state import load_state
 from adapters.errors import UsageError
+from qdem_fem.grains.sets import load_grains
 from rigid_lcp.errors import ProblemError
 from rigid_lcp.friction.files.formats import read_problem
 from tests.small_bed import small_bed
@@ -28,8 +29,9 @@ def test_memory_is_what_the_system_says() -> None:
 
 @pytest.mark.parametrize(
     ("read", "error"),
-    [(read_arrays, MemoryError), (load_state, UsageError), (read_problem, ProblemError)],
-)
+    [(read_arrays, MemoryError), (load_grains, MemoryError), (load_state, UsageError),
+     (read_problem, ProblemError)],
+)  # fmt: skip
 def test_packed_arrays_are_measured_before_they_are_unpacked(
     read: Callable[[Path], Any], error: type[Exception],
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
