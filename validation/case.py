@@ -14,7 +14,6 @@ from pkgutil import iter_modules
 from typing import Any
 
 from adapters.errors import UsageError
-from trackbed.scene_files.reader import suggest_word
 from validation import cases
 from validation.age import describe_age
 from validation.study import find_record, import_part, list_studies, read_record
@@ -90,6 +89,8 @@ def load_case(name: str) -> Callable[[bool], list[Check]]:
         return run
     if name in list_studies():
         return partial(judge_study, name)
+    from trackbed.scene_files.reader import suggest_word  # pydantic, which no case on a GPU needs
+
     known = suggest_word(name, list_cases())
     raise UsageError(f"there is no validation case {name}{known}")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -83,3 +84,42 @@ def test_missing_library_is_said_with_its_remedy(monkeypatch: pytest.MonkeyPatch
 
 
 CONCRETE = q.Material(young=45e9, poisson=0.167, density=2350.0)
+
+
+ACCEPTANCE = r"""
+import sys, tempfile
+from pathlib import Path
+
+class Bare:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in ("pydantic", "pydantic_core", "meshio", "skfem", "matplotlib"):
+            raise ModuleNotFoundError(name)
+
+sys.meta_path.insert(0, Bare())
+from validation.case import Check
+from validation.cases.qdem_gpu import compare_two, set_conditions
+from validation.gpu_acceptance import run_stages
+
+def twin():
+    return [Check("twin", compare_two("finger", "float64", False, set_conditions), "<= 1", True)]
+
+with tempfile.TemporaryDirectory() as folder:
+    record = Path(folder) / "record.jsonl"
+    stages = {"twin": twin, "broken": lambda: 1 / 0, "late": twin}
+    assert not run_stages(stages, record, 9.0)
+    rows = record.read_text().splitlines()
+    assert '"value"' in rows[0] and "ZeroDivisionError" in rows[1] and '"value"' in rows[2]
+    assert run_stages({"late": twin}, record, -1.0)
+    assert "skipped" in record.read_text().splitlines()[3]
+"""
+
+
+@pytest.mark.long
+def test_the_acceptance_of_a_gpu_needs_no_other_package() -> None:
+    """In numba's simulator, as on a machine that has numba, NumPy and SciPy alone; a stage that
+    fails is named, and the next one goes on."""
+    variables = os.environ | {"NUMBA_ENABLE_CUDASIM": "1", "NUMBA_NUM_THREADS": "1"}
+    run = subprocess.run(
+        [sys.executable, "-c", ACCEPTANCE], cwd=ROOT, env=variables, capture_output=True, text=True
+    )
+    assert run.returncode == 0, run.stderr
