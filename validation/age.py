@@ -1,9 +1,9 @@
 """Which parts of a study's record are older than the code that they measure.
 
 A study names that code in ``ROOMS`` of its ``__init__.py``, as ``"adapters: bed laws.fit"``.  A row
-keeps a digest of each room (or module) as it was when the row was measured; docstrings, comments
-and layout are in no digest.  ``older.toml`` lists studies that cannot be measured again now, and
-why.
+keeps a digest of each room (or module) as it was when the row was measured; docstrings, comments,
+layout and ways to import a name are in no digest.  ``older.toml`` lists studies that cannot be
+measured again now, and why.
 """
 
 from __future__ import annotations
@@ -15,28 +15,56 @@ from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib import import_module
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 ROOT = Path(__file__).parents[1]
 
 
-def list_content(node: object) -> object:
-    """What runs of a syntax tree, as nested lists; the same for every version of Python."""
+def list_content(node: object, names: Mapping[str, str] = MappingProxyType({})) -> object:
+    """What runs of a syntax tree, as nested lists; the same for every version of Python.
+
+    ``names``: what imported names stand for, so that ``from a import b`` and ``a.b`` are alike.
+    """
     if isinstance(node, list):
-        return [list_content(one) for one in node if not is_docstring(one)]
+        return [list_content(one, names) for one in node if not is_no_code(one)]
     if not isinstance(node, ast.AST):
         return repr(node)
+    if whole := find_whole_name(node, names):
+        return ["Name", whole]
     fields = [
-        [name, list_content(value)]
+        [name, list_content(value, names)]
         for name, value in ast.iter_fields(node)
         if value not in (None, [])
     ]
     return [type(node).__name__, *fields]
 
 
-def is_docstring(node: object) -> bool:
-    """Whether a statement is a string alone."""
-    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+def find_whole_name(node: ast.AST, names: Mapping[str, str]) -> str:
+    """``a.b.c`` of a name, or of attributes of a name, that was imported; else empty."""
+    if isinstance(node, ast.Name):
+        return names.get(node.id, "")
+    if isinstance(node, ast.Attribute) and (whole := find_whole_name(node.value, names)):
+        return f"{whole}.{node.attr}"
+    return ""
+
+
+def list_imports(tree: ast.AST) -> dict[str, str]:
+    """What each name that a file imports stands for."""
+    found: dict[str, str] = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom):
+            found |= {one.asname or one.name: f"{node.module}.{one.name}" for one in node.names}
+        elif isinstance(node, ast.Import):
+            found |= {one.asname: one.name for one in node.names if one.asname}
+    return found
+
+
+def is_no_code(node: object) -> bool:
+    """Whether a statement is a string alone, or an import."""
+    return isinstance(node, (ast.Import, ast.ImportFrom)) or (
+        isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+    )
 
 
 @cache
@@ -44,7 +72,8 @@ def digest_room(room: str) -> str:
     """Twelve digits that change with the code of a package, rooms inside counted, or a module."""
     path = ROOT.joinpath(*room.split("."))
     files = sorted(path.rglob("*.py")) if path.is_dir() else [path.with_suffix(".py")]
-    content = [list_content(ast.parse(file.read_text(encoding="utf-8"))) for file in files]
+    trees = [ast.parse(file.read_text(encoding="utf-8")) for file in files]
+    content = [list_content(tree, list_imports(tree)) for tree in trees]
     return hashlib.sha256(repr(content).encode()).hexdigest()[:12]
 
 

@@ -6,7 +6,14 @@ import ast
 
 import pytest
 
-from validation.age import describe_age, digest_rooms, excuse_page, list_content, list_excuses
+from validation.age import (
+    describe_age,
+    digest_rooms,
+    excuse_page,
+    list_content,
+    list_excuses,
+    list_imports,
+)
 from validation.study import DOCS, find_record, list_studies, read_record
 
 pytestmark = pytest.mark.studies
@@ -35,6 +42,17 @@ def test_wording_and_layout_age_nothing_and_code_does() -> None:
     assert read(CODE.replace("Twice", "Double").replace("2 * a", "(2 *\n  a)  # why")) == plain
     for other in ("3 * a", "2.0 * a", "False * a", "2 + a", "2 * b"):
         assert read(CODE.replace("2 * a", other)) != plain
+
+
+def test_ways_to_import_a_name_age_nothing_and_another_name_does() -> None:
+    def read(code: str) -> object:
+        tree = ast.parse(code)
+        return list_content(tree, list_imports(tree))
+
+    plain = read("from a.b import c\nx = c(1)")
+    assert read("from a import b\nx = b.c(1)") == read("import a.b as d\nx = d.c(1)") == plain
+    for other in ("from a.b import d\nx = d(1)", "x = c(1)", "from a import b\nx = b.c.d(1)"):
+        assert read(other) != plain
 
 
 def test_age_names_parts_and_rooms() -> None:
