@@ -1,4 +1,4 @@
-"""A run in the formats of other tools: VTU for ParaView, dumps for OVITO, CSV.
+"""A run in the formats of other tools: VTU for ParaView, dumps for OVITO, CSV for everything else.
 
 A file holds what the scene names: without friction there is no tangential force, without load
 cycles no displacement and no piston.  Cycles inside a jump have no state, only its end has.
@@ -6,13 +6,155 @@ cycles no displacement and no piston.  Cycles inside a jump have no state, only 
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
+import numpy as np
+
+from adapters.bed import FloatArray, IntArray
+from adapters.engines import bound_section
 from adapters.errors import UsageError
-from adapters.export.instants import ExportedRun
-from adapters.export.meshes import export_vtu
-from adapters.export.tables import export_csv, export_ovito
-from adapters.files import explain_full_disk
+from adapters.export.fields import (
+    Array,
+    gather_contacts,
+    gather_grains,
+    gather_placed_grains,
+    list_contacts,
+    split_columns,
+)
+from adapters.export.instants import ExportedRun, Instant
+from adapters.files import Frame, Kind, explain_full_disk, write_dump
+from trackbed.run_files import replace_file, write_pvd
+
+ENGINE_NAME = {"velocity": "v"}
+"""Field -> its name in a dump, where engines and OVITO have a shorter one."""
+
+
+def export_vtu(run: ExportedRun, into: Path, every: int) -> list[Path]:
+    """``grains.pvd`` and ``contacts.pvd``, series over the cycles, and their files in ``vtu/``.
+
+    Grains are points with `gather_grains`; contacts are lines from centre to centre with
+    `gather_contacts`.
+    """
+    (into / "vtu").mkdir(exist_ok=True)
+    grains, contacts = [], []
+    for instant in run.instants(every):
+        grains.append((instant.cycle, f"vtu/grains_{instant.cycle:06d}.vtu"))
+        contacts.append((instant.cycle, f"vtu/contacts_{instant.cycle:06d}.vtu"))
+        centres = instant.state.position
+        points = np.arange(len(centres))[:, None]
+        of_grains = gather_grains(run, instant)
+        write_mesh(into / grains[-1][1], centres, "vertex", points, point_data=of_grains)
+        of_contacts = gather_contacts(run, instant)
+        lines = list_contacts(instant)
+        write_mesh(into / contacts[-1][1], centres, "line", lines, cell_data=of_contacts)
+    write_pvd(into / "grains.pvd", grains)
+    write_pvd(into / "contacts.pvd", contacts)
+    files = [into / name for _, name in (*grains, *contacts)]
+    return [into / "grains.pvd", into / "contacts.pvd", *files]
+
+
+def write_mesh(
+    path: Path, points: FloatArray, kind: str, cells: IntArray,
+    point_data: Mapping[str, Array] | None = None, cell_data: Mapping[str, Array] | None = None,
+) -> None:  # fmt: skip
+    """Write points [m], shape (n, 3), and cells of one kind by meshio, binary and not packed."""
+    import meshio
+
+    of_cells = {name: [values] for name, values in (cell_data or {}).items()}
+    mesh = meshio.Mesh(points, [(kind, cells)], dict(point_data or {}), of_cells)
+    with replace_file(path) as temporary:
+        mesh.write(temporary, file_format="vtu", compression=None)
+
+
+def export_ovito(run: ExportedRun, into: Path, every: int) -> list[Path]:
+    """``grains.dump`` and ``contacts.dump``: text dumps whose time step is the number of cycles.
+
+    OVITO knows every column of the grains by its name.  Its modifier "Load trajectory" takes the
+    contacts for bonds when it is set that the first two columns are "Particle Identifiers"; the
+    forces are magnitudes there, as a bond's colour and width ask for.
+    """
+    box = _find_box(run)
+
+    def make_grain_frames() -> Iterator[Frame]:
+        for instant in run.instants(every):
+            fields = gather_placed_grains(run, instant)
+            named = {ENGINE_NAME.get(name, name): values for name, values in fields.items()}
+            yield _make_frame(instant, dict(split_columns(named, "")), box, "atoms")
+
+    def make_contact_frames() -> Iterator[Frame]:
+        for instant in run.instants(every):
+            yield _make_frame(instant, _gather_contact_columns(run, instant), box, "entries")
+
+    write_dump(into / "grains.dump", make_grain_frames())
+    write_dump(into / "contacts.dump", make_contact_frames())
+    return [into / "grains.dump", into / "contacts.dump"]
+
+
+def _gather_contact_columns(run: ExportedRun, instant: Instant) -> dict[str, Array]:
+    fields = gather_contacts(run, instant)
+    if run.frictional:
+        fields["tangential_force"] = np.linalg.norm(fields["tangential_force"], axis=1)
+    first, second = instant.state.contacts.pair.T
+    return {"id1": first, "id2": second, **fields}
+
+
+def _make_frame(
+    instant: Instant, columns: Mapping[str, Array], box: FloatArray, kind: Kind
+) -> Frame:
+    values = np.column_stack([*columns.values()]).astype(float)
+    return Frame(instant.cycle, tuple(columns), values, box, kind)
+
+
+def _find_box(run: ExportedRun) -> FloatArray:
+    """Low and high of the container, up to the settled bed's top [m], shape (3, 2)."""
+    start = run.track.start()
+    low, high = bound_section(run.scene.container)
+    top = float((start.position[:, 2] + start.radius).max())
+    return np.array([*zip(low, high, strict=True), (0.0, top)])
+
+
+def export_csv(run: ExportedRun, into: Path, every: int) -> list[Path]:
+    """``grains.csv``, ``contacts.csv`` and ``piston.csv``: long tables, a column ``cycle`` first.
+
+    SI units; every number is written so that it reads back the same.  ``settlement.csv`` of the
+    run folder has a row a cycle already.  The piston's table holds all its samples.
+    """
+
+    def list_grain_columns() -> Iterator[dict[str, Array]]:
+        for instant in run.instants(every):
+            fields = split_columns(gather_placed_grains(run, instant), "_")
+            yield _add_cycle(instant, dict(fields))
+
+    def list_contact_columns() -> Iterator[dict[str, Array]]:
+        for instant in run.instants(every):
+            first, second = instant.state.contacts.pair.T
+            fields = split_columns(gather_contacts(run, instant), "_")
+            yield _add_cycle(instant, {"id1": first, "id2": second, **dict(fields)})
+
+    tables = {"grains": list_grain_columns(), "contacts": list_contact_columns()}
+    if run.loaded:
+        tables["piston"] = run.piston_samples()
+    for name, parts in tables.items():
+        write_csv_rows(into / f"{name}.csv", parts)
+    return [into / f"{name}.csv" for name in tables]
+
+
+def _add_cycle(instant: Instant, columns: Mapping[str, Array]) -> dict[str, Array]:
+    """Columns with the number of the cycle before them."""
+    length = len(next(iter(columns.values())))
+    return {"cycle": np.full(length, instant.cycle), **columns}
+
+
+def write_csv_rows(path: Path, parts: Iterable[Mapping[str, Array]]) -> None:
+    """Write tables of the same columns one below the other."""
+    with replace_file(path) as temporary, temporary.open("w", encoding="ascii") as stream:
+        for number, columns in enumerate(parts):
+            if number == 0:
+                stream.write(",".join(columns) + "\n")
+            rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+            stream.writelines(",".join(map(repr, row)) + "\n" for row in rows)
+
 
 FORMATS = {"vtu": export_vtu, "ovito": export_ovito, "csv": export_csv}
 """Name of a format -> function of the run, a folder and the cycles between two instants."""

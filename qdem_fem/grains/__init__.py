@@ -1,9 +1,9 @@
 """Ballast grains: random hulls, gradings, sieves, their meshes."""
 
-from qdem_fem.grains.grading import BALLAST, Grading
 from qdem_fem.grains.hulls import GrainRecipe
 from qdem_fem.grains.measures import find_edge_angles, find_surface_edges
 from qdem_fem.grains.sets import GrainSet, make_grains, save_grains
+from qdem_fem.grains.sizes import BALLAST, Grading
 
 __all__ = [
     "BALLAST", "Grading", "GrainRecipe", "GrainSet", "find_edge_angles", "find_surface_edges",

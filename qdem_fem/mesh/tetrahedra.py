@@ -11,7 +11,6 @@ import numpy.typing as npt
 
 from qdem_fem.files import Floats, Integers, MeshError, warn_user
 from qdem_fem.mesh import checks
-from qdem_fem.mesh.doubts import find_doubts
 from qdem_fem.mesh.sources import MeshParts, read_mesh_parts
 
 _GRADIENTS_AT_ONCE = 1 << 14
@@ -100,7 +99,7 @@ def read_mesh(source: Any, *, where: str = "") -> TetMesh:
     if isinstance(source, TetMesh):
         flipped = np.union1d(flipped, source.flipped)
     else:  # what others made
-        for text in find_doubts(nodes, elements, find_gradients(nodes, elements)[0]):
+        for text in checks.find_doubts(nodes, elements, find_gradients(nodes, elements)[0]):
             warn_user(f"{where}: {text}")
     used = np.zeros(len(nodes), bool)
     used[elements.reshape(-1)] = True

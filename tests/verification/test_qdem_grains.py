@@ -13,7 +13,6 @@ from scipy.spatial.transform import Rotation
 
 from qdem_fem.files.arrays import Floats, Integers
 from qdem_fem.files.errors import MeshError
-from qdem_fem.grains.grading import BALLAST, Grading, draw_sizes
 from qdem_fem.grains.hulls import (
     HULLS,
     GrainRecipe,
@@ -34,7 +33,7 @@ from qdem_fem.grains.measures import (
 )
 from qdem_fem.grains.meshing import find_radius_ratios, make_grain_tetrahedra
 from qdem_fem.grains.sets import GrainSet, load_grains, make_grains, save_grains
-from qdem_fem.grains.sieve import find_sieve_size
+from qdem_fem.grains.sizes import BALLAST, Grading, draw_sizes, find_sieve_size
 from qdem_fem.mesh.surface import find_surface_faces
 from qdem_fem.mesh.tetrahedra import find_gradients
 from trackbed.command import main

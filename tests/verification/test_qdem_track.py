@@ -15,8 +15,8 @@ import qdem_fem as q
 from qdem_fem.cli.run import Progress
 from qdem_fem.element.material import Material
 from qdem_fem.files.errors import CheckpointError, EnergyLost, NotConverged, SceneError
-from qdem_fem.grains.grading import Grading
 from qdem_fem.grains.sets import make_grains
+from qdem_fem.grains.sizes import Grading
 from qdem_fem.march import energies, kinetic_damping
 from qdem_fem.mesh.generation import make_box_mesh
 from qdem_fem.report.track import find_grain_mobility
