@@ -5,7 +5,6 @@ from adapters.jumps.check import accept, judge, reject
 from adapters.jumps.control import JUMP, Control, Decision, Settings, decide, join_stretch, observe
 from adapters.jumps.forecast import fit_forecast
 from adapters.jumps.rates import Stretch, find_rates
-from adapters.jumps.schedule import schedule_jumps
 from adapters.jumps.slopes import (
     LOADED_BODY,
     SLOPES,
@@ -21,5 +20,5 @@ __all__ = [
     "BAND_PROBABILITY", "JUMP", "LOADED_BODY", "SLOPES", "Band", "Control", "Decision", "Jumped",
     "Landing", "Settings", "SlopeNumbers", "Stretch", "accept", "decide", "estimate_band",
     "estimate_slopes", "find_asked_gain", "find_rates", "fit_forecast", "join_stretch", "judge",
-    "observe", "reject", "remove_moves", "schedule_jumps",
+    "observe", "reject", "remove_moves",
 ]  # fmt: skip

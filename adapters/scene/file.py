@@ -9,10 +9,9 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from adapters.jumps import schedule_jumps
 from adapters.scene.checks import ALTERNATIVES, JUMP_KEYS, TOLERANCE_KEY, find_problems
 from adapters.scene.mechanics import DOUBTFUL
-from adapters.scene.procedures import fill_procedure
+from adapters.scene.procedures import fill_procedure, schedule_jumps
 from adapters.scene.tables import Procedure, Scene, flatten_keys
 from trackbed.scene_files import Guide, Problem, find_model, read_scene
 

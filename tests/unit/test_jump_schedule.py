@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adapters.jumps.schedule import schedule_jumps
+from adapters.scene.procedures import schedule_jumps
 
 
 @pytest.mark.parametrize("jumps", [1, 5, 13])

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from adapters.engines.contract import get_engine, list_engines, list_real_engines
 from adapters.errors import SceneError, TrackbedError
 from adapters.files.load_series import read_load_series
-from adapters.jumps.schedule import schedule_jumps
 from adapters.scene.file import load_scene
+from adapters.scene.procedures import schedule_jumps
 from adapters.scene.tables import Loading, Procedure, Scene
 from trackbed.scene_files.lines import find_key_lines
 from trackbed.scenes import find_scene_file, find_scene_verb, list_scenes, read_template
