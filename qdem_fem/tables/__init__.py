@@ -13,7 +13,6 @@ from qdem_fem.tables.keys import (
     SeriesTable,
     SimulationTable,
 )
-from qdem_fem.tables.nodes import find_named_nodes, make_body_mesh, make_unit_vector
 from qdem_fem.tables.prepared import (
     Prepared,
     Step,
@@ -21,8 +20,13 @@ from qdem_fem.tables.prepared import (
     list_named_files,
     list_tables,
 )
-from qdem_fem.tables.series import make_series
 from qdem_fem.tables.types import Cells, Share, WrongKey
+from qdem_fem.tables.values import (
+    find_named_nodes,
+    make_body_mesh,
+    make_series,
+    make_unit_vector,
+)
 
 __all__ = [
     "BodyTable", "Cells", "Condition", "ContactTable", "MaterialTable", "Mesh", "Nodes",

@@ -18,9 +18,8 @@ from qdem_fem.scene.doubts import warn_of_strain
 from qdem_fem.scene.energy_account import EnergyAccount
 from qdem_fem.scene.run import _Record, read_peak
 from qdem_fem.tables.keys import BoxMesh, Mesh, SeriesTable
-from qdem_fem.tables.nodes import make_body_mesh
-from qdem_fem.tables.series import make_series
 from qdem_fem.tables.types import WrongKey
+from qdem_fem.tables.values import make_body_mesh, make_series
 
 
 def bar() -> Body:
