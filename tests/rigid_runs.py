@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from rigid_lcp.scene.run_folder import RunFolder
+from rigid_lcp.scene.run import RunFolder
 
 SLIDING_BLOCK = """\
 title = "A block slides and stops"

@@ -2,16 +2,18 @@
 
 from rigid_lcp.scene.file import SceneFile, list_doubts, load_scene
 from rigid_lcp.scene.run import (
+    RunFolder,
     count_unknowns,
     list_left_out,
     make_simulation,
     plan_steps,
+    read_frame,
     read_history,
+    rebuild_frame_scene,
     run_scene,
     summarise_run,
     write_history,
 )
-from rigid_lcp.scene.run_folder import RunFolder, read_frame, rebuild_frame_scene
 from rigid_lcp.scene.simulation import Simulation
 
 __all__ = [

@@ -19,7 +19,7 @@ from trackbed.run_files.folder import RunFolder, is_written, lock_folder, refuse
 from trackbed.run_files.whole import append_text, replace_file, seal_file, write_whole
 
 ROOT = Path(__file__).parents[2]
-FOLDERS = ("adapters.files.run_folder", "qdem_fem.scene.run", "rigid_lcp.scene.run_folder")
+FOLDERS = ("adapters.files.run_folder", "qdem_fem.scene.run", "rigid_lcp.scene.run")
 
 
 class Folder(RunFolder):

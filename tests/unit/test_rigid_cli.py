@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigid_lcp.scene.run_folder import RunFolder, read_frame
+from rigid_lcp.scene.run import RunFolder, read_frame
 from tests.rigid_runs import SLIDING_BLOCK
 from trackbed import command
 

@@ -8,8 +8,14 @@ import pytest
 from rigid_lcp.errors import SceneError
 from rigid_lcp.report.page import draw_movie
 from rigid_lcp.scene.file import load_scene
-from rigid_lcp.scene.run import list_left_out, make_simulation, run_scene, summarise_run
-from rigid_lcp.scene.run_folder import RunFolder, pack_bodies
+from rigid_lcp.scene.run import (
+    RunFolder,
+    list_left_out,
+    make_simulation,
+    pack_bodies,
+    run_scene,
+    summarise_run,
+)
 from tests.rigid_runs import WORN_AND_BROKEN, WORN_IN_SPACE
 
 

@@ -22,8 +22,7 @@ import rigid_lcp as r
 from rigid_lcp.collision import passing as passed_collisions
 from rigid_lcp.report.page import write_report
 from rigid_lcp.scene.file import load_scene
-from rigid_lcp.scene.run import make_simulation, run_scene, summarise_run
-from rigid_lcp.scene.run_folder import RunFolder
+from rigid_lcp.scene.run import RunFolder, make_simulation, run_scene, summarise_run
 
 
 def billiard(ratio: float, step: float, dim: int = 2, e: float = 1.0) -> r.Simulation:

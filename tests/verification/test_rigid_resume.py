@@ -8,8 +8,7 @@ import pytest
 
 from rigid_lcp import Simulation
 from rigid_lcp.scene.file import SceneFile, load_scene
-from rigid_lcp.scene.run import make_simulation, run_scene
-from rigid_lcp.scene.run_folder import FRAME, RunFolder
+from rigid_lcp.scene.run import FRAME, RunFolder, make_simulation, run_scene
 from tests.rigid_runs import SLIDING_BLOCK, WORN_AND_BROKEN, WORN_IN_SPACE, frame_bits
 
 BOUNCING = """

@@ -18,7 +18,7 @@ import pytest
 
 import trackbed
 from rigid_lcp import Simulation
-from rigid_lcp.scene.run_folder import RunFolder
+from rigid_lcp.scene.run import RunFolder
 from tests.forked_commands import Commands
 from tests.rigid_runs import SLIDING_BLOCK, frame_bits
 from trackbed import command
