@@ -77,7 +77,7 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
 def run_fit(arguments: argparse.Namespace) -> int:
     """Fit a law to a series; print its parameters, a prediction and its band."""
     from adapters.errors import JumpRefused
-    from adapters.files import UNKNOWN
+    from adapters.files import UNKNOWN, read_series
     from adapters.laws import fit, get_law
 
     for flag in ("to_cycle", "from_cycle", "load_change"):
@@ -101,7 +101,7 @@ def run_fit(arguments: argparse.Namespace) -> int:
             "a figure is written as .png or .svg, into a folder that is there",
             where=str(picture), remedy="name it so",
         )  # fmt: skip
-    series = fit.read_series(
+    series = read_series(
         arguments.paths, arguments.steps_per_cycle, arguments.columns, arguments.unit
     )
     if arguments.steps_per_cycle is not None and series.columns:

@@ -12,10 +12,11 @@ from scipy.special import stdtrit
 
 from adapters.bed.state import FloatArray
 from adapters.errors import JumpRefused, NotConverged, UsageError
+from adapters.files import Series
 from adapters.laws import Law, get_law
 from adapters.laws.fit import band as fit_band
 from adapters.laws.fit.band import estimate_fit_noise, estimate_prediction_band
-from adapters.laws.fit.prediction import Series, fit_series
+from adapters.laws.fit.prediction import fit_series
 
 pytestmark = pytest.mark.lowest
 

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from adapters.bed.state import FloatArray
 from adapters.errors import JumpRefused, NotConverged, TrackbedError, UsageError
+from adapters.files import Series
 from adapters.laws import get_law
 from adapters.laws.fit.candidates import (
     SLOW_LAWS,
@@ -23,7 +24,7 @@ from adapters.laws.fit.candidates import (
     thin_rows,
 )
 from adapters.laws.fit.outlook import AGREE, compare_laws, find_outlook
-from adapters.laws.fit.prediction import Prediction, Series, find_regime, fit_auto, fit_series
+from adapters.laws.fit.prediction import Prediction, find_regime, fit_auto, fit_series
 from adapters.laws.fit.refusal import UNCERTAIN, find_refusals
 from adapters.laws.fit.regime import SHAKEDOWN, count_independent, find_regimes, select_tail
 from trackbed.command import main

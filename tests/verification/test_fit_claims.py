@@ -10,9 +10,10 @@ import pytest
 
 from adapters.bed import FloatArray
 from adapters.errors import JumpRefused
+from adapters.files import Series
 from adapters.laws import get_law
 from adapters.laws.fit.growth import find_fall, find_growth, measure_growth
-from adapters.laws.fit.prediction import Series, fit_auto, fit_series
+from adapters.laws.fit.prediction import fit_auto, fit_series
 from trackbed.command import main
 
 LEAST = 2000.0

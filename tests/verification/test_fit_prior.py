@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from adapters.errors import JumpRefused
+from adapters.files import Series
 from adapters.laws.fit.candidates import find_candidates
 from adapters.laws.fit.outlook import find_outlook
-from adapters.laws.fit.prediction import Series, fit_auto
+from adapters.laws.fit.prediction import fit_auto
 from adapters.laws.fit.prior import PRIOR, predict_growth, shrink_to_tail
 from trackbed.command import main
 

@@ -1,17 +1,17 @@
-"""Fit a law to a settlement series, predict, and say how far the prediction can be off."""
+"""Fit a law to a settlement series, predict, say how far the prediction can be off, and draw it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from math import isfinite, log
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from adapters.bed import FloatArray
 from adapters.errors import JumpRefused, NotConverged, UsageError
-from adapters.files import Series, make_too_few_error, read_series
+from adapters.files import Series, make_too_few_error
 from adapters.laws.fit.band import estimate_prediction_band
 from adapters.laws.fit.candidates import CANDIDATES, thin_rows
 from adapters.laws.fit.growth import find_fall, find_growth
@@ -27,7 +27,11 @@ from adapters.laws.fit.refusal import (
 from adapters.laws.fit.regime import COLLAPSE, SHAKEDOWN, WHY_NOT, Regime, find_regimes
 from adapters.laws.form import Law
 
-__all__ = ["Prediction", "Series", "describe_formula", "fit_auto", "fit_series", "read_series"]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+POINTS = 12
+"""Cycles behind the last reading at which a prediction is drawn, evenly spaced in ln N."""
 
 
 @dataclass(frozen=True)
@@ -278,3 +282,40 @@ def describe_formula(
         yield f"u(N) = {start} + {slope} {form}{cycles}: {ends}"
     for name, value in found.parameters.items():
         yield f"  {name} = {value:.6g} {'' if name.startswith('exponent') else unit}".rstrip()
+
+
+def draw_forecast(
+    series: Series, predict: Callable[[float], Prediction], to_cycle: float
+) -> Figure:
+    """Readings and what is predicted behind them against the user's load cycles, and where that is
+    refused; ``predict`` gives it at cycles of the series."""
+    from matplotlib.figure import Figure
+
+    begin, last = series.counted_from, float(series.cycle[-1])
+    cycles, found, refused = [last], [], None
+    for cycle in np.geomspace(last, to_cycle, POINTS)[1:] if to_cycle > last else ():
+        try:
+            found.append(predict(float(cycle)))
+        except JumpRefused as refusal:
+            refused = refusal.regime
+            break
+        cycles.append(float(cycle))
+    ahead, anchor = np.array(cycles) + begin, float(series.settlement[-1])
+    low, high = np.array([(anchor, anchor), *(one.band for one in found)]).T
+    figure = Figure(figsize=(7.2, 4.0))
+    axis = figure.subplots()
+    axis.plot(series.cycle + begin, series.settlement, "ko", ms=3, label="readings")
+    axis.fill_between(ahead, low, high, color="#0b5fa5", alpha=0.15, lw=0, label="band")
+    joint = [anchor, *(one.prediction for one in found)]
+    axis.plot(ahead, joint, color="#0b5fa5", label=f"predicted: {found[-1].law}" if found else None)
+    for name, said in found[-1].laws.items() if found else ():
+        own = np.array([anchor, *(one.laws[name].prediction for one in found)], float)
+        style, label = ("--", f"{name}, agrees") if said.agrees else (":", name)
+        axis.plot(ahead, own, style, lw=0.9, label=label)
+    if refused:
+        axis.axvspan(ahead[-1], to_cycle + begin, color="#e07b00", alpha=0.2, lw=0,
+                     label=f"refused: {refused}")  # fmt: skip
+    axis.set(xscale="log", xlabel="load cycles", ylabel=f"settlement ({series.unit})")
+    axis.invert_yaxis()
+    axis.legend(loc="lower left")
+    return figure
