@@ -16,15 +16,7 @@ from scipy.special import stdtrit
 
 from adapters.bed import FloatArray
 from adapters.jumps.rates import Rates, integrate_power
-from adapters.laws.fit import (
-    CANDIDATES,
-    EXPONENTS,
-    TAIL,
-    Regime,
-    find_increments,
-    find_regime_of_weight,
-    thin_rows,
-)
+from adapters.laws import fit
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,9 +55,9 @@ class Forecast:
         return student * np.sqrt(noise), student * np.sqrt(spread)
 
     @property
-    def regime(self) -> Regime:
+    def regime(self) -> fit.Regime:
         """Regime of the rates; see `fit.regime.find_regime_of_weight`."""
-        return find_regime_of_weight(self.weight, not self.rate.any())
+        return fit.find_regime_of_weight(self.weight, not self.rate.any())
 
 
 def fit_forecast(rates: Rates) -> Forecast:
@@ -76,10 +68,10 @@ def fit_forecast(rates: Rates) -> Forecast:
     """
     last = rates.last_cycle
     span = integrate_power(last, rates.start, rates.end)
-    prior = 1 / (1 + (EXPONENTS / TAIL.prior) ** 2)
+    prior = 1 / (1 + (fit.EXPONENTS / fit.TAIL.prior) ** 2)
     if not rates.gain.any() and not rates.variance.any():
-        still = np.zeros_like(EXPONENTS)
-        none = np.zeros((len(rates.gain), len(EXPONENTS)))
+        still = np.zeros_like(fit.EXPONENTS)
+        none = np.zeros((len(rates.gain), len(fit.EXPONENTS)))
         return Forecast(last, still, still, prior / prior.sum(), rates.freedom, none)
     weight = 1 / np.maximum(rates.variance, np.finfo(float).eps * rates.variance.max())[:, None]
     information = (span**2 * weight).sum(axis=0)
@@ -100,12 +92,12 @@ def bound_gain_by_laws(
     The middle ``probability`` of all laws on all windows (`fit.candidates`), fitted to the run's
     own curve: ``cycle`` (k,), ``settlement`` [m] (k,).  Infinitely far apart for too few cycles.
     """
-    if len(cycle) < 2 * CANDIDATES.rows_fewest or not np.ptp(settlement):
-        wide = np.full(len(ends), np.inf if len(cycle) < 2 * CANDIDATES.rows_fewest else 0.0)
+    if len(cycle) < 2 * fit.CANDIDATES.rows_fewest or not np.ptp(settlement):
+        wide = np.full(len(ends), np.inf if len(cycle) < 2 * fit.CANDIDATES.rows_fewest else 0.0)
         return -wide, wide
-    few, means = thin_rows(cycle, settlement[:, None])
+    few, means = fit.thin_rows(cycle, settlement[:, None])
     with np.errstate(over="ignore", invalid="ignore"):
-        found = find_increments(few, means, ends)
+        found = fit.find_increments(few, means, ends)
     every = np.stack([gains[:, 0] for gains in found.values()])
     outer = (1 - probability) / 2, (1 + probability) / 2
     low, high = np.nanquantile(np.where(np.isfinite(every), every, np.nan), outer, axis=0)

@@ -8,15 +8,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from qdem_fem import element
 from qdem_fem.bodies.rigid_mass import RigidMass, compute_rigid_mass
-from qdem_fem.element import (
-    MEASURES,
-    Material,
-    Strain,
-    compute_cauchy_stress,
-    find_displacement_gradient,
-    find_von_mises,
-)
 from qdem_fem.files import ConditionError, Floats, Integers, MaterialError
 from qdem_fem.mesh import TetMesh, find_gradients, find_surface_faces, read_mesh
 
@@ -37,11 +30,11 @@ class Body:
     """
 
     def __init__(
-        self, mesh: Any, material: Material, name: str = "body", *, rigid: Rigid = False
+        self, mesh: Any, material: element.Material, name: str = "body", *, rigid: Rigid = False
     ) -> None:
         if not isinstance(name, str):
             raise ConditionError(f"{name!r} is no name", where="body", remedy="give a text")
-        if not isinstance(material, Material):
+        if not isinstance(material, element.Material):
             raise MaterialError(
                 f"a {type(material).__name__} is no material",
                 where=name, remedy="give Material(young, poisson, density)",
@@ -116,7 +109,7 @@ class Body:
         self._velocity = field
 
     @property
-    def strain(self) -> Strain:
+    def strain(self) -> element.Strain:
         """The strain measure of the simulation the body is in; the paper's outside of one."""
         return self.mover.strain if self.mover is not None else "finger"
 
@@ -124,24 +117,26 @@ class Body:
         """Elastic Cauchy stress of the elements [Pa], (m, 3, 3) (eq. 2); zero of a rigid body."""
         if self.rigid:
             return np.zeros((len(self.elements), 3, 3))
-        gradient = find_displacement_gradient(self.gradients[0], self.elements, self.displacement)
-        nominal = MEASURES[self.strain].compute_nominal_stress(
+        gradient = element.find_displacement_gradient(
+            self.gradients[0], self.elements, self.displacement
+        )
+        nominal = element.MEASURES[self.strain].compute_nominal_stress(
             gradient, self.material.lame_first, self.material.lame_second
         )
-        return compute_cauchy_stress(gradient, nominal, self.strain)
+        return element.compute_cauchy_stress(gradient, nominal, self.strain)
 
-    def elastic_energy(self, displacement: Floats, strain: Strain) -> Floats:
+    def elastic_energy(self, displacement: Floats, strain: element.Strain) -> Floats:
         """Stored energy of the elements [J], (m,), at a displacement (n, 3) [m]."""
         gradients, volumes = self.gradients
-        found: Floats = MEASURES[strain].compute_stored_energy(
-            find_displacement_gradient(gradients, self.elements, displacement),
+        found: Floats = element.MEASURES[strain].compute_stored_energy(
+            element.find_displacement_gradient(gradients, self.elements, displacement),
             volumes, self.material.lame_first, self.material.lame_second,
         )  # fmt: skip
         return found
 
     def von_mises(self) -> Floats:
         """Von Mises stress of the elements [Pa], (m,)."""
-        return find_von_mises(self.stress())
+        return element.find_von_mises(self.stress())
 
     def select_nodes(self, nodes: Any, where: str) -> Integers:
         """Node numbers of a selection: a mask (n,), an index or indices.

@@ -8,19 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from qdem_fem.contact import search
 from qdem_fem.contact.bounds import bound_spring_network
-from qdem_fem.contact.search import (
-    NO_IMAGE,
-    Pairs,
-    PeriodicWidth,
-    check_extents,
-    check_joined,
-    choose_skin,
-    find_extents,
-    find_near_walls,
-    make_pairs,
-    renew_pairs,
-)
 from qdem_fem.contact.spheres import (
     NEAR,
     SKIN_OF_SPHERES,
@@ -75,9 +64,9 @@ class SphereContacts(Contacts):
                 np.repeat(np.arange(len(counts)), counts), radius, normal,
                 find_tangential_stiffness(normal, poisson),
             ),
-            make_pairs(
+            search.make_pairs(
                 np.zeros(size + 1, np.int64), np.zeros(0, np.int64), np.zeros((size, 0), bool),
-                NO_IMAGE if asked.periodic is None else np.zeros((0, 3)),
+                search.NO_IMAGE if asked.periodic is None else np.zeros((0, 3)),
             ),
             Planes(
                 *pack_planes(asked.planes, asked.friction),
@@ -88,9 +77,9 @@ class SphereContacts(Contacts):
         )  # fmt: skip
 
     @property
-    def pairs(self) -> Pairs:
+    def pairs(self) -> search.Pairs:
         """The present list of pairs."""
-        found: Pairs = self.kernel.pairs
+        found: search.Pairs = self.kernel.pairs
         return found
 
     def forget(self) -> None:
@@ -104,16 +93,16 @@ class SphereContacts(Contacts):
         self.check_images(position)
         least, most = self.skins
         room = least + self.room / 2
-        self.skin = choose_skin(
+        self.skin = search.choose_skin(
             self.skin, self.lasted, self.count_idle_pairs(), len(self.nodes), least, min(most, room)
         )  # fmt: skip
         self.look_for_pairs(
             position, max(self.skin, min(self.measure_gap(position), self.deep, room))
         )
 
-    def extents(self, position: Floats, side: PeriodicWidth) -> Floats:
+    def extents(self, position: Floats, side: search.PeriodicWidth) -> Floats:
         """Extent of each body along the axis of a width [m], (bodies,)."""
-        return find_extents(position[:, side.number], self.first_vertex)
+        return search.find_extents(position[:, side.number], self.first_vertex)
 
     def check_images(self, position: Floats) -> None:
         """Raise `ConditionError` for a body that would touch its own image across the width."""
@@ -124,9 +113,9 @@ class SphereContacts(Contacts):
         for b in np.unique(np.searchsorted(run.first_node, fixed, side="right") - 1):
             nodes = slice(*run.first_node[b : b + 2])
             master = run.master[nodes] - run.first_node[b]
-            check_joined(run.bodies[b], master, side, self.where)
+            search.check_joined(run.bodies[b], master, side, self.where)
         size = self.extents(position, side)
-        self.room = check_extents(run.bodies, size, self.reach, side, self.where)
+        self.room = search.check_extents(run.bodies, size, self.reach, side, self.where)
 
     def count_idle_pairs(self) -> int:
         """Pairs of the list that do not touch."""
@@ -135,7 +124,7 @@ class SphereContacts(Contacts):
     def look_for_pairs(self, position: Floats, skin: float) -> None:
         """List the pairs within ``skin`` [m] of each other at (c, 3) [m]."""
         spheres = self.kernel.spheres
-        pairs = renew_pairs(
+        pairs = search.renew_pairs(
             self.pairs, position, spheres.radius, spheres.body, skin,
             self.walls(position, skin), self.asked.periodic,
         )  # fmt: skip
@@ -161,7 +150,7 @@ class SphereContacts(Contacts):
     def walls(self, position: Floats, skin: float) -> NDArray[np.bool_]:
         """Which vertices at (c, 3) [m] touch which walls, or may on a way of ``skin`` [m]."""
         radius, planes = self.kernel.spheres.radius, self.kernel.planes
-        return find_near_walls(position, radius, planes.point, planes.normal, skin)
+        return search.find_near_walls(position, radius, planes.point, planes.normal, skin)
 
     def describe_deepest(self) -> tuple[str, str]:
         touching, radius = self.touching(), self.kernel.spheres.radius
@@ -253,8 +242,8 @@ class SphereContacts(Contacts):
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         given = {name: arrays[f"contact_{name}"].copy() for name in PAIR_ARRAYS + CONTACT_ARRAYS}
         walls = self.walls(given["start"], self.skin)
-        image = NO_IMAGE if self.asked.periodic is None else arrays["contact_image"].copy()
-        pairs = make_pairs(given["first"], given["second"], walls, image)
+        image = search.NO_IMAGE if self.asked.periodic is None else arrays["contact_image"].copy()
+        pairs = search.make_pairs(given["first"], given["second"], walls, image)
         held = {name: arrays[f"contact_plane_{name}"].copy() for name in PLANE_ARRAYS}
         self.kernel = self.kernel._replace(
             pairs=pairs._replace(**{name: given[name] for name in PAIR_ARRAYS}),

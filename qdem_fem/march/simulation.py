@@ -15,19 +15,12 @@ from qdem_fem.bodies import Body, Discretisation
 from qdem_fem.contact import choose_assembly
 from qdem_fem.element import Strain
 from qdem_fem.files import ConditionError, Floats, is_real
+from qdem_fem.march import options
 from qdem_fem.march.checkpoint import read_checkpoint, write_checkpoint
 from qdem_fem.march.conditioned_bodies import ConditionedBodies
 from qdem_fem.march.dynamic_relaxation import StaticAnswer, relax
 from qdem_fem.march.energies import Energy, estimate_errors, find_energy
 from qdem_fem.march.leapfrog import find_velocity, level_velocities
-from qdem_fem.march.options import (
-    Contact,
-    check_contact,
-    check_options,
-    check_rigid,
-    list_bodies,
-    make_gravity,
-)
 from qdem_fem.march.state import STEP_SAFETY
 from qdem_fem.march.steps import march
 
@@ -74,18 +67,18 @@ class Simulation(ConditionedBodies):
         precision: Literal["float64", "float32"] = "float64", step: float | None = None,
         safety: float = STEP_SAFETY, gravity: ArrayLike | None = None, threads: int | None = None,
         mass_scaling: float | None = None, device: Literal["cpu", "cuda"] = "cpu",
-        contact: Contact | None = None,
+        contact: options.Contact | None = None,
     ) -> None:  # fmt: skip
-        own = list_bodies(bodies)
-        check_options(
+        own = options.list_bodies(bodies)
+        options.check_options(
             strain=strain, precision=precision, device=device, step=step, safety=safety,
             threads=threads, mass_scaling=mass_scaling,
         )  # fmt: skip
-        check_contact(contact, precision, device)
+        options.check_contact(contact, precision, device)
         choose_assembly(device)
-        check_rigid(own, precision, device)
+        options.check_rigid(own, precision, device)
         super().__init__(
-            own, strain, precision, threads, mass_scaling, device, make_gravity(gravity),
+            own, strain, precision, threads, mass_scaling, device, options.make_gravity(gravity),
             contact=contact, given_step=None if step is None else float(step), safety=safety,
         )  # fmt: skip
         for body in self.bodies:

@@ -8,17 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from qdem_fem.files import ConditionError, Series
-from qdem_fem.track.loads import (
-    MOST_SAMPLES,
-    RATE,
-    Roughness,
-    Track,
-    Train,
-    WheelFlat,
-    find_flat_forces,
-    find_rolling_forces,
-    find_seat_share,
-)
+from qdem_fem.track import loads
 
 DOWN = np.array([0.0, 0.0, -1.0])
 RISE = 0.01
@@ -26,8 +16,9 @@ RISE = 0.01
 
 
 def make_bogie_series(
-    train: Train, track: Track, share: float, lead: float, rest: float, rate: float = RATE,
-    roughness: Roughness | None = None, flats: Sequence[WheelFlat] = (),
+    train: loads.Train, track: loads.Track, share: float, lead: float, rest: float,
+    rate: float = loads.RATE, roughness: loads.Roughness | None = None,
+    flats: Sequence[loads.WheelFlat] = (),
 ) -> Series:  # fmt: skip
     """Force on the seat of a slice while the first bogie of a train passes [N], (k, 3), down.
 
@@ -46,26 +37,26 @@ def make_bogie_series(
             f"{RISE:g} s", where="bogie",
             remedy=f"give a lead of {RISE * train.speed:.3g} m or more, or less speed",
         )  # fmt: skip
-    if not (end + rest) * rate < MOST_SAMPLES:
+    if not (end + rest) * rate < loads.MOST_SAMPLES:
         raise ConditionError(
             f"it passes and rests for {end + rest:.3g} s, {(end + rest) * rate:.3g} samples",
             where="bogie",
-            remedy=f"give more speed, less lead or less rest: at most {MOST_SAMPLES} samples",
+            remedy=f"give more speed, less lead or less rest: at most {loads.MOST_SAMPLES} samples",
         )
     time = np.arange(int(np.ceil((end + rest) * rate)) + 1) / rate
     front = train.speed * time - lead
-    of_wheels = sum(find_seat_share(front - axle, track) for axle in axles)
+    of_wheels = sum(loads.find_seat_share(front - axle, track) for axle in axles)
     ramp = np.clip(np.minimum(time, end - time) / RISE, 0.0, 1.0)
     force = train.first_share * train.axle_load * of_wheels
     if roughness is not None:
-        force += find_rolling_forces(
+        force += loads.find_rolling_forces(
             time - lead / train.speed, train.speed, axles, train.wheel_loads[:1], track, roughness
         )[:, 0]
     if flats:
-        force += find_flat_forces(front, axles, train.speed, track, flats)
+        force += loads.find_flat_forces(front, axles, train.speed, track, flats)
     return Series(time, np.outer(share * force * (1 - np.cos(np.pi * ramp)) / 2, DOWN))
 
 
-def find_passing_time(train: Train, lead: float) -> float:
+def find_passing_time(train: loads.Train, lead: float) -> float:
     """From the front axle ``lead`` [m] before the sleeper to the rear one as far behind it [s]."""
     return float(2 * lead + train.axles[1]) / train.speed

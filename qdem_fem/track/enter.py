@@ -16,21 +16,11 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
+from qdem_fem import tables
 from qdem_fem.contact.spheres import SphereContact
 from qdem_fem.element import Material
 from qdem_fem.files import ConditionError, Floats, Integers, Series
 from qdem_fem.march import Rest
-from qdem_fem.tables import (
-    BodyTable,
-    ContactTable,
-    Prepared,
-    Scene,
-    Step,
-    WrongKey,
-    find_contact_faults,
-    find_output_faults,
-    list_named_files,
-)
 from qdem_fem.track.bed import Bed, list_stages_ahead, prepare_bed, read_bed
 from qdem_fem.track.bodies import TrackBox
 from qdem_fem.track.recipe import SLEEPER, BedRecipe, name_bodies
@@ -43,10 +33,10 @@ BELOW = 0.1
 bed less than twice as deep its half."""
 
 
-class TrackScene(Scene):
+class TrackScene(tables.Scene):
     """A scene whose bodies are made by ``[track]``."""
 
-    body: Annotated[tuple[BodyTable, ...], Field(strict=False)] = ()
+    body: Annotated[tuple[tables.BodyTable, ...], Field(strict=False)] = ()
     track: TrackTable
 
     def list_left_out(self) -> list[str]:
@@ -67,7 +57,7 @@ class TrackScene(Scene):
 
 
 @dataclass(frozen=True)
-class TrackPrepared(Prepared):
+class TrackPrepared(tables.Prepared):
     """A checked scene of a track."""
 
     recipe: BedRecipe
@@ -97,7 +87,7 @@ def check_track(text: SceneText) -> TrackPrepared:
     if isinstance(track, TrackTable):
         try:
             loads = make_seat_loads(track, text.path.parent)
-        except WrongKey as wrong:
+        except tables.WrongKey as wrong:
             problems.append(wrong.problem)
         except ConditionError as error:
             problems.append(Problem("track.bogie", describe_error(error)))
@@ -110,13 +100,13 @@ def check_track(text: SceneText) -> TrackPrepared:
                 f"a scene writes into its own folder, not {bed}: to have it so, use --set track.bed"
             )
             problems.append(Problem("track.bed", what))
-    text.refuse(problems + list(find_output_faults(text)))
+    text.refuse(problems + list(tables.find_output_faults(text)))
     scene = TrackScene.model_validate(text.data)
     track = scene.track
     bed_file = text.path.parent / track.bed
-    steps = [Step("track", "load", SLEEPER, (np.zeros(0, np.int64), load)) for load in loads]
+    steps = [tables.Step("track", "load", SLEEPER, (np.zeros(0, np.int64), load)) for load in loads]
     return TrackPrepared(
-        scene, text, {}, steps, {}, dict(list_named_files(text, text.path.parent)),
+        scene, text, {}, steps, {}, dict(tables.list_named_files(text, text.path.parent)),
         recipe=make_bed_recipe(scene), bed_file=bed_file, loads=loads,
     )  # fmt: skip
 
@@ -132,9 +122,9 @@ def _find_faults(text: SceneText) -> Iterator[Problem]:
         yield from find_track_faults(track)
     if contact is None and "contact" not in text.data:
         yield Problem("contact", "missing: a track needs it")
-    if isinstance(contact, ContactTable):
+    if isinstance(contact, tables.ContactTable):
         names = ("ballast", SLEEPER)
-        for fault in find_contact_faults(contact, simulation, names):
+        for fault in tables.find_contact_faults(contact, simulation, names):
             yield Problem(*fault)
         stiffness = contact.normal_stiffness
         if contact.model != "spheres" or contact.radius is None or contact.plane:

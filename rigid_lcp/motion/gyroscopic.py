@@ -9,29 +9,20 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rigid_lcp import shapes
 from rigid_lcp.arrays import Floats
-from rigid_lcp.shapes import (
-    extract_quaternion,
-    make_quaternion,
-    make_rotation,
-    multiply_quaternions,
-    normalise,
-    rotate,
-    rotate_back,
-    turn_quaternion,
-)
 
 
 def find_principal_axes(inertia: ArrayLike) -> tuple[Floats, Floats]:
     """Principal moments (..., 3) in ascending order [kg m^2], and quaternions (..., 4) that turn
     their axes to body coordinates, of tensors (..., 3, 3) in the body frame [kg m^2]."""
     moments, axes = np.linalg.eigh(np.asarray(inertia, dtype=float))
-    return moments, extract_quaternion(axes * np.sign(np.linalg.det(axes))[..., None, None])
+    return moments, shapes.extract_quaternion(axes * np.sign(np.linalg.det(axes))[..., None, None])
 
 
 def turn_inertia(inertia: Floats, quaternion: Floats) -> Floats:
     """``R I R^T``, (..., 3, 3), of body tensors (..., 3, 3) [kg m^2]."""
-    turn = make_rotation(quaternion)
+    turn = shapes.make_rotation(quaternion)
     return np.einsum("...ij,...jk,...lk->...il", turn, inertia, turn)
 
 
@@ -56,23 +47,23 @@ def rotate_freely(
     cubes and all bodies with two equal moments move exactly.
     """
     moments, axes = principal
-    frame = normalise(multiply_quaternions(quaternion, axes))
-    momentum = moments * rotate_back(frame, spin)
+    frame = shapes.normalise(shapes.multiply_quaternions(quaternion, axes))
+    momentum = moments * shapes.rotate_back(frame, spin)
     twice_energy = (momentum**2 / moments).sum(axis=-1)
-    world_momentum = rotate(frame, momentum)
+    world_momentum = shapes.rotate(frame, momentum)
     rest = 1.0 / moments - 1.0 / moments[..., 1:2]
     for axis, share in ((0, 0.5), (2, 1.0), (0, 0.5)):
         turn = np.zeros_like(momentum)
         turn[..., axis] = share * seconds * rest[..., axis] * momentum[..., axis]
-        step = make_quaternion(turn)
-        frame = multiply_quaternions(frame, step)
-        momentum = rotate_back(step, momentum)
+        step = shapes.make_quaternion(turn)
+        frame = shapes.multiply_quaternions(frame, step)
+        momentum = shapes.rotate_back(step, momentum)
     back = find_energy_turn(moments, momentum, twice_energy, seconds)
-    frame = multiply_quaternions(frame, make_quaternion(back))
-    frame = turn_quaternion(frame, seconds / moments[..., 1:2] * world_momentum)
-    spin = rotate(frame, rotate_back(frame, world_momentum) / moments)
-    body = multiply_quaternions(frame, axes * [1.0, -1.0, -1.0, -1.0])
-    return normalise(body), spin
+    frame = shapes.multiply_quaternions(frame, shapes.make_quaternion(back))
+    frame = shapes.turn_quaternion(frame, seconds / moments[..., 1:2] * world_momentum)
+    spin = shapes.rotate(frame, shapes.rotate_back(frame, world_momentum) / moments)
+    body = shapes.multiply_quaternions(frame, axes * [1.0, -1.0, -1.0, -1.0])
+    return shapes.normalise(body), spin
 
 
 def find_energy_turn(

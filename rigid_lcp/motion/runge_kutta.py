@@ -31,21 +31,11 @@ from numpy.typing import ArrayLike
 from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.contact import ContactForces, Contacts
 from rigid_lcp.errors import NoSolution, NotConverged, Overlapping, ProblemError, RigidError
+from rigid_lcp.motion import lasting_contacts
 from rigid_lcp.motion.acceleration_forces import find_forces
 from rigid_lcp.motion.checks import Loads
 from rigid_lcp.motion.equations import find_contact_offset, find_response, make_body_space
 from rigid_lcp.motion.finite_states import explain_overflow, is_finite
-from rigid_lcp.motion.lasting_contacts import (
-    TOUCHING,
-    Lasting,
-    collide_bodies,
-    find_excess_overlap,
-    find_lasting,
-    find_share_until_rest,
-    find_share_until_touch,
-    redetect_contacts,
-    remove_drift,
-)
 from rigid_lcp.motion.state import Motion, replace_rates
 from rigid_lcp.motion.time_stepping import MOREAU, make_contact_forces
 from rigid_lcp.motion.world import World
@@ -128,11 +118,11 @@ def advance_runge_kutta(
             where=f"time {time:.9g} s", remedy="use method='time-stepping'",
         )  # fmt: skip
     while end - time > RUNGE_KUTTA.shortest_step * pace.longest or forces is None:
-        motion, collision = collide_bodies(world, motion, tolerance)
+        motion, collision = lasting_contacts.collide_bodies(world, motion, tolerance)
         pace.collisions += collision is not None
         pace.scaled += collision is not None and collision.restitution_scale < 1.0
         pace.cut_off += collision is not None and collision.cut_off
-        lasting = find_lasting(world, motion)
+        lasting = lasting_contacts.find_lasting(world, motion)
         tried, located = pace.step, 0
         while True:
             h = min(tried, end - time, _find_travel_limit(world, motion))
@@ -152,13 +142,15 @@ def advance_runge_kutta(
                 raise explain_overflow(world, motion, loads(time, motion), h, time)
             first, last = rates[0], rates[-1]
             pressed, stuck = list_lasting_keys(first, last)
-            overlap = find_excess_overlap(world, after, pressed)
-            stop = find_share_until_rest(world, motion, after, h, lasting)
+            overlap = lasting_contacts.find_excess_overlap(world, after, pressed)
+            stop = lasting_contacts.find_share_until_rest(world, motion, after, h, lasting)
             far = _find_travel_limit(world, after)
-            if overlap > TOUCHING.overlap * world.length:
+            if overlap > lasting_contacts.TOUCHING.overlap * world.length:
                 share = None
                 if located < RUNGE_KUTTA.located_ends:
-                    share = find_share_until_touch(world, motion, after, h, pressed)
+                    share = lasting_contacts.find_share_until_touch(
+                        world, motion, after, h, pressed
+                    )
                 if share is None or located == 0:
                     pace.step, pace.clean = h / 2, 0
                 tried, located = h * (0.5 if share is None else share), located + 1
@@ -182,14 +174,14 @@ def advance_runge_kutta(
         if pace.clean >= RUNGE_KUTTA.steps_before_doubling:
             pace.step, pace.clean = min(2 * pace.step, pace.longest), 0
         forces = make_contact_forces(first.contacts, first.force, first.acceleration, 1.0)
-        motion = remove_drift(world, after, pressed, stuck)
+        motion = lasting_contacts.remove_drift(world, after, pressed, stuck)
     assert forces is not None
     return motion, forces
 
 
 def step_runge_kutta(
-    world: World, motion: Motion, time: float, h: float, lasting: Lasting, loads: Loads,
-    tolerance: float,
+    world: World, motion: Motion, time: float, h: float, lasting: lasting_contacts.Lasting,
+    loads: Loads, tolerance: float,
 ) -> tuple[list[Rate], Motion]:  # fmt: skip
     """One classical fourth-order step: the rates of its four stages, and its end."""
 
@@ -217,13 +209,13 @@ def move_state(motion: Motion, h: float, weights: list[tuple[float, Rate]]) -> M
 
 
 def find_state_rate(
-    world: World, motion: Motion, h: float, lasting: Lasting, loads: ArrayLike | None,
-    tolerance: float,
+    world: World, motion: Motion, h: float, lasting: lasting_contacts.Lasting,
+    loads: ArrayLike | None, tolerance: float,
 ) -> Rate:  # fmt: skip
     """Velocities and accelerations of a state, its lasting contacts taken as closed (eq. 26)."""
     turning = motion.spin if motion.dim == 2 else find_quaternion_rate(motion.angle, motion.spin)
     free = world.accelerations(motion, loads)
-    contacts, slip = redetect_contacts(world, motion, h, lasting)
+    contacts, slip = lasting_contacts.redetect_contacts(world, motion, h, lasting)
     if len(contacts) == 0:
         none = np.zeros((0, motion.dim))
         return Rate(motion.velocity, turning, free, contacts, none, none)
@@ -242,7 +234,7 @@ def find_state_rate(
 def _explain_failure(world: World, motion: Motion, overlap: float, time: float) -> RigidError:
     """What is wrong with the end ``motion`` of the shortest step, which may have an ``overlap``."""
     where, remedy = f"time {time:.9g} s", "use method='time-stepping'"
-    if overlap > TOUCHING.overlap * world.length:
+    if overlap > lasting_contacts.TOUCHING.overlap * world.length:
         return Overlapping(
             f"bodies overlap by {overlap:.2g} m after the shortest step", where=where,
             remedy=f"{remedy}, which removes overlaps",

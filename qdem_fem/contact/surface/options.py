@@ -28,12 +28,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from qdem_fem.contact.spheres import (
-    ContactPlane,
-    check_contact_number,
-    check_contact_planes,
-    find_body_value,
-)
+from qdem_fem.contact import spheres
 from qdem_fem.files import Floats, Integers
 from qdem_fem.mesh import find_area_vectors
 
@@ -53,7 +48,7 @@ class SurfaceContact:
     """p of two surfaces of the body's material [Pa/m]; a number, or by the name of the body"""
     friction: float
     """Coulomb's coefficient mu"""
-    planes: Sequence[ContactPlane] = ()
+    planes: Sequence[spheres.ContactPlane] = ()
     points: int = 2
     """A face has that many points squared within it."""
     depth: float | None = None
@@ -66,17 +61,17 @@ class SurfaceContact:
     def __post_init__(self) -> None:
         values = self.modulus.values() if isinstance(self.modulus, Mapping) else [self.modulus]
         for each in values:
-            check_contact_number(each, "modulus", above=True)
+            spheres.check_contact_number(each, "modulus", above=True)
         if self.depth is not None:
-            check_contact_number(self.depth, "depth", above=True)
-        check_contact_number(self.friction, "friction", above=False)
-        check_contact_number(self.contacts, "contacts", above=True)
-        check_contact_number(self.points, "points", above=True)
-        check_contact_planes(self.planes)
+            spheres.check_contact_number(self.depth, "depth", above=True)
+        spheres.check_contact_number(self.friction, "friction", above=False)
+        spheres.check_contact_number(self.contacts, "contacts", above=True)
+        spheres.check_contact_number(self.points, "points", above=True)
+        spheres.check_contact_planes(self.planes)
 
     def find_value(self, name: str, quantity: str) -> float:
         """``modulus`` of a body; `ConditionError` where it has none."""
-        return find_body_value(getattr(self, quantity), name, quantity)
+        return spheres.find_body_value(getattr(self, quantity), name, quantity)
 
 
 def place_points(parts: int) -> Floats:

@@ -16,13 +16,7 @@ from numpy.typing import ArrayLike
 
 from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.errors import ProblemError
-from rigid_lcp.friction.problem.checks import (
-    check_factors,
-    require_by_contact,
-    require_matrix,
-    require_one_a_contact,
-    require_range,
-)
+from rigid_lcp.friction.problem import checks
 from rigid_lcp.friction.problem.cones import find_natural_map, find_natural_residual, norm
 from rigid_lcp.sparse import (
     find_diagonal_blocks,
@@ -278,21 +272,21 @@ def make_problem(matrix: Any, offset: ArrayLike, friction: ArrayLike, dim: int) 
     """
     if not isinstance(dim, int | np.integer) or dim not in (2, 3):
         raise ProblemError(f"dim is {dim!r}", where="dim", remedy="give 2 or 3")
-    q = require_by_contact(offset, "q", dim)
-    require_range(q, "q", least=0.0)  # bodies may come to rest as slowly as they like
+    q = checks.require_by_contact(offset, "q", dim)
+    checks.require_range(q, "q", least=0.0)  # bodies may come to rest as slowly as they like
     if len(q) % dim:
         raise ProblemError(
             f"q has {len(q)} numbers, which are not {dim} a contact", where="q",
             remedy="order it contact after contact: n, t" + ", t2" * (dim - 2),
         )  # fmt: skip
     contacts = len(q) // dim
-    mu = require_one_a_contact(friction, "mu", MOST_FRICTION, contacts)
+    mu = checks.require_one_a_contact(friction, "mu", MOST_FRICTION, contacts)
     bodies = matrix if isinstance(matrix, BodySpace) else None
     if bodies is not None:
-        check_factors(bodies.jacobian, bodies.inverse_mass, bodies.body_size)
-    w = None if bodies is not None else require_matrix(matrix)
+        checks.check_factors(bodies.jacobian, bodies.inverse_mass, bodies.body_size)
+    w = None if bodies is not None else checks.require_matrix(matrix)
     if w is not None:
-        require_range(w.data, "W")
+        checks.require_range(w.data, "W")
     shape = (bodies.jacobian.shape[0],) * 2 if bodies is not None else w.shape  # type: ignore[union-attr]
     if shape != (len(q), len(q)):
         raise ProblemError(
