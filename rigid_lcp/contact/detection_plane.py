@@ -14,17 +14,8 @@ import numpy as np
 from numba import njit
 
 from rigid_lcp.arrays import Bools, Floats, Ints
+from rigid_lcp.contact import near_pairs
 from rigid_lcp.contact.arrays import FEATURE_BITS, LENGTH_TIE, Contacts, pack_key
-from rigid_lcp.contact.near_pairs import (
-    DISC,
-    HALF_SPACE,
-    POLYGON,
-    ZERO,
-    bound_shapes,
-    find_near_pairs,
-    order_by_pair,
-    place_shapes,
-)
 from rigid_lcp.contact.parting_faces import choose_face
 from rigid_lcp.errors import SceneError
 from rigid_lcp.shapes import Disc, HalfSpace, Polygon
@@ -57,13 +48,13 @@ def pack_shapes_2d(
     kind, first, vertices, normals, radius = [], [0], [], [], []
     for number, shape in enumerate(shapes):
         if isinstance(shape, Polygon):
-            kind.append(POLYGON)
+            kind.append(near_pairs.POLYGON)
             corners, outward, size = shape.vertices, shape.normals, shape.reach
         elif isinstance(shape, Disc):
-            kind.append(DISC)
+            kind.append(near_pairs.DISC)
             corners, outward, size = np.zeros((0, 2)), np.zeros((0, 2)), shape.radius
         elif isinstance(shape, HalfSpace) and shape.dim == 2:
-            kind.append(HALF_SPACE)
+            kind.append(near_pairs.HALF_SPACE)
             corners, outward, size = shape.normal[None], shape.normal[None], shape.offset
         else:
             raise SceneError(
@@ -99,15 +90,16 @@ def detect_2d(
     """
     margins = np.full(len(shapes.kind), margin, dtype=float)
     position = np.ascontiguousarray(position)
-    vertices, normals = place_shapes(shapes.kind, shapes.first, shapes.vertices, shapes.normals,
-                                     position, angle)  # fmt: skip
-    boxes = bound_shapes(shapes.first, vertices, shapes.radius, position, margins)
-    pairs = find_near_pairs(shapes.kind, boxes, shapes.movable)
+    vertices, normals = near_pairs.place_shapes(
+        shapes.kind, shapes.first, shapes.vertices, shapes.normals, position, angle
+    )
+    boxes = near_pairs.bound_shapes(shapes.first, vertices, shapes.radius, position, margins)
+    pairs = near_pairs.find_near_pairs(shapes.kind, boxes, shapes.movable)
     bodies, numbers, key = find_pair_contacts(
         pairs, shapes.kind, shapes.first, vertices, normals, shapes.radius, position, margins,
         np.zeros((len(position), 3)) if drift is None else drift,
     )  # fmt: skip
-    order = order_by_pair(shapes.kind, bodies)
+    order = near_pairs.order_by_pair(shapes.kind, bodies)
     bodies, numbers, key = bodies[order], numbers[order], key[order]
     zero, edges = np.zeros((2, len(key))), np.zeros((2, len(key), 2))
     return Contacts(
@@ -154,7 +146,7 @@ def find_face_contacts(
     ends = (face, (face + 1) % len(face_own))
     t0, t1 = -n[1], n[0]
     length = t0 * (face_own[ends[1], 0] - corner[0]) + t1 * (face_own[ends[1], 1] - corner[1])
-    none = opposite = int(ZERO)
+    none = opposite = int(near_pairs.ZERO)
     steepest = np.inf
     for k in range(len(own)):
         cosine = n[0] * normals[k, 0] + n[1] * normals[k, 1]
@@ -209,11 +201,11 @@ def find_pair_contacts(
     """
     room = 0
     for i, j in pairs:
-        room += first[i + 1] - first[i] + 1 if kind[j] == HALF_SPACE else 2
+        room += first[i + 1] - first[i] + 1 if kind[j] == near_pairs.HALF_SPACE else 2
     bodies, numbers = np.empty((room, 2), np.int64), np.empty((room, 7))
     key = np.empty(room, np.int64)
     found = np.empty((2, 4))
-    c = none = int(ZERO)
+    c = none = int(near_pairs.ZERO)
     late = np.zeros(len(pairs), np.bool_)
     for turn in range(2 * len(pairs)):
         p = turn % len(pairs)
@@ -221,9 +213,9 @@ def find_pair_contacts(
             continue
         i, j = pairs[p]
         margin = margins[i] + margins[j]
-        if kind[j] == HALF_SPACE:
+        if kind[j] == near_pairs.HALF_SPACE:
             n, offset = normals[first[j]], radius[j]
-            if kind[i] == DISC:
+            if kind[i] == near_pairs.DISC:
                 x, y = position[i]
                 gap = n[0] * x + n[1] * y - offset - radius[i]
                 if gap <= margin:
@@ -239,7 +231,7 @@ def find_pair_contacts(
                     bodies[c, 0], bodies[c, 1], key[c] = i, j, pack_key(i, j, v - first[i], none)
                     _store(numbers, c, x, y, n[0], n[1], gap, 0.0, np.inf)
                     c += 1
-        elif kind[i] == POLYGON and kind[j] == POLYGON:
+        elif kind[i] == near_pairs.POLYGON and kind[j] == near_pairs.POLYGON:
             vi, ni = vertices[first[i] : first[i + 1]], normals[first[i] : first[i + 1]]
             vj, nj = vertices[first[j] : first[j + 1]], normals[first[j] : first[j + 1]]
             face_i, gap_i = find_widest_face(vi, ni, vj)
@@ -278,11 +270,11 @@ def find_pair_contacts(
                 bodies[c, 0], bodies[c, 1], key[c] = a, b, pack_key(a, b, vertex, face)
                 _store(numbers, c, x, y, n[0], n[1], found[k, 3], 0.0, np.inf)
                 c += 1
-        elif kind[i] == DISC and kind[j] == DISC:
+        elif kind[i] == near_pairs.DISC and kind[j] == near_pairs.DISC:
             c += _find_round_contact(i, j, position[i], position[j], radius[i], radius[j], none,
                                 margin, c, bodies, numbers, key)  # fmt: skip
         else:
-            disc, grain = (i, j) if kind[i] == DISC else (j, i)
+            disc, grain = (i, j) if kind[i] == near_pairs.DISC else (j, i)
             x, y = position[disc]
             own = vertices[first[grain] : first[grain + 1]]
             outward = normals[first[grain] : first[grain + 1]]
@@ -326,7 +318,7 @@ def _find_round_contact(
     if distance - radius_a - radius_b > margin:
         return 0
     n0, n1 = (x / distance, y / distance) if distance > 0.0 else (0.0, 1.0)
-    bodies[c, 0], bodies[c, 1], key[c] = a, b, pack_key(a, b, int(ZERO), corner)
+    bodies[c, 0], bodies[c, 1], key[c] = a, b, pack_key(a, b, int(near_pairs.ZERO), corner)
     _store(numbers, c, centre_a[0] - radius_a * n0, centre_a[1] - radius_a * n1, n0, n1,
            distance - radius_a - radius_b, radius_a, radius_b)  # fmt: skip
     return 1

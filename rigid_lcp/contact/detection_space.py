@@ -10,18 +10,8 @@ import numpy as np
 from numba import njit
 
 from rigid_lcp.arrays import Floats, Ints
+from rigid_lcp.contact import manifold
 from rigid_lcp.contact.arrays import FEATURE_BITS, LENGTH_TIE, Contacts, pack_key
-from rigid_lcp.contact.manifold import (
-    CANDIDATE_COLUMNS,
-    CORNER_FACE,
-    EDGES,
-    FACE_CORNER,
-    MOST_KEPT,
-    ROOM,
-    add_candidate,
-    is_within_face,
-    keep_outer,
-)
 from rigid_lcp.contact.near_pairs import (
     HALF_SPACE,
     ZERO,
@@ -69,7 +59,7 @@ def touch_sphere_solid(solids: Solids, body: int, x: Floats, radius: float, row:
         distance = dot(solids.normal[f], x) - solids.offset[f]
         if distance > separation:
             best, separation = f, distance
-    if separation <= 0.0 or is_within_face(solids, body, best, x, 0.0):
+    if separation <= 0.0 or manifold.is_within_face(solids, body, best, x, 0.0):
         _fill(row, x, radius, solids.normal[best], separation - radius, np.inf)
         return best - first_face
     feature, nearest = 0, np.inf
@@ -188,10 +178,10 @@ def find_pair_contacts(
     A row of numbers: point (3), normal (3), gap, radii of curvature of a and b.  Pairs that several
     faces part wait until the others' contacts are known (`rigid_lcp.contact.parting_faces`).
     """
-    room = MOST_KEPT * len(pairs)
+    room = manifold.MOST_KEPT * len(pairs)
     bodies, numbers = np.empty((room, 2), np.int64), np.empty((room, 9))
     key = np.empty(room, np.int64)
-    found = np.empty((ROOM, CANDIDATE_COLUMNS))
+    found = np.empty((manifold.ROOM, manifold.CANDIDATE_COLUMNS))
     c = none = int(ZERO)
     late = np.zeros(len(pairs), np.bool_)
     for turn in range(2 * len(pairs)):
@@ -229,9 +219,9 @@ def find_pair_contacts(
         for k in range(count):
             form, first, second = int(found[k, 0]), int(found[k, 1]), int(found[k, 2])
             a, b, sign = i, j, 1.0
-            if form in (FACE_CORNER, EDGE_CORNER):  # the corner is body j's
+            if form in (manifold.FACE_CORNER, EDGE_CORNER):  # the corner is body j's
                 a, b, sign, first, second = j, i, -1.0, second, first
-            if form == EDGES:
+            if form == manifold.EDGES:
                 first, second = first + MOST_EDGES, second + MOST_EDGES
             elif form in (CORNER_EDGE, EDGE_CORNER):
                 second += MOST_EDGES
@@ -243,7 +233,7 @@ def find_pair_contacts(
                 numbers[c, axis] = found[k, 7 + axis]
                 numbers[c, 3 + axis] = sign * found[k, 4 + axis]
             numbers[c, 6], numbers[c, 7] = found[k, 3], 0.0
-            numbers[c, 8] = np.inf if form <= EDGES else 0.0
+            numbers[c, 8] = np.inf if form <= manifold.EDGES else 0.0
             c += 1
     return bodies[:c], numbers[:c], key[:c]
 
@@ -253,14 +243,14 @@ def find_corners_on_plane(
     solids: Solids, body: int, plane: int, margin: float, size: float, found: Floats
 ) -> int:
     """Corners of a polyhedron near a half-space, the outer ones; returns how many."""
-    count, kind = int(ZERO), int(CORNER_FACE)
+    count, kind = int(ZERO), int(manifold.CORNER_FACE)
     face = solids.first_face[plane]
     n, level, first = solids.normal[face], solids.offset[face], solids.first_vertex[body]
     for v in range(first, solids.first_vertex[body + 1]):
         x = solids.vertex[v]
         gap = dot(n, x) - level
         if gap <= margin:
-            count = add_candidate(
+            count = manifold.add_candidate(
                 found, count, kind, v - first, int(ZERO), gap, n, 1.0, x, LENGTH_TIE * size
             )
-    return keep_outer(found, count, size)
+    return manifold.keep_outer(found, count, size)

@@ -10,13 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from qdem_fem.contact.cuda.law import (
-    add_reactions,
-    build_pairs_forces,
-    compute_walls_forces,
-    move_spheres,
-    push_forces,
-)
+from qdem_fem.contact.cuda import law
 from qdem_fem.contact.cuda.pairs import renew_pairs
 from qdem_fem.contact.search import Pairs, PeriodicWidth
 from qdem_fem.contact.spheres import GO_ON, LOOK_AGAIN, TOO_DEEP, Contact, Planes, Spheres
@@ -57,7 +51,7 @@ class DeviceContact:
     def launch_push(self, forces: Any, status: Any, k: int) -> None:
         """Forces found in the step before reach the nodes."""
         c = self.on
-        push_forces[choose_grid(self.acting)](
+        law.push_forces[choose_grid(self.acting)](
             self.acting, c.pairs.acting, c.spheres.place, c.force, forces, status, k
         )
 
@@ -66,21 +60,21 @@ class DeviceContact:
     ) -> None:
         """Contact at the new displacement, as `qdem_fem.contact.spheres.law.build_advance`'s."""
         c, (s, p, w, *_), few = self.on, self.on, choose_grid(self.acting)
-        move_spheres[choose_grid(self.size)](
+        law.move_spheres[choose_grid(self.size)](
             s.reference, s.place, displacement, c.start, c.half_skin, c.position, status, k
         )
-        build_pairs_forces(self.side is not None)[few](
+        law.build_pairs_forces(self.side is not None)[few](
             self.acting, p.acting, p.first, p.second, p.touching, p.spring, p.pull, p.image,
             c.position, s.radius, s.normal, s.tangential, s.place, velocity, c.friction, c.force,
             c.slid, status, step, k,
         )  # fmt: skip
         if self.walls:
-            compute_walls_forces[few](
+            law.compute_walls_forces[few](
                 self.acting, p.acting, p.wall_first, p.wall, w.point, w.normal, w.friction,
                 w.spring, w.force, c.position, s.radius, s.normal, s.tangential, s.place, velocity,
                 c.force, c.slid, status, step, k,
             )  # fmt: skip
-        add_reactions[few](
+        law.add_reactions[few](
             self.acting, p.acting, p.back_first, p.back_pair, p.touching, p.pull, c.force, status,
             k,
         )  # fmt: skip

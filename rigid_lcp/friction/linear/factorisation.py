@@ -26,22 +26,9 @@ import numpy as np
 import scipy.linalg
 from numba import njit
 
+from rigid_lcp import sparse
 from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.friction.problem import FrictionProblem
-from rigid_lcp.sparse import (
-    EliminationTree,
-    add_contacts,
-    build_dense_delassus,
-    build_tree,
-    factor_fronts,
-    find_contact_stiffness,
-    list_body_pairs,
-    multiply_blocks,
-    push_bodies,
-    solve_fronts,
-    split_csr,
-    subtract_motion,
-)
 
 Solve = Callable[[Floats], Floats]
 
@@ -88,8 +75,8 @@ class DenseFactorisation:
         self.contacts, self.dim = problem.contacts, problem.dim
         if problem.matrix is None and problem.bodies is not None:
             bodies = problem.bodies
-            self.matrix: Floats = build_dense_delassus(
-                *split_csr(bodies.jacobian), *split_csr(bodies.inverse_mass)
+            self.matrix: Floats = sparse.build_dense_delassus(
+                *sparse.split_csr(bodies.jacobian), *sparse.split_csr(bodies.inverse_mass)
             )
         else:
             self.matrix = problem.delassus.toarray()
@@ -112,7 +99,7 @@ class BlockSystem:
 
     def __init__(self, count: int, size: int, rows: Ints, columns: Ints) -> None:
         """``count`` block rows of ``size`` rows each; blocks at (rows, columns)."""
-        tree = self.tree = build_tree(count, size, rows, columns)
+        tree = self.tree = sparse.build_tree(count, size, rows, columns)
         self.space = np.empty(tree.rest_most), np.empty(tree.stack_most)
         self.spare: list[Floats] = []
 
@@ -126,9 +113,11 @@ class BlockSystem:
     def factor(self, blocks: Floats) -> Solve:
         """Factor the matrix with these blocks (entries, size, size).  Raises `SingularSystem`."""
         factors = self.allocate_factors()
-        if not factor_fronts(self.tree, blocks, factors, *self.space):
+        if not sparse.factor_fronts(self.tree, blocks, factors, *self.space):
             raise SingularSystem
-        return self.bind_factors(lambda right: solve_fronts(self.tree, factors, right), factors)
+        return self.bind_factors(
+            lambda right: sparse.solve_fronts(self.tree, factors, right), factors
+        )
 
     def allocate_factors(self) -> Floats:
         """Memory for factors: of what no one needs any more, as new memory costs more than it
@@ -176,7 +165,7 @@ class BodyFactorisation:
         self.dim = problem.dim
         self.first, self.body, self.block = problem.body_jacobians
         own = np.arange(bodies) * (bodies + 1)
-        key = np.concatenate([own, list_body_pairs(self.first, self.body, bodies)])
+        key = np.concatenate([own, sparse.list_body_pairs(self.first, self.body, bodies)])
         found, places = np.unique(key, return_inverse=True)
         self.system = BlockSystem(bodies, size, found // bodies, found % bodies)
         self.flops = self.system.flops
@@ -206,27 +195,29 @@ class BodyFactorisation:
 
 @njit(cache=True)
 def factor_contacts(
-    tree: EliminationTree, mass: Floats, first: Ints, block: Floats, places: Ints,
+    tree: sparse.EliminationTree, mass: Floats, first: Ints, block: Floats, places: Ints,
     a: Floats, b: Floats, matrix: Floats, factors: Floats, rest: Floats, stack: Floats,
 ) -> tuple[Floats, Floats, bool]:  # fmt: skip
     """``A^-1``, ``A^-1 B`` and the ``factors`` of ``M + J^T A^-1 B J``, and whether there are any.
 
     ``matrix``, ``rest``, ``stack``: space to work in.
     """
-    inverse, stiffness, regular = find_contact_stiffness(a, b)
+    inverse, stiffness, regular = sparse.find_contact_stiffness(a, b)
     if not regular:
         return inverse, stiffness, False
     matrix[:] = mass
-    add_contacts(matrix, first, block, places, stiffness)
-    return inverse, stiffness, factor_fronts(tree, matrix, factors, rest, stack)
+    sparse.add_contacts(matrix, first, block, places, stiffness)
+    return inverse, stiffness, sparse.factor_fronts(tree, matrix, factors, rest, stack)
 
 
 @njit(cache=True)
 def solve_contacts(
-    tree: EliminationTree, factors: Floats, first: Ints, body: Ints, block: Floats,
+    tree: sparse.EliminationTree, factors: Floats, first: Ints, body: Ints, block: Floats,
     bodies: int, inverse: Floats, stiffness: Floats, right: Floats,
 ) -> Floats:  # fmt: skip
     """``dr = A^-1 (b - B J v)`` of the right-hand side b (nc, dim)."""
-    force = multiply_blocks(inverse, right)
-    push = push_bodies(first, body, block, bodies, force)
-    return subtract_motion(first, body, block, stiffness, force, solve_fronts(tree, factors, push))
+    force = sparse.multiply_blocks(inverse, right)
+    push = sparse.push_bodies(first, body, block, bodies, force)
+    return sparse.subtract_motion(
+        first, body, block, stiffness, force, sparse.solve_fronts(tree, factors, push)
+    )

@@ -7,20 +7,10 @@ import numpy as np
 from numba import njit
 
 from rigid_lcp.arrays import Floats, Ints
+from rigid_lcp.friction.pivots import updates
 from rigid_lcp.friction.pivots.drive import DONE, TOO_MANY
 from rigid_lcp.friction.pivots.shift import set_lists
 from rigid_lcp.friction.pivots.state import Pivots, drive_offset
-from rigid_lcp.friction.pivots.updates import (
-    BREAKING,
-    SLIDING_DOWN,
-    SLIDING_UP,
-    STATIC,
-    Geometry,
-    find_slide_sign,
-    multiply_geometry,
-    refresh_reduced,
-    solve_reduced,
-)
 from rigid_lcp.friction.problem import FrictionProblem
 
 
@@ -39,7 +29,7 @@ def follow_from_nothing(problem: FrictionProblem, state: Pivots, limit: int) -> 
     if len(ties):  # which way a contact would slide where q does not say: inside K*
         least = 1e-3 * covering[normal][geometry.tangent >= 0]
         covering[ties] = least * generator.uniform(-1.0, 1.0, len(ties))
-    state.reduced.kind[:] = BREAKING
+    state.reduced.kind[:] = updates.BREAKING
     b += covering
     state.a[:] = b
     return drive_offset(state, exact - b, True, limit)
@@ -54,15 +44,15 @@ def follow_from_forces(problem: FrictionProblem, state: Pivots, start: Floats, l
     reduced, geometry = state.reduced, state.geometry
     set_lists(state, kinds)
     members = reduced.members[: reduced.size[0]]
-    if not refresh_reduced(geometry, reduced):
+    if not updates.refresh_reduced(geometry, reduced):
         return TOO_MANY
     exact = state.b - state.shift[0] * force.ravel()[state.rows]  # a proximal step from the start
-    state.f[members] = solve_reduced(reduced, exact)
+    state.f[members] = updates.solve_reduced(reduced, exact)
     little = 1e-3 * float(np.abs(state.f).mean()) or 1.0
     noise = np.random.default_rng(2).uniform(0.5, 1.5, (nc, 2))
     make_consistent(geometry, kinds, state.f, state.a, exact, little, problem.rho, noise)
     product = np.zeros_like(exact)
-    multiply_geometry(geometry, state.f, product)
+    updates.multiply_geometry(geometry, state.f, product)
     state.b[:] = state.a - product
     return drive_offset(state, exact - state.b, True, limit)
 
@@ -70,45 +60,45 @@ def follow_from_forces(problem: FrictionProblem, state: Pivots, start: Floats, l
 @njit(cache=True)
 def read_lists(force: Floats, velocity: Floats, mu: Floats, rho: float, slip: Ints) -> Ints:
     """List of each contact: on which face of its cone the natural map projects it."""
-    kinds = np.full(len(mu), BREAKING)
+    kinds = np.full(len(mu), updates.BREAKING)
     for c in range(len(mu)):
         tangential = force[c, 1] - rho * velocity[c, 1] if mu[c] > 0.0 else 0.0
         normal = force[c, 0] - rho * (velocity[c, 0] + mu[c] * abs(velocity[c, 1]))
         if slip[c] != 0:
             if force[c, 0] > rho * velocity[c, 0]:
-                kinds[c] = SLIDING_UP if slip[c] > 0 else SLIDING_DOWN
+                kinds[c] = updates.SLIDING_UP if slip[c] > 0 else updates.SLIDING_DOWN
         elif mu[c] * abs(tangential) > -normal:
             if mu[c] > 0.0 and abs(tangential) <= mu[c] * normal:
-                kinds[c] = STATIC
+                kinds[c] = updates.STATIC
             else:
-                kinds[c] = SLIDING_UP if tangential >= 0.0 else SLIDING_DOWN
+                kinds[c] = updates.SLIDING_UP if tangential >= 0.0 else updates.SLIDING_DOWN
     return kinds
 
 
 @njit(cache=True)
 def make_consistent(
-    geometry: Geometry, kinds: Ints, f: Floats, a: Floats, b: Floats, little: float, rho: float,
-    noise: Floats,
+    geometry: updates.Geometry, kinds: Ints, f: Floats, a: Floats, b: Floats, little: float,
+    rho: float, noise: Floats,
 ) -> None:  # fmt: skip
     """Move f and a, as little as need be, to where every contact obeys the rules of its list."""
     for c in range(len(kinds)):
         n, t, mu = geometry.normal[c], geometry.tangent[c], geometry.mu[c]
-        sign = find_slide_sign(kinds[c])
-        if kinds[c] == BREAKING:
+        sign = updates.find_slide_sign(kinds[c])
+        if kinds[c] == updates.BREAKING:
             f[n] = 0.0
         else:
             f[n] = max(f[n], little * noise[c, 0])
         if t >= 0:
-            f[t] = sign * mu * f[n] if kinds[c] != STATIC else f[t]
+            f[t] = sign * mu * f[n] if kinds[c] != updates.STATIC else f[t]
             bound = mu * f[n] * (1.0 - 1e-3 * noise[c, 1])
-            if kinds[c] == STATIC:
+            if kinds[c] == updates.STATIC:
                 f[t] = min(max(f[t], -bound), bound)
     a[:] = b
-    multiply_geometry(geometry, f, a)
+    updates.multiply_geometry(geometry, f, a)
     for c in range(len(kinds)):
-        n, t, sign = geometry.normal[c], geometry.tangent[c], find_slide_sign(kinds[c])
-        a[n] = max(a[n], little / rho * noise[c, 0]) if kinds[c] == BREAKING else 0.0
-        if t >= 0 and kinds[c] == STATIC:
+        n, t, sign = geometry.normal[c], geometry.tangent[c], updates.find_slide_sign(kinds[c])
+        a[n] = max(a[n], little / rho * noise[c, 0]) if kinds[c] == updates.BREAKING else 0.0
+        if t >= 0 and kinds[c] == updates.STATIC:
             a[t] = 0.0
         elif t >= 0 and sign != 0.0 and geometry.slip[c] == 0:
             a[t] = -sign * max(-sign * a[t], little / rho * noise[c, 1])
