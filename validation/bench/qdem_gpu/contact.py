@@ -91,7 +91,7 @@ def guard_processor(run: q.Simulation) -> Iterator[list[str]]:
 
     refused = AssertionError("the processor was asked")
     with (
-        patch("qdem_fem.contact.sphere_state.renew_pairs", side_effect=refused),
+        patch("qdem_fem.contact.search.renew_pairs", side_effect=refused),
         patch("qdem_fem.contact.state.advance_contact", side_effect=refused),
         patch.object(DeviceContact, "fetch", fetch_noted),
         patch.object(CudaAssembly, "_read", read_noted),
