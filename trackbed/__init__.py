@@ -1,4 +1,4 @@
-"""trackbed: the command, and the floor that the three stories stand on."""
+"""trackbed: the command, and the floor that the four stories stand on."""
 
 from importlib import import_module
 from typing import Any

@@ -17,7 +17,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-STORIES = ("adapters", "qdem_fem", "rigid_lcp")
+STORIES = ("adapters", "qdem_fem", "rigid_lcp", "track_line")
 PRODUCT = ("trackbed", *STORIES)
 DECKS = ("yade_scripts", "liggghts_inputs", "lammps_inputs")
 VAGUE = {"utils", "util", "helpers", "helper", "common", "core", "manager", "misc", "tools"}

@@ -12,7 +12,7 @@ from trackbed.command import VERBS
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(ROOT.glob("docs/*.md"))]
-PACKAGES = ("adapters", "qdem_fem", "rigid_lcp", "trackbed", "validation")
+PACKAGES = ("adapters", "qdem_fem", "rigid_lcp", "track_line", "trackbed", "validation")
 STUDIES = {path.parent.name.replace("_", "-") for path in ROOT.glob("validation/studies/*/page.md")}
 HISTORY = re.compile(r"`[^`]*6035ef5:[^`]*`")
 """Places in an earlier commit."""

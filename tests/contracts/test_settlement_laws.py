@@ -1,0 +1,85 @@
+"""What every settlement law of beds satisfies, found as it is; none is named here."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from track_line.laws import BedLoad, Law, get_law, list_laws
+from trackbed.errors import UsageError
+
+FORCE = np.array([0.0, 5e3, 20e3, 35e3, 60e3])
+LOAD = BedLoad(FORCE, np.full(5, 28e6))
+ROUND_OFF = 1e-12
+
+every_law = pytest.mark.parametrize("name", list_laws())
+
+
+def make(name: str) -> Law:
+    """The law with its own parameters."""
+    return get_law(name)()
+
+
+@every_law
+def test_it_says_where_it_is_from(name: str) -> None:
+    """Formula, source and validity are sentences; every parameter is a number with a default."""
+    law = make(name)
+    for said in (law.formula, law.source, law.validity):
+        assert len(said) > 10, f"{name} does not say its formula, source or validity"
+    assert all(isinstance(getattr(law, one.name), float) for one in fields(law))  # type: ignore[arg-type]
+
+
+@every_law
+def test_a_sleeper_that_hangs_does_not_settle(name: str) -> None:
+    """No force, no settlement; more force, at least as much; nothing ever heaves."""
+    law = make(name)
+    for cycle, settled in ((0.0, np.zeros(5)), (1e4, np.full(5, 2e-3))):
+        grown = law.advance(LOAD, settled, cycle, 1e3)
+        assert grown[0] == 0
+        assert (np.diff(grown) >= 0).all()
+        assert grown[-1] > 0
+
+
+@every_law
+def test_what_it_adds_is_the_integral_of_its_rate(name: str) -> None:
+    """``advance`` solves ds/dN = rate(F, s, N) at constant load, by an independent integrator."""
+    law, load = make(name), BedLoad(FORCE[2:], LOAD.bed[2:])
+    begin = law.advance(load, np.zeros(3), 0.0, 50.0)
+
+    def slope(cycle: float, settled: np.ndarray) -> np.ndarray:
+        return law.rate(load, settled, cycle)
+
+    found = solve_ivp(slope, (50.0, 5e4), begin, method="LSODA", rtol=1e-10, atol=1e-16)
+    grown = law.advance(load, begin, 50.0, 5e4 - 50.0)
+    assert begin + grown == pytest.approx(found.y[:, -1], rel=1e-6)
+
+
+@every_law
+@pytest.mark.parametrize(("cycle", "first", "second"), [(0.0, 3.0, 9e4), (1e5, 1e-3, 1e6)])
+def test_two_spans_are_one(name: str, cycle: float, first: float, second: float) -> None:
+    """Axles in two lots settle a bed as those in one do, from the first axle on."""
+    law = make(name)
+    before = law.advance(LOAD, np.zeros(5), 0.0, cycle) if cycle else np.zeros(5)
+    one = law.advance(LOAD, before, cycle, first + second)
+    part = law.advance(LOAD, before, cycle, first)
+    two = law.advance(LOAD, before + part, cycle + first, second)
+    assert part + two == pytest.approx(one, rel=1e-8)
+    assert np.isfinite(one).all()
+
+
+@every_law
+def test_lengths_scale(name: str) -> None:
+    """Arrays of any shape give the same numbers, one by one."""
+    law = make(name)
+    wide = BedLoad(np.broadcast_to(FORCE, (3, 5)), np.broadcast_to(LOAD.bed, (3, 5)))
+    many = law.advance(wide, np.full((3, 5), 1e-3), 10.0, 1e4)
+    one = law.advance(LOAD, np.full(5, 1e-3), 10.0, 1e4)
+    np.testing.assert_allclose(many, np.broadcast_to(one, (3, 5)), rtol=ROUND_OFF)
+
+
+def test_a_law_that_is_not_there_is_a_sentence() -> None:
+    with pytest.raises(UsageError, match="there is no settlement law 'shenten'; did you mean"):
+        get_law("shenten")

@@ -1,0 +1,9 @@
+"""Arrays by what they hold, as signatures name them; their shapes are in the docstrings."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]

@@ -1,0 +1,90 @@
+"""The rail as an Euler-Bernoulli beam of Hermite elements, one a bay: exact between the seats."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from skfem import Basis, BilinearForm, ElementLineHermite, LinearForm, MeshLine
+from skfem.helpers import dd, ddot
+
+from track_line.arrays import Floats
+
+GRAVITY = 9.81
+"""[m/s^2]"""
+CUBIC = 3
+"""Order of integration that is exact for curvature times curvature and for a load a metre."""
+
+
+@dataclass(frozen=True)
+class Track:
+    """One rail and its half of every sleeper; a 60E1 rail on concrete sleepers."""
+
+    bending: float = 6.3798e6
+    """E I of the rail [N m^2]."""
+    rail_mass: float = 60.21
+    """[kg/m]"""
+    pad: float = 100e6
+    """Stiffness of a rail pad [N/m]."""
+    sleeper_mass: float = 150.0
+    """Of half a sleeper [kg]."""
+    spacing: float = 0.6
+    """From sleeper to sleeper [m]."""
+
+    @property
+    def sleeper_weight(self) -> float:
+        """Of half a sleeper [N]."""
+        return self.sleeper_mass * GRAVITY
+
+
+@dataclass(frozen=True)
+class Rail:
+    """A free rail over n seats as blocks of a symmetric matrix, for deflection [m], positive
+    downwards, and slope [-] at each seat."""
+
+    diagonal: Floats
+    """Blocks (w w, w slope, slope slope) of each seat, shape (n, 3) [N/m, N, N m]."""
+    upper: Floats
+    """Blocks to the next seat, row by row, shape (n - 1, 4)."""
+    weight: Floats
+    """Of the rail, consistent with its elements, shape (n, 2) [N, N m]."""
+
+
+@BilinearForm
+def bend(u, v, w):  # type: ignore[no-untyped-def]
+    """Curvature times curvature."""
+    return ddot(dd(u), dd(v))
+
+
+@LinearForm
+def press(v, w):  # type: ignore[no-untyped-def]
+    """A load of one a metre."""
+    return v
+
+
+def assemble_rail(place: Floats, track: Track) -> Rail:
+    """The rail over seats at ``place`` (n,) [m], increasing; its ends are free."""
+    basis = Basis(MeshLine(place), ElementLineHermite(), intorder=CUBIC)
+    order = basis.nodal_dofs.T  # deflection and slope of each seat
+    matrix = (track.bending * bend.assemble(basis)).tocsr()
+
+    def take(first: Floats, second: Floats) -> Floats:
+        return np.asarray(matrix[first, second]).ravel()
+
+    w, slope = order.T
+    diagonal = np.stack([take(w, w), take(w, slope), take(slope, slope)], axis=1)
+    ways = [(w, w), (w, slope), (slope, w), (slope, slope)]
+    upper = np.stack([take(a[:-1], b[1:]) for a, b in ways], axis=1)
+    weight = track.rail_mass * GRAVITY * press.assemble(basis)
+    return Rail(diagonal, upper, weight[order])
+
+
+def find_critical_speed(track: Track, stiffness: float) -> float:
+    """Speed [m/s] at which a load would run into its own waves, (4 u E I/m^2)^(1/4).
+
+    u: ``stiffness`` of a seat, pad and bed in series [N/m], over the spacing; m: rail and sleepers
+    a metre (Timoshenko 1926).  At a speed v rail deflections are 1/sqrt(1 - (v/v_cr)^2) of those
+    at rest, in which this story computes.
+    """
+    mass = track.rail_mass + track.sleeper_mass / track.spacing
+    return float((4 * stiffness / track.spacing * track.bending / mass**2) ** 0.25)

@@ -1,0 +1,44 @@
+"""What a settlement law is.
+
+A law is a frozen dataclass whose fields are its parameters in SI units, with defaults.  It speaks
+of a bed of mean quality; that others settle more is the scatter's (`track_line.beds`).
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar
+
+from track_line.arrays import Floats
+
+
+@dataclass(frozen=True)
+class BedLoad:
+    """What an axle does to beds; arrays of one shape."""
+
+    force: Floats
+    """Greatest force R of half a sleeper on its bed [N], zero where it hangs."""
+    bed: Floats
+    """Stiffness of the bed under half a sleeper [N/m]."""
+
+
+class Law(ABC):
+    """ds/dN as a function of load, settlement and axles so far.
+
+    Hardening by time: the rate depends on N alone; by strain: on s alone.
+    """
+
+    formula: ClassVar[str]
+    source: ClassVar[str]
+    """Where the form and the defaults are from, and which of the two is not."""
+    validity: ClassVar[str]
+    """What it was measured on, and what it is not for."""
+
+    @abstractmethod
+    def rate(self, load: BedLoad, settled: Floats, cycle: float) -> Floats:
+        """ds/dN [m] at the settlement s = ``settled`` [m] behind N = ``cycle`` axles."""
+
+    @abstractmethod
+    def advance(self, load: BedLoad, settled: Floats, cycle: float, cycles: float) -> Floats:
+        """The integral of `rate` over ``cycles`` further axles at constant load [m]."""

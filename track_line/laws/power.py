@@ -1,0 +1,53 @@
+"""Power law with strain hardening: what an ensemble of grain beds, or a test, is fitted by."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from track_line.arrays import Floats
+from track_line.laws.contract import BedLoad, Law
+
+
+@dataclass(frozen=True)
+class Power(Law):
+    """s = a (F/F0)^m N^b at constant force; ds/dN = b u^(1/b) s^(1 - 1/b), u = a (F/F0)^m.
+
+    A bed that was loaded less goes on where a bed of its settlement would be: the rate forgets how
+    it came there.  a, b: of ``trackbed fit --law power`` to a sweep's mean, without its c.
+    """
+
+    a: float = 0.7e-3
+    """Settlement by the first axle [m]."""
+    force: float = 34e3
+    """F0: the force at which a was found [N]."""
+    m: float = 1.6
+    """Exponent of the force [-]."""
+    b: float = 0.2
+    """Exponent of the axles [-]."""
+
+    formula = "s = a (F/F0)^m N^b"
+    source = (
+        "form: Monismith et al. 1975; m: Hettler 1984, quoted from memory; a, b: an example, to be "
+        "replaced by a fit"
+    )
+    validity = "the cycles and the ballast it was fitted to; no collapse, no threshold"
+
+    def _first(self, load: BedLoad) -> Floats:
+        """u: settlement by one axle of this load [m]."""
+        return np.asarray(self.a * (load.force / self.force) ** self.m)
+
+    def rate(self, load: BedLoad, settled: Floats, cycle: float) -> Floats:
+        first = self._first(load)
+        return np.asarray(self.b * first ** (1 / self.b) * settled ** (1 - 1 / self.b))
+
+    def advance(self, load: BedLoad, settled: Floats, cycle: float, cycles: float) -> Floats:
+        first = self._first(load)
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+            further = cycles * (first / settled) ** (1 / self.b)  # over the axles that it had
+            grown = settled * np.expm1(self.b * np.log1p(further))
+        return np.where(settled > 0, grown, first * cycles**self.b)
+
+
+LAW = Power

@@ -1,0 +1,110 @@
+"""From block to block: axles roll by, beds settle, the level is taken."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from track_line.arrays import Bools, Floats
+from track_line.beam import Passage, rest_wheels, roll_axle
+from track_line.beds import renew_scores
+from track_line.laws import BedLoad
+from track_line.settling.blocks import find_block
+from track_line.settling.level import measure_deviations
+from track_line.settling.line import Line
+
+VOIDS = (0.1e-3, 1e-3)
+"""Gaps under hanging sleepers that are counted [m]."""
+
+
+@dataclass(frozen=True)
+class State:
+    """A line after some axles."""
+
+    cycle: float
+    """Axles so far."""
+    settled: Floats
+    """How deep each bed lies, shape (b, n) [m]; where it began is in it."""
+    hardened: Floats
+    """What the law has made a mean bed of this history settle, shape (b, n) [m]."""
+    score: Floats
+    """Of the settlement, standard normal, shape (b, n)."""
+    bears: tuple[Bools, ...] = ()
+    """Which sleepers bear while each kind of axle rolls by; where the next passage begins."""
+
+
+@dataclass(frozen=True)
+class Record:
+    """What a recording car, and a look below the sleepers, find in b realisations."""
+
+    cycle: float
+    settlement: Floats
+    """Mean of the beds, shape (b,) [m]."""
+    deviation: Floats
+    """Standard deviation of D1 under the first axle, each section, shape (b, sections) [m]."""
+    voids: Floats
+    """Share of sleepers that hang by more than each of `VOIDS`, shape (2, b) [-]."""
+    deepest: Floats
+    """Greatest gap, shape (b,) [m]."""
+
+
+def start_line(line: Line) -> State:
+    """Before the first axle."""
+    level = line.beds.level
+    return State(0.0, level.copy(), np.zeros_like(level), line.beds.score)
+
+
+def march_line(
+    line: Line, state: State, end: float, *, finer: float = 1.0
+) -> Iterator[tuple[State, Record]]:
+    """States and records before each block, and at the ``end`` [axles].
+
+    ``finer``: by which blocks are smaller than stability asks.  Raises `NotConverged`.
+    """
+    while True:
+        passages = _roll_axles(line, state)
+        state = replace(state, bears=tuple(one.bears for one in passages))
+        yield state, _take_record(line, state, passages[0])
+        if state.cycle >= end:
+            return
+        state = _settle_block(line, state, [one.force for one in passages], end, finer)
+
+
+def _roll_axles(line: Line, state: State) -> list[Passage]:
+    """A passage of each kind of axle."""
+    bears = state.bears or (None,) * len(line.traffic.axles)
+    return [
+        roll_axle(line.rail, line.support, state.settled, axle.wheel, one)
+        for axle, one in zip(line.traffic.axles, bears, strict=True)
+    ]
+
+
+def _settle_block(
+    line: Line, state: State, forces: list[Floats], end: float, finer: float
+) -> State:
+    """The state behind the next block of axles."""
+    factor = line.beds.find_factors(state.score, line.scatter.settlement)
+    cycles = find_block(line, forces, state.hardened, factor, state.cycle, end, finer)
+    grown = np.zeros_like(factor)
+    for axle, force in zip(line.traffic.axles, forces, strict=True):
+        load = BedLoad(force, line.support.bed)
+        grown += axle.share * line.law.advance(load, state.hardened, state.cycle, cycles)
+    before = float(state.hardened.mean())
+    hardened = state.hardened + grown
+    score = renew_scores(
+        state.score, line.scatter, line.seed, line.track.spacing, before, float(hardened.mean())
+    )
+    cycle = state.cycle + cycles
+    cycle = end if cycle > end * (1 - 1e-12) else cycle
+    return State(cycle, state.settled + factor * grown, hardened, score, state.bears)
+
+
+def _take_record(line: Line, state: State, passage: Passage) -> Record:
+    """What is seen of a state under a passing axle, and at rest."""
+    rest = rest_wheels(line.rail, line.support, state.settled, np.zeros(len(line.beds.place)))
+    gap, settled = (a[:, line.inside] for a in (rest.gap, state.settled - line.beds.level))
+    voids = np.array([(gap > least).mean(axis=1) for least in VOIDS])
+    deviation = measure_deviations(passage.level, line.track.spacing)
+    return Record(state.cycle, settled.mean(axis=1), deviation, voids, gap.max(axis=1))
