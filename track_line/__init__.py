@@ -1,8 +1,7 @@
 """Track geometry: how uneven a line becomes under its axles, and when it has to be tamped.
 
 A rail on pads, sleepers and beds that only push; each bed settles by a law of its load and its
-history.  Start with a scene (`track_line.scene`) or with the rooms below it: `track_line.beam`,
-`track_line.beds`, `track_line.laws`, `track_line.settling`.
+history.  Start with `track_line.scene`, or from Python with `track_line.settling`.
 """
 
 from trackbed.cache_folders import provide_cache_folders

@@ -33,6 +33,7 @@ VERBS = {
     "grains": ("qdem_fem.cli.track", "random ballast grains of a standard grading, as a file"),
     "train": ("qdem_fem.cli.track", "load of a passing train on a sleeper's rail seats, as CSV"),
     "rigid": ("rigid_lcp.cli", "rigid, sharp-edged grains with friction, from a scene file"),
+    "line": ("track_line.cli", "how uneven a line becomes and when to tamp it, from a scene file"),
     "validate": ("validation.cli", "measure trackbed against a case with a known answer"),
     "cite": (START, "print what to cite, as BibTeX"),
 }
@@ -50,7 +51,7 @@ def build_parser(verb: str | None) -> argparse.ArgumentParser:
     """The command's parser; only ``verb`` gets its arguments, so only its package is loaded."""
     parser = argparse.ArgumentParser(
         prog="trackbed",
-        description="Railway ballast: settlement under load cycles, vibration, hard grains.",
+        description="Railway ballast: settlement under load cycles, vibration, hard grains, track geometry.",
         epilog=describe_exit_codes(),
         formatter_class=HelpFormatter,
         allow_abbrev=False,

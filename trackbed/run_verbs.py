@@ -1,6 +1,6 @@
 """The verbs about a finished or stopped run, for every kind of run folder.
 
-A settlement run is its story's; of QDEM and rigid runs, which are gone on with by the command that
+A settlement run is its story's; of the others, which are gone on with by the command that
 started them, the same verbs say here how far they are and what to do.
 """
 
@@ -39,6 +39,7 @@ KINDS = (
          "energy.csv in a spreadsheet"),
     Kind("run", "rigid", "frame_*.npz", "history.csv opens in a spreadsheet, movie.gif in a "
          "browser, frame_*.npz in NumPy"),
+    Kind("line", "line", "state.npz", "geometry.csv opens in a spreadsheet, state.npz in NumPy"),
 )  # fmt: skip
 
 

@@ -11,7 +11,7 @@ from trackbed.command import main
 from trackbed.errors import EXIT_CODES, Interrupted, TrackbedError
 
 ERRORS = ("adapters.errors", "qdem_fem.files.errors", "rigid_lcp.errors")
-DOORS = {"run": "engine", "qdem": "simulation", "rigid": "run"}
+DOORS = {"run": "engine", "qdem": "simulation", "rigid": "run", "line": "line"}
 """Verbs that read a scene file, and a table of each."""
 
 
@@ -41,7 +41,7 @@ def test_an_error_says_what_where_and_what_to_do() -> None:
 def test_a_missing_scene_reads_alike_at_every_door(
     verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """No file: exit code 2 and the file's name first, at all three doors."""
+    """No file: exit code 2 and the file's name first, at every door."""
     path = tmp_path / "none.toml"
     assert main([verb, str(path)]) == 2
     said = capsys.readouterr().err

@@ -19,7 +19,10 @@ from trackbed.run_files.folder import RunFolder, is_written, lock_folder, refuse
 from trackbed.run_files.whole import append_text, replace_file, seal_file, write_whole
 
 ROOT = Path(__file__).parents[2]
-FOLDERS = ("adapters.files.run_folder", "qdem_fem.scene.run", "rigid_lcp.scene.run")
+FOLDERS = (
+    "adapters.files.run_folder", "qdem_fem.scene.run", "rigid_lcp.scene.run",
+    "track_line.scene.run",
+)  # fmt: skip
 
 
 class Folder(RunFolder):

@@ -16,7 +16,9 @@ STARTED = "trackbed VERB a.toml --set 'x=[1, 2]' --force"
 SCENES: dict[str, Any] = {
     "qdem": {"scene": {"title": "beam", "simulation": {}}, "files": {}},
     "rigid": {"scene": {"title": "pile", "run": {}}},
+    "line": {"scene": {"title": "a kilometre", "line": {}}},
 }
+STATES = {"qdem": "checkpoint.npz", "rigid": "frame_000000.npz", "line": "state.npz"}
 
 
 def folder_of(kind: str, path: Path) -> Path:
@@ -25,7 +27,7 @@ def folder_of(kind: str, path: Path) -> Path:
     command = STARTED.replace("VERB", kind)
     origin = {"command": command} if kind == "qdem" else {"provenance": {"command": command}}
     (path / "manifest.json").write_text(json.dumps(SCENES[kind] | origin))
-    (path / ("checkpoint.npz" if kind == "qdem" else "frame_000000.npz")).touch()
+    (path / STATES[kind]).touch()
     return path
 
 

@@ -195,8 +195,8 @@ def test_nearest_word_is_suggested(word: str, said: str) -> None:
     assert suggest_word(word, ["way", "step"]) == said
 
 
-@pytest.mark.parametrize("name", ["karrech-coarse", "cantilever-vibration", "pile"])
-@pytest.mark.parametrize("verb", ["run", "qdem", "rigid"])
+@pytest.mark.parametrize("name", ["karrech-coarse", "cantilever-vibration", "pile", "line"])
+@pytest.mark.parametrize("verb", ["run", "qdem", "rigid", "line"])
 def test_a_scene_names_its_verb(
     tmp_path: Path, name: str, verb: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -14,14 +14,13 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import partial
 
 import numba
 import numpy as np
 
 from track_line.arrays import Bools, Floats
 from track_line.beam.kernel import BROKEN, pass_comb
-from track_line.beam.rail import Rail, Track
+from track_line.beam.rail import GRAVITY, Rail, Track
 from trackbed.errors import NotConverged
 
 
@@ -79,7 +78,8 @@ class Passage:
 
 def make_support(track: Track, bed: Floats) -> Support:
     """Beds of these stiffnesses (b, n) [N/m] under the pads and sleepers of a track."""
-    return Support(bed, track.pad * bed / (track.pad + bed), track.sleeper_weight, track.pad)
+    series = track.pad * bed / (track.pad + bed)
+    return Support(bed, series, track.sleeper_mass * GRAVITY, track.pad)
 
 
 def rest_wheels(rail: Rail, support: Support, settled: Floats, load: Floats) -> Rest:
@@ -119,20 +119,12 @@ def _solve(
     level, force = np.empty_like(settled), np.empty_like(settled)
     rest = support.series * (settled + support.sleeper_weight / support.bed)
     lifted = settled - support.sleeper_weight / support.pad
-    inside = partial(
-        pass_comb, rail.diagonal, rail.upper, rail.weight, load, support.sleeper_weight,
-        period, COMB.turns,
-    )  # fmt: skip
-    threads = min(numba.get_num_threads(), len(settled))
-    parts = [slice(len(settled) * k // threads, len(settled) * (k + 1) // threads)
-             for k in range(threads)]  # fmt: skip
-
-    def solve_part(part: slice) -> int:
-        given = (support.series[part], rest[part], lifted[part], bears[part])
-        return int(inside(*given, level[part], force[part]))
-
+    given = rail.diagonal, rail.upper, rail.weight, load, support.sleeper_weight, period, COMB.turns
+    threads = numba.get_num_threads()
+    shared = (support.series, rest, lifted, bears, level, force)
+    parts = zip(*(np.array_split(each, threads) for each in shared), strict=True)
     with ThreadPoolExecutor(threads) as pool:
-        status = list(pool.map(solve_part, parts))
+        status = list(pool.map(lambda part: pass_comb(*given, *part), parts))
     if BROKEN in status or any(status):
         why = "no two sleepers bear" if BROKEN in status else f"{COMB.turns} turns did not do"
         raise NotConverged(

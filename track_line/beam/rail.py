@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 from skfem import Basis, BilinearForm, ElementLineHermite, LinearForm, MeshLine
 from skfem.helpers import dd, ddot
 
 from track_line.arrays import Floats
+from trackbed.scene_files import NonNegative, Positive, Real, Table
 
 GRAVITY = 9.81
 """[m/s^2]"""
@@ -16,25 +19,21 @@ CUBIC = 3
 """Order of integration that is exact for curvature times curvature and for a load a metre."""
 
 
-@dataclass(frozen=True)
-class Track:
-    """One rail and its half of every sleeper; a 60E1 rail on concrete sleepers."""
+class Track(Table):
+    """One rail and its half of every sleeper: a 60E1 rail, concrete sleepers."""
 
-    bending: float = 6.3798e6
+    bending: Positive = 6.3798e6
     """E I of the rail [N m^2]."""
-    rail_mass: float = 60.21
+    rail_mass: NonNegative = 60.21
     """[kg/m]"""
-    pad: float = 100e6
+    pad: Positive = 100e6
     """Stiffness of a rail pad [N/m]."""
-    sleeper_mass: float = 150.0
+    bed: Positive = 28e6
+    """Mean stiffness of the beds, under half a sleeper [N/m]."""
+    sleeper_mass: NonNegative = 150.0
     """Of half a sleeper [kg]."""
-    spacing: float = 0.6
+    spacing: Annotated[Real, Field(ge=0.2, le=1.2)] = 0.6
     """From sleeper to sleeper [m]."""
-
-    @property
-    def sleeper_weight(self) -> float:
-        """Of half a sleeper [N]."""
-        return self.sleeper_mass * GRAVITY
 
 
 @dataclass(frozen=True)
@@ -77,14 +76,3 @@ def assemble_rail(place: Floats, track: Track) -> Rail:
     upper = np.stack([take(a[:-1], b[1:]) for a, b in ways], axis=1)
     weight = track.rail_mass * GRAVITY * press.assemble(basis)
     return Rail(diagonal, upper, weight[order])
-
-
-def find_critical_speed(track: Track, stiffness: float) -> float:
-    """Speed [m/s] at which a load would run into its own waves, (4 u E I/m^2)^(1/4).
-
-    u: ``stiffness`` of a seat, pad and bed in series [N/m], over the spacing; m: rail and sleepers
-    a metre (Timoshenko 1926).  At a speed v rail deflections are 1/sqrt(1 - (v/v_cr)^2) of those
-    at rest, in which this story computes.
-    """
-    mass = track.rail_mass + track.sleeper_mass / track.spacing
-    return float((4 * stiffness / track.spacing * track.bending / mass**2) ** 0.25)

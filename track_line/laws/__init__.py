@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from track_line.laws.contract import BedLoad, Law
 from trackbed.choices import find_choice, find_choices
 
-__all__ = ["BedLoad", "Law", "get_law", "list_laws", "make_law"]
+__all__ = ["BedLoad", "Law", "get_law", "list_laws"]
 
 
 def list_laws() -> tuple[str, ...]:
@@ -19,8 +17,3 @@ def get_law(name: str) -> type[Law]:
     """The law of this name; raises `UsageError` with the nearest name when there is none."""
     law: type[Law] = find_choice(__name__, "LAW", name, "there is no settlement law")
     return law
-
-
-def make_law(name: str, parameters: Mapping[str, float]) -> Law:
-    """The law of this name with some parameters in place of its own [SI]; raises `UsageError`."""
-    return get_law(name)(**parameters)

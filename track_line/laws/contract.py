@@ -15,7 +15,7 @@ from track_line.arrays import Floats
 
 @dataclass(frozen=True)
 class BedLoad:
-    """What an axle does to beds; arrays of one shape."""
+    """What an axle does to beds; arrays that fit each other."""
 
     force: Floats
     """Greatest force R of half a sleeper on its bed [N], zero where it hangs."""

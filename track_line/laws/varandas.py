@@ -9,7 +9,7 @@ import numpy as np
 from track_line.arrays import Floats
 from track_line.laws.contract import BedLoad, Law
 
-SHIFT = 16.0
+SHIFT = 100.0
 """From where on the series below is summed by Euler and Maclaurin, to 1e-9."""
 
 
@@ -44,14 +44,12 @@ class Varandas(Law):
     def _smooth(self, n: float) -> float:
         """H(n) up to a constant, for large n (Euler and Maclaurin)."""
         tail = n**-self.beta / 2 - self.beta * n ** (-self.beta - 1) / 12
-        third = self.beta * (self.beta + 1) * (self.beta + 2) * n ** (-self.beta - 3) / 720
-        return float(n ** (1 - self.beta) / (1 - self.beta) + tail + third)
+        return float(n ** (1 - self.beta) / (1 - self.beta) + tail)
 
     def _slope(self, number: float) -> float:
         """dH/dn [-]."""
         n, b, places = SHIFT + number, self.beta, np.arange(1, int(SHIFT) + 1)
         smooth = n**-b - b * n ** (-b - 1) / 2 + b * (b + 1) * n ** (-b - 2) / 12
-        smooth -= b * (b + 1) * (b + 2) * (b + 3) * n ** (-b - 4) / 720
         return float(smooth + (b * (number + places) ** (-b - 1)).sum())
 
     def _scale(self, load: BedLoad) -> Floats:

@@ -8,8 +8,7 @@ sleeper with another sign; for ds ~ F^m that is ds > 2 F/(m k_s).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import brentq
@@ -32,42 +31,38 @@ class Blocks:
     spread: float = 0.2
     sample: int = 4000
     """Beds by which a block is chosen, spread over all lines."""
+    search: float = 20.0
+    """Powers of e over which the length of a block is looked for."""
     nudge: float = 1e-4
     """Of the force, for ds/dF [-]."""
-    shortest: float = 1e-9
-    """Of a block over the whole run [-]."""
 
 
 BLOCKS = Blocks()
 
 
 def measure_gain(
-    line: Line, forces: list[Floats], hardened: Floats, factor: Floats, cycle: float,
-    cycles: float, every: int = 1,
+    line: Line, force: Floats, hardened: Floats, factor: Floats, cycle: float, cycles: float,
+    every: int = 1,
 ) -> Floats:  # fmt: skip
-    """k_s ds/dF of beds [-] for a block of ``cycles`` axles behind ``cycle``.
+    """k_s ds/dF [-] of each ``every``-th bed, for a block of ``cycles`` axles behind ``cycle``.
 
-    ``forces``: of each kind of axle, (b, n) [N]; ``hardened`` (b, n) [m]: what the law has made
-    a mean bed of this history settle; ``factor`` (b, n): settlement over a mean bed's; of the
-    beds, flat, each ``every``-th is taken.
+    ``force``: of each kind of axle, (kinds, b, n) [N]; ``hardened`` (b, n) [m]: what the law has
+    made a mean bed of this history settle; ``factor`` (b, n): settlement over a mean bed's.
     """
-
-    def pick(values: Floats) -> Floats:
-        return np.ravel(values)[::every]
-
-    total = np.zeros_like(pick(factor))
-    for axle, force in zip(line.traffic.axles, forces, strict=True):
-        load = BedLoad(pick(force), pick(line.support.bed))
-        more = replace(load, force=load.force * (1 + BLOCKS.nudge))
-        given: Any = pick(hardened), cycle, cycles
-        rise = line.law.advance(more, *given) - line.law.advance(load, *given)
-        apart = np.where(load.force > 0, load.force * BLOCKS.nudge, 1.0)
-        total += axle.share * rise / apart
-    return np.asarray(total * pick(factor) * pick(line.support.series))
+    given = (line.support.bed, line.support.series, hardened, factor)
+    bed, series, hardened, factor = (values.ravel()[::every] for values in given)
+    force = force.reshape(len(force), -1)[:, ::every]
+    apart = BLOCKS.nudge * force
+    more, less = (
+        line.law.advance(BedLoad(one, bed), hardened, cycle, cycles)
+        for one in (force + apart, force)
+    )
+    slope = (more - less) / np.where(apart > 0, apart, 1.0)
+    return np.asarray(np.tensordot(line.shares, slope, 1) * factor * series)
 
 
 def find_block(
-    line: Line, forces: list[Floats], hardened: Floats, factor: Floats, cycle: float, end: float,
+    line: Line, force: Floats, hardened: Floats, factor: Floats, cycle: float, end: float,
     finer: float,
 ) -> float:  # fmt: skip
     """Axles of the next block, of a run that ends at ``end`` axles; arguments as in
@@ -75,17 +70,15 @@ def find_block(
     every = max(1, factor.size // BLOCKS.sample)
     grown = cycle**BLOCKS.spread + end**BLOCKS.spread / (BLOCKS.fewest * finer)
     longest = min(grown ** (1 / BLOCKS.spread), end) - cycle
-    shortest = min(BLOCKS.shortest * end, longest)
 
     def exceed(logarithm: float) -> float:
         cycles = float(np.exp(logarithm))
-        gain = measure_gain(line, forces, hardened, factor, cycle, cycles, every)
+        gain = measure_gain(line, force, hardened, factor, cycle, cycles, every)
         worst = np.quantile(gain, 1 - BLOCKS.outliers) / 2
         return float(max(gain.mean(), worst) * finer / BLOCKS.gain - 1)
 
-    low, high = np.log(shortest), np.log(longest)
+    high = float(np.log(longest))
+    low = high - BLOCKS.search
     if not exceed(high) > 0:
         return float(longest)
-    if exceed(low) > 0:
-        return float(shortest)
-    return float(np.exp(brentq(exceed, low, high, rtol=1e-3)))
+    return float(np.exp(low if exceed(low) > 0 else brentq(exceed, low, high, rtol=1e-3)))

@@ -1,7 +1,8 @@
-"""A line with its traffic: everything that does not change while it settles."""
+"""A line with its axles: everything that does not change while it settles."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,37 +12,21 @@ from track_line.beam import GRAVITY, Rail, Support, Track, assemble_rail, make_s
 from track_line.beds import Beds, Scatter, Zone, draw_beds
 from track_line.laws import Law
 from track_line.settling.level import LEVEL
+from trackbed.scene_files import Positive, Table
 
 
-@dataclass(frozen=True)
-class Axle:
+class Axle(Table):
     """A kind of axle."""
 
-    load: float
+    load: Positive
     """Of the axle, both wheels [N]."""
-    share: float = 1.0
+    share: Positive = 1.0
     """Of all axles [-]."""
 
     @property
     def wheel(self) -> float:
         """Load of a wheel [N]."""
         return self.load / 2
-
-
-@dataclass(frozen=True)
-class Traffic:
-    """The kinds of axles that roll by; their shares add up to one."""
-
-    axles: tuple[Axle, ...]
-
-    @property
-    def tonnes(self) -> float:
-        """Of the mean axle [1000 kg]."""
-        return sum(one.share * one.load for one in self.axles) / GRAVITY / 1e3
-
-    def find_tonnage(self, cycle: Floats) -> Floats:
-        """Millions of gross tonnes (MGT) after so many axles."""
-        return np.asarray(cycle * self.tonnes / 1e6)
 
 
 @dataclass(frozen=True)
@@ -54,8 +39,18 @@ class Line:
     beds: Beds
     scatter: Scatter
     law: Law
-    traffic: Traffic
+    axles: tuple[Axle, ...]
+    """Their shares add up to one."""
     seed: int
+
+    @property
+    def shares(self) -> Floats:
+        """Of each kind of axle, shape (kinds,) [-]."""
+        return np.array([one.share for one in self.axles])
+
+    def find_tonnage(self, cycle: Floats) -> Floats:
+        """Millions of gross tonnes (MGT) after so many axles."""
+        return cycle * sum(one.share * one.load for one in self.axles) / GRAVITY / 1e9
 
     @property
     def inside(self) -> slice:
@@ -65,16 +60,18 @@ class Line:
 
 
 def make_line(
-    length: float, track: Track, stiffness: float, law: Law, traffic: Traffic, scatter: Scatter,
-    *, zones: tuple[Zone, ...] = (), lines: int = 1, seed: int = 1,
+    length: float, track: Track, law: Law, axles: Sequence[Axle], scatter: Scatter, *,
+    zones: Sequence[Zone] = (), lines: int = 1, seed: int = 1,
 ) -> Line:  # fmt: skip
     """A line of ``length`` [m] from 0 on, and a margin at each end with beds of the same kind.
 
-    ``stiffness``: mean of the beds under half a sleeper [N/m].
+    Shares of axles are scaled to add up to one.
     """
     inside = round(length / track.spacing) + 1
     margin = round(LEVEL.margin / track.spacing)
     place = np.arange(-margin, inside + margin) * np.float64(track.spacing)
-    beds = draw_beds(place, stiffness, scatter, zones, lines, seed)
+    beds = draw_beds(place, track.bed, scatter, zones, lines, seed)
+    whole = sum(one.share for one in axles)
+    kinds = (Axle(load=one.load, share=one.share / whole) for one in axles)
     rail, support = assemble_rail(place, track), make_support(track, beds.stiffness)
-    return Line(track, rail, support, beds, scatter, law, traffic, seed)
+    return Line(track, rail, support, beds, scatter, law, tuple(kinds), seed)

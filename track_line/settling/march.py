@@ -64,40 +64,31 @@ def march_line(
     ``finer``: by which blocks are smaller than stability asks.  Raises `NotConverged`.
     """
     while True:
-        passages = _roll_axles(line, state)
+        bears = state.bears or (None,) * len(line.axles)
+        passages = [
+            roll_axle(line.rail, line.support, state.settled, axle.wheel, one)
+            for axle, one in zip(line.axles, bears, strict=True)
+        ]
         state = replace(state, bears=tuple(one.bears for one in passages))
         yield state, _take_record(line, state, passages[0])
         if state.cycle >= end:
             return
-        state = _settle_block(line, state, [one.force for one in passages], end, finer)
+        state = _settle_block(line, state, np.stack([one.force for one in passages]), end, finer)
 
 
-def _roll_axles(line: Line, state: State) -> list[Passage]:
-    """A passage of each kind of axle."""
-    bears = state.bears or (None,) * len(line.traffic.axles)
-    return [
-        roll_axle(line.rail, line.support, state.settled, axle.wheel, one)
-        for axle, one in zip(line.traffic.axles, bears, strict=True)
-    ]
-
-
-def _settle_block(
-    line: Line, state: State, forces: list[Floats], end: float, finer: float
-) -> State:
-    """The state behind the next block of axles."""
+def _settle_block(line: Line, state: State, force: Floats, end: float, finer: float) -> State:
+    """The state behind the next block; ``force`` (kinds, b, n) [N]."""
     factor = line.beds.find_factors(state.score, line.scatter.settlement)
-    cycles = find_block(line, forces, state.hardened, factor, state.cycle, end, finer)
-    grown = np.zeros_like(factor)
-    for axle, force in zip(line.traffic.axles, forces, strict=True):
-        load = BedLoad(force, line.support.bed)
-        grown += axle.share * line.law.advance(load, state.hardened, state.cycle, cycles)
+    cycles = find_block(line, force, state.hardened, factor, state.cycle, end, finer)
+    load = BedLoad(force, line.support.bed)
+    each = line.law.advance(load, state.hardened, state.cycle, cycles)
+    grown = np.tensordot(line.shares, each, 1)
     before = float(state.hardened.mean())
     hardened = state.hardened + grown
     score = renew_scores(
         state.score, line.scatter, line.seed, line.track.spacing, before, float(hardened.mean())
     )
-    cycle = state.cycle + cycles
-    cycle = end if cycle > end * (1 - 1e-12) else cycle
+    cycle = end if cycles == end - state.cycle else state.cycle + cycles  # not by round-off
     return State(cycle, state.settled + factor * grown, hardened, score, state.bears)
 
 

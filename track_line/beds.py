@@ -1,61 +1,84 @@
-"""Random beds: lognormal, alike within a length along the line, and zones with a quality of their
-own."""
+"""Beds along a line: lognormal, alike within a length, and zones with a quality of their own."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 from scipy.signal import lfilter
 
 from track_line.arrays import Floats
-from track_line.beds.state import Beds, spread_around_one
+from trackbed.scene_files import NonNegative, Positive, Real, Table
 
+Variation = Annotated[Real, Field(ge=0, le=3)]
 STEPS_A_MEMORY = 8
 """Renewals of the scatter in the settlement that it takes to be forgotten by a factor e."""
 STIFFNESS, SETTLEMENT, LEVEL, RENEWAL = range(4)
 """Streams of random numbers of a scene's seed."""
 
 
-@dataclass(frozen=True)
-class Scatter:
+class Scatter(Table):
     """How beds differ.  Published numbers of lines are few: vary these."""
 
-    stiffness: float = 0.2
+    stiffness: Variation = 0.2
     """Coefficient of variation of the stiffness [-]."""
-    settlement: float = 0.2
+    settlement: Variation = 0.2
     """Coefficient of variation of the settlement under equal load [-]."""
-    length: float = 0.0
+    length: NonNegative = 0.0
     """Over which beds are alike: their correlation is e^(-x/length) [m]; 0 where each is drawn by
     itself."""
-    together: float = 0.0
+    together: Annotated[Real, Field(ge=-1, le=1)] = 0.0
     """Correlation of settlement with stiffness, of their logarithms [-]; below 0 where soft beds
     settle more under equal load."""
-    memory: float | None = None
+    memory: Annotated[Real, Field(ge=1e-4)] | None = None
     """Mean settlement after which the scatter of settlement is forgotten by e [m]; None where it
     stays for ever."""
-    unevenness: float = 0.0
+    unevenness: NonNegative = 0.0
     """Standard deviation of the level of the beds behind tamping [m]."""
 
 
-@dataclass(frozen=True)
-class Zone:
+class Zone(Table):
     """A part of the line, such as the end of a bridge."""
 
-    begin: float
+    begin: Real
+    end: Real
     """[m]"""
-    end: float
-    """[m]"""
-    stiffness: float = 1.0
+    stiffness: Positive = 1.0
     """By which the beds' stiffness is multiplied [-]."""
-    settlement: float = 1.0
+    settlement: NonNegative = 1.0
     """By which their settlement is multiplied [-]."""
-    void: float = 0.0
+    void: Annotated[Real, Field(ge=0, le=0.1)] = 0.0
     """How much deeper they lie at first [m]."""
 
-    def covers(self, place: Floats) -> Floats:
-        """1 for each of the places (n,) [m] inside, both ends counted, else 0."""
-        return ((place >= self.begin) & (place <= self.end)).astype(float)
+
+@dataclass(frozen=True)
+class Beds:
+    """b lines of n beds, each of half a sleeper."""
+
+    place: Floats
+    """Along the line, shape (n,) [m]."""
+    stiffness: Floats
+    """k_b, shape (b, n) [N/m]."""
+    score: Floats
+    """Standard normal, shape (b, n): how much more than the mean each bed settles."""
+    scale: Floats
+    """Of zones, shape (n,): by which every settlement is multiplied [-]."""
+    level: Floats
+    """How deep each lies below the level of tamping, shape (b, n) [m]."""
+
+    def find_factors(self, score: Floats, variation: float) -> Floats:
+        """Settlement over that of the mean bed, (b, n) [-]: lognormal of mean 1 by zone, with a
+        coefficient of ``variation``."""
+        return spread_around_one(score, variation) * self.scale
+
+
+def spread_around_one(score: Floats, variation: float) -> Floats:
+    """Lognormal numbers of mean 1 and coefficient of ``variation`` of standard normal ones [-]."""
+    width = np.sqrt(np.log1p(variation**2))
+    return np.asarray(np.exp(width * score - width**2 / 2))
 
 
 def draw_normal(seed: tuple[int, ...], shape: tuple[int, int], spacing: float,
@@ -68,13 +91,6 @@ def draw_normal(seed: tuple[int, ...], shape: tuple[int, int], spacing: float,
     alike = np.exp(-spacing / length)
     white[:, 1:] *= np.sqrt(1 - alike**2)
     return np.asarray(lfilter([1.0], [1.0, -alike], white, axis=1))
-
-
-def draw_scores(scatter: Scatter, seed: int, shape: tuple[int, int], spacing: float) -> Floats:
-    """Standard normal scores of the settlement, (b, n), before the first axle."""
-    alike = draw_normal((seed, STIFFNESS), shape, spacing, scatter.length)
-    own = draw_normal((seed, SETTLEMENT), shape, spacing, scatter.length)
-    return np.asarray(scatter.together * alike + np.sqrt(1 - scatter.together**2) * own)
 
 
 def renew_scores(
@@ -97,18 +113,19 @@ def renew_scores(
 
 
 def draw_beds(
-    place: Floats, stiffness: float, scatter: Scatter, zones: tuple[Zone, ...], lines: int,
-    seed: int,
-) -> Beds:  # fmt: skip
+    place: Floats, stiffness: float, scatter: Scatter, zones: Sequence[Zone], lines: int, seed: int
+) -> Beds:
     """Beds at ``place`` (n,) [m], evenly spaced, of a mean ``stiffness`` [N/m]."""
     shape, spacing = (lines, len(place)), float(place[1] - place[0])
     alike = draw_normal((seed, STIFFNESS), shape, spacing, scatter.length)
     level = scatter.unevenness * draw_normal((seed, LEVEL), shape, spacing, scatter.length)
+    own = draw_normal((seed, SETTLEMENT), shape, spacing, scatter.length)
+    score = scatter.together * alike + np.sqrt(1 - scatter.together**2) * own
     bed = stiffness * spread_around_one(alike, scatter.stiffness)
     scale = np.ones(len(place))
     for zone in zones:
-        inside = zone.covers(place)
+        inside = ((place >= zone.begin) & (place <= zone.end)).astype(float)
         bed *= 1 + (zone.stiffness - 1) * inside
         scale *= 1 + (zone.settlement - 1) * inside
         level += zone.void * inside
-    return Beds(place, bed, draw_scores(scatter, seed, shape, spacing), scale, level)
+    return Beds(place, bed, score, scale, level)

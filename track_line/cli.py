@@ -1,0 +1,63 @@
+"""The verb ``trackbed line SCENE``: what it computes with is loaded when it runs."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from trackbed.run_files import Progress, add_run_arguments, place_run
+from trackbed.run_verbs import print_fields
+
+if TYPE_CHECKING:
+    from track_line.scene import SceneFile
+
+
+def register(verb: str, parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``line`` to its parser."""
+    assert verb == "line"
+    add_run_arguments(parser, "a scene of a line (TOML)", "line.axles=1e7", "the last saved state")
+    parser.set_defaults(command=run_line)
+
+
+def run_line(arguments: argparse.Namespace) -> int:
+    """Run a scene, or say what would run; the last line is the engineer's sentence."""
+    from track_line.scene import load_scene, preview_run
+
+    path = place_run(arguments)
+    file = load_scene(arguments.scene, arguments.overrides)
+    answer = preview_run(file) if arguments.dry_run else _run(file, path, arguments)
+    sentence = "" if arguments.json else answer.pop("sentence", "")
+    print_fields(answer, arguments.json)
+    if sentence:
+        print(sentence)
+    return 0
+
+
+def _run(file: SceneFile, path: Path, arguments: argparse.Namespace) -> dict[str, Any]:
+    """The whole run with its report; its summary."""
+    from track_line.scene import RunFolder, run_scene, summarise_run, write_report
+    from trackbed.run_files import raise_on_signals, record_provenance, write_result
+
+    folder = RunFolder(path)
+    manifest = {
+        "scene": file.tables.model_dump(mode="json"),
+        "provenance": record_provenance(["trackbed", *sys.argv[1:]]),
+    }
+    given = {"resume": arguments.resume, "force": arguments.force}
+    if finished := folder.look_ahead(manifest, **given):
+        return finished | {"folder": str(path)}
+    progress = Progress()
+
+    def show(now: float, end: float, blocks: int) -> None:
+        progress.report(now**0.2, end**0.2, f"{now:.3g} of {end:.3g} axles, {blocks} blocks")
+
+    kept, remedy = "the last saved state is kept", "the same command with --resume goes on from it"
+    with folder.lock(), raise_on_signals(kept, remedy, str(path)):
+        goes_on = folder.prepare(manifest, file.text, **given)
+        records = run_scene(file, folder, resume=goes_on, progress=show)
+        summary = summarise_run(file, records)
+        write_report(folder, records, manifest, summary, draw=not arguments.no_pictures)
+        write_result(path, summary)
+    return summary | {"folder": str(path)}

@@ -1,0 +1,159 @@
+"""Scene files of lines: TOML to a `Line`, with every problem at once, each with line and key."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import AfterValidator, Field
+
+from track_line.beam import Track
+from track_line.beds import Scatter, Zone
+from track_line.laws import BedLoad, get_law, list_laws
+from track_line.settling import Axle, Line, find_alert_limit, make_line
+from trackbed.memory import refuse_more_memory
+from trackbed.scene_files import (
+    Guide,
+    Name,
+    NonNegative,
+    Positive,
+    Problem,
+    Real,
+    Table,
+    read_scene,
+    suggest_word,
+)
+
+GUIDE = Guide("line", "line.axles=1e7")
+BYTES_A_BED = 250
+"""Memory that a sleeper of one realisation takes, all axles of one kind [bytes]; measured."""
+
+LEFT_OUT = (
+    "dynamic wheel loads: an uneven line is loaded as a level one is, but for its voids",
+    "axles less than 14 m apart: each rolls by alone",
+    "the other rail: no cant, no twist, no lateral forces",
+    "unevenness of the rail itself, of welds and joints",
+    "what tamping leaves behind: the memory of old voids, broken stones",
+)
+"""Physics that is not computed."""
+
+
+def check_law(name: str) -> str:
+    """The name of a settlement law, if there is one of it."""
+    if name not in list_laws():
+        raise ValueError(f"there is no settlement law {name!r}{suggest_word(name, list_laws())}")
+    return name
+
+
+class LineTable(Table):
+    """How long, how many axles, how many lines."""
+
+    length: Annotated[Real, Field(ge=60, le=20_000)]
+    """[m]"""
+    axles: Annotated[Real, Field(ge=1, le=1e9)]
+    speed: Positive
+    """[m/s]"""
+    realisations: Annotated[int, Field(ge=1, le=10_000)] = 200
+    seed: Annotated[int, Field(ge=0)] = 1
+    limit: Positive | None = None
+    """Standard deviation of D1 at which to tamp [m]."""
+
+
+class LawTable(Table):
+    """How beds settle."""
+
+    name: Annotated[str, AfterValidator(check_law)]
+    parameters: dict[Name, NonNegative] = Field({})
+    """In place of the law's own [SI]."""
+
+
+class SceneTables(Table):
+    """A whole scene file."""
+
+    title: str = ""
+    line: LineTable
+    track: Track = Track()
+    axle: Annotated[list[Axle], Field(min_length=1, max_length=20)]
+    scatter: Scatter = Scatter()
+    law: LawTable
+    zone: list[Zone] = Field([])
+
+
+def find_faults(tables: SceneTables) -> Iterator[Problem]:
+    """What the tables of a scene demand of one another."""
+    law = tables.law
+    known = [one.name for one in fields(get_law(law.name))]  # type: ignore[arg-type]
+    strange = [name for name in law.parameters if name not in known]
+    for name in strange:
+        yield Problem(f"law.parameters.{name}", f"unknown parameter{suggest_word(name, known)}")
+    if not strange and not is_sound(tables):
+        yield Problem("law.parameters", f"the law {law.name} finds no settlement with these")
+    for i, zone in enumerate(tables.zone):
+        if not 0 <= zone.begin <= zone.end <= tables.line.length:
+            yield Problem(
+                f"zone.{i}", f"from {zone.begin:g} to {zone.end:g} m is no part of the line, "
+                f"which goes from 0 to {tables.line.length:g} m",
+            )  # fmt: skip
+
+
+def is_sound(tables: SceneTables) -> bool:
+    """Whether the law finds finite settlements under the wheels, of which some are above zero."""
+    force = np.array([one.wheel for one in tables.axle])
+    load = BedLoad(force, np.full_like(force, tables.track.bed))
+    try:
+        with np.errstate(all="ignore"):
+            law = get_law(tables.law.name)(**tables.law.parameters)
+            grown = law.advance(load, np.zeros_like(force), 0.0, tables.line.axles)
+    except ArithmeticError:
+        return False
+    return bool(np.isfinite(grown).all() and (grown >= 0).all() and grown.any())
+
+
+@dataclass(frozen=True)
+class SceneFile:
+    """A scene file as read and checked."""
+
+    text: str
+    tables: SceneTables
+
+    @property
+    def limit(self) -> float:
+        """Standard deviation of D1 at which to tamp [m]."""
+        line = self.tables.line
+        return find_alert_limit(line.speed) if line.limit is None else line.limit
+
+
+def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> SceneFile:
+    """Read and check a scene file; ``overrides`` such as ``line.axles=1e7`` replace or add keys.
+
+    Raises `UsageError` when the file or an override can not be read, `SceneError` with all
+    problems when the scene is not valid.
+    """
+    text = read_scene(path, overrides, guide=GUIDE)
+    text.check(SceneTables)
+    text.refuse(text.problems)
+    tables = SceneTables.model_validate(text.data)
+    text.refuse(find_faults(tables))
+    return SceneFile(text.text, tables)
+
+
+def build_line(file: SceneFile, lines: int | None = None) -> Line:
+    """The line of a scene, with its first ``lines`` realisations, or all of them.
+
+    Raises `OutOfMemory` for more than there is room for.
+    """
+    tables = file.tables
+    lines = tables.line.realisations if lines is None else lines
+    beds = lines * tables.line.length / tables.track.spacing
+    refuse_more_memory(
+        BYTES_A_BED * beds * len(tables.axle), f"{lines} lines of {tables.line.length:g} m",
+        "line.realisations", "ask for fewer realisations or a shorter line",
+    )  # fmt: skip
+    law = get_law(tables.law.name)(**tables.law.parameters)
+    return make_line(
+        tables.line.length, tables.track, law, tables.axle, tables.scatter, zones=tables.zone,
+        lines=lines, seed=tables.line.seed,
+    )  # fmt: skip
