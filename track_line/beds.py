@@ -68,11 +68,12 @@ class Beds:
     """Of zones, shape (n,): by which every settlement is multiplied [-]."""
     level: Floats
     """How deep each lies below the level of tamping, shape (b, n) [m]."""
+    scatter: Scatter
+    seed: int
 
-    def find_factors(self, score: Floats, variation: float) -> Floats:
-        """Settlement over that of the mean bed, (b, n) [-]: lognormal of mean 1 by zone, with a
-        coefficient of ``variation``."""
-        return spread_around_one(score, variation) * self.scale
+    def find_factors(self, score: Floats) -> Floats:
+        """Settlement over that of the mean bed, (b, n) [-]: lognormal, of mean 1 but in zones."""
+        return spread_around_one(score, self.scatter.settlement) * self.scale
 
 
 def spread_around_one(score: Floats, variation: float) -> Floats:
@@ -93,23 +94,22 @@ def draw_normal(seed: tuple[int, ...], shape: tuple[int, int], spacing: float,
     return np.asarray(lfilter([1.0], [1.0, -alike], white, axis=1))
 
 
-def renew_scores(
-    score: Floats, scatter: Scatter, seed: int, spacing: float, before: float, after: float
-) -> Floats:
-    """Scores (b, n) as the mean settlement goes from ``before`` to ``after`` [m].
+def renew_scores(beds: Beds, score: Floats, before: float, after: float) -> tuple[Floats, Floats]:
+    """Scores behind a mean settlement from ``before`` to ``after`` [m], and the mean of
+    `Beds.find_factors` on the way, (b, n) each.
 
-    They are renewed at equal steps of settlement, whatever the blocks of axles are, so that
-    smaller blocks are of the same line.
+    Scores are renewed at equal steps of settlement, whatever the blocks of axles are.
     """
-    if scatter.memory is None:
-        return score
-    step = scatter.memory / STEPS_A_MEMORY
-    kept = np.exp(-1 / STEPS_A_MEMORY)
+    if beds.scatter.memory is None or not after > before:
+        return score, beds.find_factors(score)
+    step, kept = beds.scatter.memory / STEPS_A_MEMORY, np.exp(-1 / STEPS_A_MEMORY)
+    total, here, spacing = np.zeros_like(score), before, float(beds.place[1] - beds.place[0])
     for number in range(int(before / step) + 1, int(after / step) + 1):
-        seeds = (seed, RENEWAL, number)
-        fresh = draw_normal(seeds, score.shape, spacing, scatter.length)
+        total += (number * step - here) * beds.find_factors(score)
+        here = number * step
+        fresh = draw_normal((beds.seed, RENEWAL, number), score.shape, spacing, beds.scatter.length)
         score = kept * score + np.sqrt(1 - kept**2) * fresh
-    return score
+    return score, (total + (after - here) * beds.find_factors(score)) / (after - before)
 
 
 def draw_beds(
@@ -128,4 +128,4 @@ def draw_beds(
         bed *= 1 + (zone.stiffness - 1) * inside
         scale *= 1 + (zone.settlement - 1) * inside
         level += zone.void * inside
-    return Beds(place, bed, score, scale, level)
+    return Beds(place, bed, score, scale, level, scatter, seed)

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from trackbed.plausible import describe_implausible
 from trackbed.run_files import Progress, add_run_arguments, place_run
 from trackbed.run_verbs import print_fields
 
@@ -60,4 +61,6 @@ def _run(file: SceneFile, path: Path, arguments: argparse.Namespace) -> dict[str
         summary = summarise_run(file, records)
         write_report(folder, records, manifest, summary, draw=not arguments.no_pictures)
         write_result(path, summary)
+    if doubt := describe_implausible("settlement", summary["settlement_m"], "mean settlement"):
+        print(f"warning: {doubt}", file=sys.stderr)
     return summary | {"folder": str(path)}

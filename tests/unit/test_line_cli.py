@@ -43,6 +43,7 @@ def test_a_run_leaves_table_page_and_sentence(words, capsys):
     assert "data:image/svg+xml" in page
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("damage", [False, True])
 def test_a_run_goes_on_to_the_same_bits(damage, words, capsys, monkeypatch):
     """Stopped behind its eighth block and gone on with, from a sound state or a damaged one."""

@@ -37,11 +37,9 @@ class Line:
     rail: Rail
     support: Support
     beds: Beds
-    scatter: Scatter
     law: Law
     axles: tuple[Axle, ...]
     """Their shares add up to one."""
-    seed: int
 
     @property
     def shares(self) -> Floats:
@@ -74,4 +72,4 @@ def make_line(
     whole = sum(one.share for one in axles)
     kinds = (Axle(load=one.load, share=one.share / whole) for one in axles)
     rail, support = assemble_rail(place, track), make_support(track, beds.stiffness)
-    return Line(track, rail, support, beds, scatter, law, tuple(kinds), seed)
+    return Line(track, rail, support, beds, law, tuple(kinds))

@@ -78,16 +78,14 @@ def march_line(
 
 def _settle_block(line: Line, state: State, force: Floats, end: float, finer: float) -> State:
     """The state behind the next block; ``force`` (kinds, b, n) [N]."""
-    factor = line.beds.find_factors(state.score, line.scatter.settlement)
+    factor = line.beds.find_factors(state.score)
     cycles = find_block(line, force, state.hardened, factor, state.cycle, end, finer)
     load = BedLoad(force, line.support.bed)
     each = line.law.advance(load, state.hardened, state.cycle, cycles)
     grown = np.tensordot(line.shares, each, 1)
-    before = float(state.hardened.mean())
     hardened = state.hardened + grown
-    score = renew_scores(
-        state.score, line.scatter, line.seed, line.track.spacing, before, float(hardened.mean())
-    )
+    span = float(state.hardened.mean()), float(hardened.mean())
+    score, factor = renew_scores(line.beds, state.score, *span)
     cycle = end if cycles == end - state.cycle else state.cycle + cycles  # not by round-off
     return State(cycle, state.settled + factor * grown, hardened, score, state.bears)
 
