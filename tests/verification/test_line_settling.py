@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 from scipy.signal import butter, sosfreqz
 
 from track_line.beam import Track, roll_axle
@@ -158,7 +159,7 @@ def predict_deviation(line: Line, settlement: float, variation: float) -> float:
     gain = abs(sosfreqz(band, q)[1])
     held = SERIES * (1 - lattice) / force
     wave = lattice * gain * -np.expm1(-held * settlement) / np.maximum(held, 1e-12)
-    return variation * float(np.sqrt(np.trapezoid(wave**2, q) / np.pi))
+    return variation * float(np.sqrt(trapezoid(wave**2, q) / np.pi))
 
 
 def test_small_scatter_grows_as_linear_theory_says() -> None:
