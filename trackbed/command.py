@@ -51,7 +51,7 @@ def build_parser(verb: str | None) -> argparse.ArgumentParser:
     """The command's parser; only ``verb`` gets its arguments, so only its package is loaded."""
     parser = argparse.ArgumentParser(
         prog="trackbed",
-        description="Railway ballast: settlement under load cycles, vibration, hard grains, track geometry.",
+        description="Railway ballast: settlement under load cycles, vibration, hard grains, lines.",
         epilog=describe_exit_codes(),
         formatter_class=HelpFormatter,
         allow_abbrev=False,

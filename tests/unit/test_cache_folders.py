@@ -26,7 +26,10 @@ def refuse(event, arguments, allowed=sys.argv.pop(1)):
 sys.addaudithook(refuse)
 """
 """A process that can make files in one folder only, root or not."""
-KERNELS = "adapters.relaxation.kernel, qdem_fem.kernel.cpu.step, rigid_lcp.friction.problem.cones, track_line.beam.kernel"
+KERNELS = (
+    "adapters.relaxation.kernel, qdem_fem.kernel.cpu.step, rigid_lcp.friction.problem.cones, "
+    "track_line.beam.kernel"
+)
 
 
 def run_without_home(code: str, folder: Path) -> str:

@@ -91,11 +91,12 @@ def test_new_names_the_verb_that_reads_the_scene() -> None:
     from qdem_fem.scene.checks import GUIDE, read_scene
     from qdem_fem.tables import Scene
     from rigid_lcp.scene.file import load_scene as rigid_scene
+    from track_line.scene import load_scene as line_scene
 
     def check_qdem(path: Path) -> None:
         read_scene(path, guide=GUIDE).check(Scene)
 
-    readers = {"run": load_scene, "qdem": check_qdem, "rigid": rigid_scene}
+    readers = {"run": load_scene, "qdem": check_qdem, "rigid": rigid_scene, "line": line_scene}
     for name in list_scenes():
         readers[find_scene_verb(name)](find_scene_file(name))
 

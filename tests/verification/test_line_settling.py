@@ -102,8 +102,7 @@ def test_a_void_fills_as_its_neighbours_sink() -> None:
     gap = path[:, 0] - path[:, 1]
     assert (np.diff(gap) < 1e-9).all()
     assert 0 < gap[-1] < 3e-3
-    deepest = [record.deepest[0] for _, record in run]
-    assert deepest[0] > deepest[-1]
+    assert run[0][1].deepest[0] > run[-1][1].deepest[0]
 
 
 def test_a_bridge_end_makes_a_step() -> None:
