@@ -36,7 +36,7 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
 
 def run_export(arguments: argparse.Namespace) -> int:
     """Write a run, finished or not, in the format of another tool; print what to open."""
-    from adapters.export import export_run, read_exported_run
+    from adapters.report.export import export_run, read_exported_run
 
     into = arguments.into or arguments.run_folder / arguments.variant / "export"
     run = read_exported_run(arguments.run_folder, arguments.variant)

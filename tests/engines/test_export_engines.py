@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from adapters.bed.state import load_state
-from adapters.export.formats import export_run
-from adapters.export.instants import read_exported_run
+from adapters.report.export.formats import export_run
+from adapters.report.export.instants import read_exported_run
 from tests.engine_sample import SECOND, Sample
 
 VECTORS = {"Particle Identifier", "Position", "Velocity", "Angular Velocity", "Radius", "Mass"}

@@ -16,12 +16,12 @@ import pytest
 
 from adapters.bed.state import Contacts, State
 from adapters.errors import EngineFailed
-from adapters.export.formats import FORMATS, export_run
-from adapters.export.instants import ExportedRun, read_exported_run
 from adapters.files.window import PistonTrack, Window
 from adapters.procedure.progress import Progress
 from adapters.procedure.record import read_run_record
 from adapters.procedure.run import run_scene
+from adapters.report.export.formats import FORMATS, export_run
+from adapters.report.export.instants import ExportedRun, read_exported_run
 from adapters.scene.file import load_scene
 from tests import engine_sample
 from trackbed import command

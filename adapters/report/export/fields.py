@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adapters.bed import IntArray
-from adapters.export.instants import ExportedRun, Instant
+from adapters.report.export.instants import ExportedRun, Instant
 
 Array = NDArray[np.float64] | NDArray[np.int64]
 

@@ -14,7 +14,7 @@ import numpy as np
 from adapters.bed import FloatArray, IntArray
 from adapters.engines import bound_section
 from adapters.errors import UsageError
-from adapters.export.fields import (
+from adapters.report.export.fields import (
     Array,
     gather_contacts,
     gather_grains,
@@ -22,7 +22,7 @@ from adapters.export.fields import (
     list_contacts,
     split_columns,
 )
-from adapters.export.instants import ExportedRun, Instant
+from adapters.report.export.instants import ExportedRun, Instant
 from adapters.files import Frame, Kind, explain_full_disk, write_dump
 from trackbed.run_files import replace_file, write_pvd
 

@@ -1,6 +1,0 @@
-"""A run as files of other programs: ParaView, OVITO, tables."""
-
-from adapters.export.formats import export_run
-from adapters.export.instants import read_exported_run
-
-__all__ = ["export_run", "read_exported_run"]
