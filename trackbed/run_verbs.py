@@ -35,6 +35,7 @@ class Kind:
 
 KINDS = (
     Kind("sample", "run"),
+    Kind("deck", "run"),
     Kind("simulation", "qdem", "checkpoint.npz", "fields.pvd opens in ParaView, probes.csv and "
          "energy.csv in a spreadsheet"),
     Kind("run", "rigid", "frame_*.npz", "history.csv opens in a spreadsheet, movie.gif in a "

@@ -41,7 +41,7 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
     engine = data.get("engine")
     if isinstance(engine, dict) and engine.get("rayleigh_share") == "fast":
         engine["rayleigh_share"] = DOUBTFUL.rayleigh_share
-    problems = list(_expand_schedule(data))
+    problems = list(expand_schedule(data))
     text.check(Scene)
     if text.problems:
         problems += [problem for problem in text.problems if problem.key]
@@ -67,7 +67,7 @@ def _drop_alternatives(data: dict[str, Any], key: str) -> None:
         table.pop(name, None)
 
 
-def _expand_schedule(data: dict[str, Any]) -> Iterator[Problem]:
+def expand_schedule(data: dict[str, Any]) -> Iterator[Problem]:
     """Put the cycles of each jump in place of a procedure.h such as ``"5 growing"``.
 
     What can not be so is a problem, and stands as one jump while the other keys are looked at.

@@ -1,0 +1,294 @@
+"""What stands in the way of cutting a deck into windows, each as a sentence with the line to add.
+
+Every one was measured, on decks that others wrote: a window that misses it computes another bed, or
+none.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+from adapters.decks.parse import BEGIN, END, Command, Deck
+from adapters.decks.split import BOX, KEYED, find_named, list_live
+
+INSERTION = re.compile(r"insert/.*|pour|deposit")
+RIGID = re.compile(r"rigid(/.*)?|poems")
+STATE = re.compile(
+    r"(?<![\w.])(step|elapsed|elaplong|time|ke|pe|atoms|temp|press|[cf]_\w+)(?!\w)"
+    r"|\b(xcm|vcm|bound|count|mass|ke|gyration|fcm|random|normal)(?=\()"
+)
+"""Parts of a formula whose value is another when the window starts."""
+DECLARED = re.compile(r"\b(fix|unfix|compute|region|dump|pair_style|pair_coeff)\s")
+OUTPUTS = ("dump", "log", "write_dump", "write_restart")
+AVERAGES = ("print", "ave/time", "ave/chunk")
+"""Commands, and styles of fixes, that write files."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something of a deck that its user should know."""
+
+    kind: str  # "stops": no window is right; "added": put into the marked copy; "note"
+    place: str  # file and line; empty for the deck as a whole
+    what: str
+    remedy: str = ""
+    above: str = ""  # above which mark the remedy is added: "cycle" or "end"
+
+    def __str__(self) -> str:
+        where = f"{self.place}: " if self.place else ""
+        return f"{where}{self.what}" + (f"\n    -> {self.remedy}" if self.remedy else "")
+
+
+def stop(one: Command, what: str, remedy: str) -> Finding:
+    """A finding with which no window is right."""
+    return Finding("stops", one.place, what, remedy)
+
+
+def note(one: Command, what: str, remedy: str = "") -> Finding:
+    """A finding to think of."""
+    return Finding("note", one.place, what, remedy)
+
+
+@dataclass(frozen=True)
+class Contents:
+    """What a deck has of what cycle jumps need."""
+
+    groups: tuple[str, ...]
+    clumps: tuple[str, ...]  # fixes that hold grains of several spheres together
+    meshes: dict[str, str]  # mesh -> style
+    moved: dict[str, str]  # mesh -> what moves it
+
+    @property
+    def loaded_body(self) -> str:
+        """The mesh that is driven, where there is one alone; else empty."""
+        return next(iter(self.moved)) if len(self.moved) == 1 else ""
+
+
+def list_contents(deck: Deck) -> Contents:
+    """What is in a deck: groups, clumps, meshes and which of them move."""
+    fixes = find_named(deck.before, "fix")
+    fixes |= {one.word(1): one for one in deck.cycle if one.name == "fix"}
+    styles = {name: one.word(3) for name, one in fixes.items()}
+    meshes = {name: style for name, style in styles.items() if style.startswith("mesh/")}
+    moved = {name: style for name, style in meshes.items() if style.endswith("/servo")}
+    for name, one in fixes.items():
+        if styles[name] == "move/mesh" and "mesh" in one.words[:-1]:
+            where = "inside the cycle" if one in deck.cycle else "all the time"
+            moved[one.words[one.words.index("mesh") + 1]] = f"fix {name}, {where}"
+    clumps = (
+        f"{name} ({style})" for name, style in styles.items()
+        if RIGID.fullmatch(style) or style.startswith("multisphere")
+    )  # fmt: skip
+    groups = dict.fromkeys(one.word(1) for one in deck.before if one.name == "group")
+    return Contents(tuple(groups), tuple(clumps), meshes, moved)
+
+
+def find_obstacles(deck: Deck, engine: str) -> list[Finding]:
+    """All findings of a marked deck, in the order of its lines where they have one."""
+    found = [one for rule in RULES for one in rule(deck, engine)]
+    order = {one.place: n for n, one in reversed(list(enumerate(deck.commands)))}
+    return sorted(found, key=lambda one: order.get(one.place, -1))
+
+
+def find_insertions(deck: Deck, engine: str) -> Iterator[Finding]:
+    """Insertions that are not undone before the cycle: a window inserts again."""
+    for name, one in find_named(deck.before, "fix").items():
+        if INSERTION.fullmatch(one.word(3)):
+            what = f"fix {name} still inserts grains: each window would insert them again"
+            yield Finding("added", one.place, what, f"unfix {name}", "cycle")
+
+
+def find_unfinished(deck: Deck, engine: str) -> Iterator[Finding]:
+    """Things that a cycle makes and leaves, or takes away: the next one can not be the same."""
+    for kind, undo in KEYED.items():
+        if kind == "variable":
+            continue
+        start, end = (find_named(part, kind) for part in (deck.before, deck.before + deck.cycle))
+        for name in end.keys() - start.keys():
+            what = f"the cycle makes {kind} {name} and leaves it: the next cycle can not make it"
+            line = f"{undo} {name}" if undo else f"region {name} delete"
+            yield Finding("added", end[name].place, what, line, "end")
+        for name in start.keys() - end.keys():
+            what = f"the cycle takes {kind} {name} away, which the next one wants again"
+            yield stop(start[name], what, f"above '{END}': {start[name].short}")
+
+
+def find_absolute_runs(deck: Deck, engine: str) -> Iterator[Finding]:
+    """Cycles without a run, or to a step that only the first can reach."""
+    if not any(one.name == "run" for one in deck.cycle):
+        yield Finding("stops", "", "nothing is run between the marks", "run STEPS")
+    for number, one in enumerate(deck.cycle):
+        if one.name == "run" and "upto" in one.words:
+            done = count_steps(deck.before + deck.cycle[:number])
+            steps = int(one.word(1)) - done if done and one.word(1).isdecimal() else "STEPS"
+            what = f"'{one.short}' runs up to a step: only the first cycle has so far to run"
+            yield stop(one, what, f"run {steps}")
+        if one.name in BOX | {"clear", "create_atoms", "reset_timestep"}:
+            what = f"'{one.short}' inside the cycle begins another bed"
+            yield stop(one, what, f"put it above '{BEGIN}'")
+
+
+def count_steps(commands: Sequence[Command]) -> int:
+    """Time steps that commands run from step 0; 0 where these are no plain numbers."""
+    done = 0
+    for one in commands:
+        if one.name == "run":
+            if not one.word(1).isdecimal():
+                return 0
+            done = int(one.word(1)) + (0 if "upto" in one.words else done)
+    return done
+
+
+def find_frozen_values(deck: Deck, engine: str) -> Iterator[Finding]:
+    """``${v}`` of a formula of the bed's state in a declaration: a window has another value."""
+    variables = find_named(deck.before, "variable")
+    for one in list_live(deck.before):
+        for name in sorted(one.substituted()):
+            if part := find_state_in(name, variables):
+                what = (
+                    f"${{{name}}} in '{one.short}' comes of {part}, and is another number when a "
+                    "window starts"
+                )
+                yield stop(one, what, f"the number itself, as this prints it: print ${{{name}}}")
+
+
+def find_state_in(name: str, variables: dict[str, Command], depth: int = 0) -> str:
+    """What of the bed's state a variable's formula depends on; empty for none."""
+    one = variables.get(name)
+    if one is None or one.word(2) not in ("equal", "atom") or depth > len(variables):
+        return ""
+    formula = " ".join(one.words[3:])
+    if part := STATE.search(formula):
+        return part[0]
+    inner = one.substituted() | set(re.findall(r"\bv_(\w+)", formula))
+    return next(filter(None, (find_state_in(n, variables, depth + 1) for n in inner)), "")
+
+
+def find_phases(deck: Deck, engine: str) -> Iterator[Finding]:
+    """Motions whose phase counts from the start of a run, and forces read where a run begins."""
+    meshes = list_contents(deck).meshes if engine == "liggghts" else {}
+    for one in (*list_live(deck.before), *deck.cycle):
+        name, style, live = one.word(1), one.word(3), one not in deck.cycle
+        if one.name == "fix" and "wiggle" in one.words:
+            if live and engine == "lammps" and style.startswith("wall/gran"):
+                yield stop(
+                    one, f"the motion of wall {name} starts again from its first phase in each "
+                    "window", f"put it inside the cycle, of whole periods: '{one.short}' below "
+                    f"'{BEGIN}' and 'unfix {name}' above '{END}'",
+                )  # fmt: skip
+            elif live and style == "move/mesh":
+                yield note(
+                    one, f"fix {name} goes on in its phase, to round-off of its places (8e-7 m "
+                    "were seen); a cycle must be whole periods of it",
+                )  # fmt: skip
+        formula = " ".join(one.words[3:]) if one.name == "variable" else ""
+        if part := re.search(r"(?<![\w.])(elapsed|elaplong)(?!\w)", formula):
+            yield note(
+                one, f"variable {name} counts {part[0]} steps from the start of each run: the "
+                "motion must be whole in each",
+            )  # fmt: skip
+        if read := set(re.findall(r"\bf_(\w+)\[", formula)) & meshes.keys():
+            yield note(
+                one, f"f_{min(read)}[...] is 0 where a window begins and doubled where a further "
+                "run begins: a motion that follows it takes a wrong step there",
+                "read the force a step earlier, or let 'fix mesh/surface/stress/servo' follow it",
+            )  # fmt: skip
+
+
+def find_clumps(deck: Deck, engine: str) -> Iterator[Finding]:
+    """Grains of several spheres."""
+    for name, one in find_named(deck.before, "fix").items():
+        if RIGID.fullmatch(one.word(3)):
+            what = (
+                f"fix {name} {one.word(3)} holds grains together, and trackbed can not move its "
+                "bodies"
+            )
+            yield stop(one, what, "spheres, or in LIGGGHTS 'fix multisphere'")
+        if one.word(3).startswith("multisphere") and one.word(2) != "all":
+            yield stop(
+                one, f"fix {name} {one.word(3)} is of group {one.word(2)}: spheres beside it "
+                "vanish at the second run", " ".join(("fix", name, "all", *one.words[3:])),
+            )  # fmt: skip
+
+
+def find_missing_regions(deck: Deck, engine: str) -> Iterator[Finding]:
+    """Walls on a region that is gone: LAMMPS then names an atom's callback, not the region."""
+    regions = find_named(deck.before, "region")
+    for one in find_named(deck.before, "fix").values():
+        for before, name in zip(one.words[3:], one.words[4:], strict=False):
+            known = name in regions or "$" in name or INSERTION.fullmatch(one.word(3))
+            if before == "region" and not known:
+                what = f"fix {one.word(1)} needs the region {name}, gone where the cycle begins"
+                yield stop(one, what, f"declare it above '{BEGIN}': region {name} ...")
+
+
+def find_branches(deck: Deck, engine: str) -> Iterator[Finding]:
+    """Commands in branches and loops, which a window can not follow."""
+    labels = {one.word(1) for one in deck.cycle if one.name == "label"}
+    run = next((n for n, one in enumerate(deck.cycle) if one.name == "run"), len(deck.cycle))
+    for number, one in enumerate(deck.cycle):
+        if one.name == "label" and number < run:
+            what = f"the cycle's first run is inside the loop {one.word(1)}"
+            yield stop(one, what, f"put the marks inside of it: '{BEGIN}' behind '{one.short}'")
+        if one.name == "jump" and one.word(2) not in labels:
+            what = f"'{one.short}' leaves the cycle"
+            yield stop(one, what, f"put '{END}' above this loop's next and jump")
+    for one in deck.before + deck.cycle:
+        if one.name == "if" and engine == "liggghts" and "include" in one.text:
+            yield stop(one, "LIGGGHTS refuses include inside of if", "the included lines instead")
+        elif one.name == "if" and one in deck.before and DECLARED.search(one.text):
+            what = f"'{one.short}' declares something or not: a window can not know which"
+            yield stop(one, what, "write the command that it comes to, without if")
+        if one.name == "jump" and one.word(1) != "SELF":
+            what = f"'{one.short}' goes on in another file"
+            yield stop(one, what, "jump SELF LABEL, or include that file")
+    around = {one.word(1) for one in deck.before if one.name == "label"}
+    for one in deck.after:
+        if one.name == "jump" and one.word(2) in around:
+            what = f"the loop {one.word(2)} around the cycle is left out: trackbed counts cycles"
+            yield note(one, what)
+
+
+def find_losses(deck: Deck, engine: str) -> Iterator[Finding]:
+    """Settings with which results are overwritten, or not what they seem."""
+    for one in (*list_live(deck.before), *deck.cycle):
+        path = next((word for word in one.words[1:] if word.startswith("/")), "")
+        if path and (one.name in OUTPUTS or one.word(3) in AVERAGES):
+            what = f"{path} is written by each window over the last one's"
+            yield note(one, what, "a relative name: each window has a folder of its own")
+        if one.name == "units" and one.word(1) != "si":
+            yield note(one, f"lengths are in units {one.word(1)}, no metres")
+        if one.name == "thermo_modify" and {"ignore", "warn"} & {*one.words}:
+            what = "grains that leave the box vanish without stopping the engine"
+            yield note(one, what, "thermo_modify lost error")
+    for one in deck.before:
+        if one.name == "group" and "dynamic" in one.words:
+            yield note(one, f"group {one.word(1)} keeps the grains it has at the mark")
+
+
+RULES: Sequence[Callable[[Deck, str], Iterator[Finding]]] = (
+    find_insertions, find_unfinished, find_absolute_runs, find_frozen_values, find_phases,
+    find_clumps, find_missing_regions, find_branches, find_losses,
+)  # fmt: skip
+"""What is looked for."""
+
+
+def add_lines(deck: Deck, findings: Sequence[Finding]) -> list[str]:
+    """Lines of a marked deck with what was ``added``."""
+    assert deck.marks is not None
+    lines = list(deck.lines)
+    for where, mark in zip(("end", "cycle"), reversed(deck.marks), strict=True):
+        added = [one.remedy for one in findings if one.kind == "added" and one.above == where]
+        lines[mark - 1 : mark - 1] = added
+    return lines
+
+
+def add_marks(deck: Deck) -> tuple[list[str], Finding]:
+    """Lines of a deck with marks around its last run, and what is to be said of that."""
+    lines, run = list(deck.lines), next(one for one in reversed(deck.before) if one.name == "run")
+    lines[run.line - 1 : run.last] = [BEGIN, *lines[run.line - 1 : run.last], END]
+    what = f"no load cycle is marked: the marks are put around the last run, '{run.short}'"
+    remedy = "move them in the copy if your load cycle is another stretch of commands"
+    return lines, Finding("added", run.place, what, remedy)

@@ -1,0 +1,46 @@
+"""A jump over load cycles of any grains: places at cycle ends in, places h cycles later out."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from adapters.bed import Container, FloatArray
+from adapters.errors import UsageError
+from adapters.laws import get_law
+from adapters.moves import Jump, get_move
+
+
+def jump(
+    states: ArrayLike, h: float, radius: ArrayLike, *, law: str = "log", move: str = "smoothed",
+    first_cycle: int = 0,
+) -> FloatArray:  # fmt: skip
+    """Centres after ``h`` more load cycles [m], shape (n, 3).
+
+    ``states``: centres at the ends of c cycles one after another [m], shape (c, n, 3), the first
+    after ``first_cycle`` cycles, at 0 before any load.  ``radius``: radii [m], shape (n,), or one
+    of all.  ``law``: how a displacement grows with cycles; ``move``: what each grain's own becomes,
+    see `adapters.moves`.  Overlaps are left as they come: some cycles heal them.
+
+    Raises `UsageError` for arrays that do not fit, are not finite, or are too few for the law.
+    """
+    position = np.asarray(states, float)
+    if position.ndim != 3 or position.shape[2:] != (3,) or 0 in position.shape:
+        raise UsageError(
+            f"states of shape {position.shape} are no places of grains at cycle ends",
+            where="jump", remedy="give them as (cycles, grains, 3)",
+        )  # fmt: skip
+    try:
+        radii = np.broadcast_to(np.asarray(radius, float), position.shape[1]).copy()
+    except ValueError:
+        raise UsageError(
+            f"radii of shape {np.shape(radius)} are not those of {position.shape[1]} grains",
+            where="jump", remedy="give one for each grain, or one of all",
+        ) from None  # fmt: skip
+    if not (np.isfinite(radii) & (radii > 0)).all() or not 0 <= h < np.inf:
+        raise UsageError("radii are above 0, and cycles to jump at least 0", where="jump")
+    cycle = first_cycle + np.arange(len(position), dtype=float)
+    size = np.ptp(position[-1], axis=0) + 2 * radii.max()
+    container = Container("box", size_x=float(size[0]), size_y=float(size[1]))
+    seen = Jump(cycle, position, radii, get_law(law), h, container)
+    return position[-1] + get_move(move).displacement(seen)

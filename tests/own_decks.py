@@ -1,0 +1,109 @@
+"""Small decks as users write them, of spheres in a box under a heavier and a lighter gravity."""
+
+LIGGGHTS = """\
+# a bed of my own, from before trackbed
+atom_style granular
+atom_modify map array
+boundary f f f
+newton off
+communicate single vel yes
+units si
+region reg block -0.001 0.061 -0.001 0.061 -0.001 0.15 units box
+create_box 1 reg
+neighbor 0.002 bin
+neigh_modify delay 0
+variable young index 5.e6
+fix m1 all property/global youngsModulus peratomtype ${young}
+fix m2 all property/global poissonsRatio peratomtype 0.3
+fix m3 all property/global coefficientRestitution peratomtypepair 1 0.3
+fix m4 all property/global coefficientFriction peratomtypepair 1 0.5
+pair_style gran model hertz tangential history
+pair_coeff * *
+timestep 0.00002
+include walls.in
+region fill block 0.001 0.059 0.001 0.059 0.001 0.12 units box
+fix pts1 all particletemplate/sphere 15485863 atom_type 1 density constant 2500 &
+    radius constant 0.005
+fix pdd1 all particledistribution/discrete 32452843 1 pts1 1.0
+fix ins all insert/pack seed 32452867 distributiontemplate pdd1 maxattempt 200 insert_every once &
+    overlapcheck yes all_in yes vel constant 0. 0. -0.3 region fill particles_in_region 80
+fix integr all nve/sphere
+fix grav all gravity 9.81 vector 0 0 -1
+dump pictures all custom 5000 post/bed_*.txt id x y z # comment
+run 1
+unfix ins
+run 9000
+# trackbed: cycle
+unfix grav
+fix grav all gravity 30 vector 0 0 -1
+run 400
+unfix grav
+fix grav all gravity 9.81 vector 0 0 -1
+run 400
+# trackbed: end
+"""
+WALLS = """\
+fix x1 all wall/gran model hertz tangential history primitive type 1 xplane 0.0
+fix x2 all wall/gran model hertz tangential history primitive type 1 xplane 0.06
+fix y1 all wall/gran model hertz tangential history primitive type 1 yplane 0.0
+fix y2 all wall/gran model hertz tangential history primitive type 1 yplane 0.06
+fix z1 all wall/gran model hertz tangential history primitive type 1 zplane 0.0
+"""
+PLATE = """\
+fix plate all mesh/surface/stress file plate.stl type 1
+fix hold all wall/gran model hertz tangential history mesh n_meshes 1 meshes plate
+"""
+"""A plate on top of the bed, for `LIGGGHTS`: a mesh at the height of `PLATE_STL`."""
+PLATE_HEIGHT = 0.045
+PLATE_STL = (
+    "solid plate\n"
+    + "".join(
+        "facet normal 0 0 -1\nouter loop\n"
+        + "".join(f"vertex {x} {y} {PLATE_HEIGHT}\n" for x, y in corners)
+        + "endloop\nendfacet\n"
+        for corners in (
+            ((0.001, 0.001), (0.059, 0.001), (0.059, 0.059)),
+            ((0.001, 0.001), (0.059, 0.059), (0.001, 0.059)),
+        )
+    )
+    + "endsolid plate\n"
+)
+PRESSED = """\
+# trackbed: cycle
+fix press all move/mesh mesh plate linear 0. 0. -0.02
+run 400
+unfix press
+fix press all move/mesh mesh plate linear 0. 0. 0.02
+run 400
+unfix press
+# trackbed: end
+"""
+"""A cycle of the plate: down and up by 0.16 mm."""
+LAMMPS = """\
+units si
+atom_style sphere
+boundary f f f
+newton off
+comm_modify vel yes
+region box block -0.001 0.061 -0.001 0.061 -0.001 0.15 units box
+create_box 1 box
+neighbor 0.002 bin
+neigh_modify delay 0
+pair_style gran/hertz/history 5e6 NULL 50.0 NULL 0.5 0
+pair_coeff * *
+timestep 0.00002
+region bed block 0 0.06 0 0.06 0 0.2 units box
+region fill block 0.006 0.054 0.006 0.054 0.006 0.12 units box
+create_atoms 1 random 60 12345 fill overlap 0.01 maxtry 1000
+set type 1 diameter 0.01 density 2500
+fix integr all nve/sphere
+fix grav all gravity 9.81 vector 0 0 -1
+fix walls all wall/gran/region hertz/history 5e6 NULL 50.0 NULL 0.5 0 region bed
+run 9000
+# trackbed: cycle
+fix grav all gravity 30 vector 0 0 -1
+run 400
+fix grav all gravity 9.81 vector 0 0 -1
+run 400
+# trackbed: end
+"""
