@@ -89,7 +89,7 @@ region box block -0.001 0.061 -0.001 0.061 -0.001 0.15 units box
 create_box 1 box
 neighbor 0.002 bin
 neigh_modify delay 0
-pair_style gran/hertz/history 5e6 NULL 50.0 NULL 0.5 0
+pair_style gran/hertz/history 5e6 NULL 5e6 NULL 0.5 0
 pair_coeff * *
 timestep 0.00002
 region bed block 0 0.06 0 0.06 0 0.2 units box
@@ -98,7 +98,7 @@ create_atoms 1 random 60 12345 fill overlap 0.01 maxtry 1000
 set type 1 diameter 0.01 density 2500
 fix integr all nve/sphere
 fix grav all gravity 9.81 vector 0 0 -1
-fix walls all wall/gran/region hertz/history 5e6 NULL 50.0 NULL 0.5 0 region bed
+fix walls all wall/gran/region hertz/history 5e6 NULL 5e6 NULL 0.5 0 region bed
 run 9000
 # trackbed: cycle
 fix grav all gravity 30 vector 0 0 -1
@@ -107,3 +107,15 @@ fix grav all gravity 9.81 vector 0 0 -1
 run 400
 # trackbed: end
 """
+STONES = (
+    LIGGGHTS.replace(
+        "fix pts1 all particletemplate/sphere 15485863 atom_type 1 density constant 2500 &\n"
+        "    radius constant 0.005",
+        "fix pts1 all particletemplate/multisphere 15485863 atom_type 1 density constant 2500 &\n"
+        "    nspheres 2 ntry 100000 spheres 0 0 0 0.005 0.004 0 0 0.004 type 1",
+    )
+    .replace("particles_in_region 80", "particles_in_region 40")
+    .replace("fix integr all nve/sphere", "fix integr all multisphere")
+    .replace("atom_modify map array", "atom_modify map array sort 0 0")
+)
+"""`LIGGGHTS` with stones of two overlapping spheres."""

@@ -111,15 +111,26 @@ def list_jump_overrides(arguments: argparse.Namespace) -> list[str]:
 
 def run_command(arguments: argparse.Namespace) -> int:
     """Run a scene from its start."""
+    from adapters.decks import describe_deck_run, is_deck_scene, run_deck_scene
     from adapters.procedure import run as procedure
 
     named = [f"procedure.name={arguments.procedure}"] if arguments.procedure else []
     folder = arguments.run_folder or arguments.scene.parent / "run"
+    overrides = named + list_overrides(arguments) + list_jump_overrides(arguments)
+    if is_deck_scene(arguments.scene):
+        if arguments.dry_run:
+            raise UsageError(
+                "the scene of a deck has no dry run", where=str(arguments.scene),
+                remedy="trackbed adopt DECK --check runs two of its cycles",
+            )  # fmt: skip
+        run_deck_scene(arguments.scene, folder, control=arguments.control, overrides=overrides)
+        print(*describe_deck_run(folder), sep="\n")
+        return 0
     procedure.run_scene(
         arguments.scene,
         folder,
         control=arguments.control,
-        overrides=named + list_overrides(arguments) + list_jump_overrides(arguments),
+        overrides=overrides,
         dry_run=arguments.dry_run,
         cycle_by_cycle=arguments.cycle_by_cycle,
     )

@@ -92,14 +92,6 @@ def find_obstacles(deck: Deck, engine: str) -> list[Finding]:
     return sorted(found, key=lambda one: order.get(one.place, -1))
 
 
-def find_insertions(deck: Deck, engine: str) -> Iterator[Finding]:
-    """Insertions that are not undone before the cycle: a window inserts again."""
-    for name, one in find_named(deck.before, "fix").items():
-        if INSERTION.fullmatch(one.word(3)):
-            what = f"fix {name} still inserts grains: each window would insert them again"
-            yield Finding("added", one.place, what, f"unfix {name}", "cycle")
-
-
 def find_unfinished(deck: Deck, engine: str) -> Iterator[Finding]:
     """Things that a cycle makes and leaves, or takes away: the next one can not be the same."""
     for kind, undo in KEYED.items():
@@ -170,68 +162,57 @@ def find_phases(deck: Deck, engine: str) -> Iterator[Finding]:
     """Motions whose phase counts from the start of a run, and forces read where a run begins."""
     meshes = list_contents(deck).meshes if engine == "liggghts" else {}
     for one in (*list_live(deck.before), *deck.cycle):
-        name, style, live = one.word(1), one.word(3), one not in deck.cycle
-        if one.name == "fix" and "wiggle" in one.words:
-            if live and engine == "lammps" and style.startswith("wall/gran"):
-                yield stop(
-                    one, f"the motion of wall {name} starts again from its first phase in each "
-                    "window", f"put it inside the cycle, of whole periods: '{one.short}' below "
-                    f"'{BEGIN}' and 'unfix {name}' above '{END}'",
-                )  # fmt: skip
-            elif live and style == "move/mesh":
-                yield note(
-                    one, f"fix {name} goes on in its phase, to round-off of its places (8e-7 m "
-                    "were seen); a cycle must be whole periods of it",
-                )  # fmt: skip
+        name, waves = one.word(1), one.name == "fix" and "wiggle" in one.words
+        if waves and engine == "lammps" and "wall/gran" in one.text and one not in deck.cycle:
+            what = f"the motion of wall {name} starts again from its first phase in each window"
+            remedy = f"'{one.short}' below '{BEGIN}', 'unfix {name}' above '{END}', whole periods"
+            yield stop(one, what, remedy)
+        elif waves and one.word(3) == "move/mesh":
+            what = f"fix {name} goes on in its phase to round-off only (8e-7 m were seen)"
+            yield note(one, what, "a cycle must be whole periods of it")
         formula = " ".join(one.words[3:]) if one.name == "variable" else ""
         if part := re.search(r"(?<![\w.])(elapsed|elaplong)(?!\w)", formula):
-            yield note(
-                one, f"variable {name} counts {part[0]} steps from the start of each run: the "
-                "motion must be whole in each",
-            )  # fmt: skip
+            what = f"variable {name} counts {part[0]} steps from the start of each run"
+            yield note(one, what, "the motion must be whole in each run")
         if read := set(re.findall(r"\bf_(\w+)\[", formula)) & meshes.keys():
-            yield note(
-                one, f"f_{min(read)}[...] is 0 where a window begins and doubled where a further "
-                "run begins: a motion that follows it takes a wrong step there",
-                "read the force a step earlier, or let 'fix mesh/surface/stress/servo' follow it",
-            )  # fmt: skip
-
-
-def find_clumps(deck: Deck, engine: str) -> Iterator[Finding]:
-    """Grains of several spheres."""
-    for name, one in find_named(deck.before, "fix").items():
-        if RIGID.fullmatch(one.word(3)):
             what = (
-                f"fix {name} {one.word(3)} holds grains together, and trackbed can not move its "
-                "bodies"
+                f"f_{min(read)}[...] is 0 where a window begins and doubled where a further run "
+                "begins: a motion that follows it takes a wrong step there"
             )
-            yield stop(one, what, "spheres, or in LIGGGHTS 'fix multisphere'")
-        if one.word(3).startswith("multisphere") and one.word(2) != "all":
-            yield stop(
-                one, f"fix {name} {one.word(3)} is of group {one.word(2)}: spheres beside it "
-                "vanish at the second run", " ".join(("fix", name, "all", *one.words[3:])),
-            )  # fmt: skip
+            yield note(one, what, "read the force a step earlier")
 
 
-def find_missing_regions(deck: Deck, engine: str) -> Iterator[Finding]:
-    """Walls on a region that is gone: LAMMPS then names an atom's callback, not the region."""
+def find_unfit_fixes(deck: Deck, engine: str) -> Iterator[Finding]:
+    """Insertions that a window would begin again, clumps, and walls on a region that is gone.
+
+    LAMMPS names an atom's callback for the last, not the region.
+    """
     regions = find_named(deck.before, "region")
-    for one in find_named(deck.before, "fix").values():
-        for before, name in zip(one.words[3:], one.words[4:], strict=False):
-            known = name in regions or "$" in name or INSERTION.fullmatch(one.word(3))
-            if before == "region" and not known:
-                what = f"fix {one.word(1)} needs the region {name}, gone where the cycle begins"
-                yield stop(one, what, f"declare it above '{BEGIN}': region {name} ...")
+    for name, one in find_named(deck.before, "fix").items():
+        style = one.word(3)
+        if INSERTION.fullmatch(style):
+            what = f"fix {name} still inserts grains: each window would insert them again"
+            yield Finding("added", one.place, what, f"unfix {name}", "cycle")
+            continue
+        if RIGID.fullmatch(style):
+            what = f"fix {name} {style} holds grains together, and trackbed can not move its bodies"
+            yield stop(one, what, "spheres, or in LIGGGHTS 'fix multisphere'")
+        if style.startswith("multisphere") and one.word(2) != "all":
+            what = f"fix {name} {style} is not of all: spheres beside it vanish at the second run"
+            yield stop(one, what, " ".join(("fix", name, "all", *one.words[3:])))
+        if style.endswith("/servo"):
+            what = f"the controller of fix {name} starts again in each window"
+            yield note(one, what, "trackbed adopt --check says how far that goes")
+        for before, region in zip(one.words[3:], one.words[4:], strict=False):
+            if before == "region" and region not in regions and "$" not in region:
+                what = f"fix {name} needs the region {region}, gone where the cycle begins"
+                yield stop(one, what, f"declare it above '{BEGIN}': region {region} ...")
 
 
 def find_branches(deck: Deck, engine: str) -> Iterator[Finding]:
     """Commands in branches and loops, which a window can not follow."""
     labels = {one.word(1) for one in deck.cycle if one.name == "label"}
-    run = next((n for n, one in enumerate(deck.cycle) if one.name == "run"), len(deck.cycle))
-    for number, one in enumerate(deck.cycle):
-        if one.name == "label" and number < run:
-            what = f"the cycle's first run is inside the loop {one.word(1)}"
-            yield stop(one, what, f"put the marks inside of it: '{BEGIN}' behind '{one.short}'")
+    for one in deck.cycle:
         if one.name == "jump" and one.word(2) not in labels:
             what = f"'{one.short}' leaves the cycle"
             yield stop(one, what, f"put '{END}' above this loop's next and jump")
@@ -269,8 +250,8 @@ def find_losses(deck: Deck, engine: str) -> Iterator[Finding]:
 
 
 RULES: Sequence[Callable[[Deck, str], Iterator[Finding]]] = (
-    find_insertions, find_unfinished, find_absolute_runs, find_frozen_values, find_phases,
-    find_clumps, find_missing_regions, find_branches, find_losses,
+    find_unfinished, find_absolute_runs, find_frozen_values, find_phases, find_unfit_fixes,
+    find_branches, find_losses,
 )  # fmt: skip
 """What is looked for."""
 

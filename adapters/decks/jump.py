@@ -24,21 +24,17 @@ def jump(
 
     Raises `UsageError` for arrays that do not fit, are not finite, or are too few for the law.
     """
-    position = np.asarray(states, float)
-    if position.ndim != 3 or position.shape[2:] != (3,) or 0 in position.shape:
-        raise UsageError(
-            f"states of shape {position.shape} are no places of grains at cycle ends",
-            where="jump", remedy="give them as (cycles, grains, 3)",
-        )  # fmt: skip
-    try:
-        radii = np.broadcast_to(np.asarray(radius, float), position.shape[1]).copy()
-    except ValueError:
-        raise UsageError(
-            f"radii of shape {np.shape(radius)} are not those of {position.shape[1]} grains",
-            where="jump", remedy="give one for each grain, or one of all",
-        ) from None  # fmt: skip
-    if not (np.isfinite(radii) & (radii > 0)).all() or not 0 <= h < np.inf:
-        raise UsageError("radii are above 0, and cycles to jump at least 0", where="jump")
+    position, radii = np.asarray(states, float), np.asarray(radius, float)
+    why = ""
+    if position.ndim != 3 or position.shape[2] != 3 or 0 in position.shape:
+        why = f"states of shape {position.shape} are no (cycles, grains, 3)"
+    elif radii.shape not in ((), position.shape[1:2]):
+        why = f"radii of shape {radii.shape} are not those of {position.shape[1]} grains"
+    elif not (np.isfinite(radii) & (radii > 0)).all() or not 0 <= h < np.inf:
+        why = "radii must be above 0, and cycles to jump at least 0"
+    if why:
+        raise UsageError(why, where="jump")
+    radii = np.broadcast_to(radii, position.shape[1]).copy()
     cycle = first_cycle + np.arange(len(position), dtype=float)
     size = np.ptp(position[-1], axis=0) + 2 * radii.max()
     container = Container("box", size_x=float(size[0]), size_y=float(size[1]))

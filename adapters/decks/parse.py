@@ -88,43 +88,40 @@ def read_deck(path: Path, lines: Sequence[str] | None = None) -> Deck:
     lines = read_lines(path) if lines is None else lines
     marks = find_marks(path, lines)
     first, last = marks or (len(lines) + 1, len(lines) + 1)
-    found = [(one.line, part) for one in join_lines(lines, path.name)
-             for part in expand(one, path.parent)]  # fmt: skip
-    return Deck(
-        path, tuple(lines),
-        tuple(one for line, one in found if line < first),
-        tuple(one for line, one in found if first < line < last),
-        tuple(one for line, one in found if line > last), marks,
-    )  # fmt: skip
+    before, cycle, after = list[Command](), list[Command](), list[Command]()
+    for one in join_lines(lines, path.name):
+        part = before if one.line < first else cycle if one.line < last else after
+        part.extend(expand(one, path.parent))
+    return Deck(path, tuple(lines), tuple(before), tuple(cycle), tuple(after), marks)
 
 
 def read_lines(path: Path) -> list[str]:
     """Lines of a deck; raises `UsageError` for a file that is not there or is no text."""
-    remedy = "give the input file that you run by liggghts -in or lmp -in"
     try:
         text = read_bounded(path, errors="surrogateescape")  # comments may be in any encoding
+        reason = "it is no text" if "\0" in text else ""
     except OSError as error:
-        what = f"this deck can not be read ({error.strerror})"
-        raise UsageError(what, where=str(path), remedy=remedy) from error
-    if "\0" in text:
-        raise UsageError("this is no deck: it is no text", where=str(path), remedy=remedy)
-    return text.split("\n")[: -1 if text.endswith("\n") else None]
+        text, reason = "", error.strerror or str(error)
+    if reason:
+        raise UsageError(
+            f"this deck can not be read ({reason})", where=str(path),
+            remedy="give the input file that you run by liggghts -in or lmp -in",
+        )  # fmt: skip
+    return text.removesuffix("\n").split("\n")
 
 
 def find_marks(path: Path, lines: Sequence[str]) -> tuple[int, int] | None:
     """Lines of the two marks, from 1; None where there is none."""
-    found = [
-        (number, mark[1]) for number, line in enumerate(lines, 1) if (mark := MARK.match(line))
-    ]
+    found = {n: mark[1] for n, line in enumerate(lines, 1) if (mark := MARK.match(line))}
     if not found:
         return None
-    if [word for _, word in found] != ["cycle", "end"]:
-        listed = ", ".join(f"'{word}' in line {number}" for number, word in found)
+    if list(found.values()) != ["cycle", "end"]:
+        listed = ", ".join(f"'{word}' in line {number}" for number, word in found.items())
         raise UsageError(
             f"the marks are not one pair: {listed}", where=str(path),
             remedy=f"one line '{BEGIN}' above the load cycle and one line '{END}' below it",
         )  # fmt: skip
-    return found[0][0], found[1][0]
+    return min(found), max(found)
 
 
 def join_lines(lines: Sequence[str], file: str) -> Iterator[Command]:
@@ -132,12 +129,11 @@ def join_lines(lines: Sequence[str], file: str) -> Iterator[Command]:
     text, first = "", 0
     for number, line in enumerate(lines, 1):
         first = first if text else number
-        text += line.rstrip("\r")
-        if text.rstrip().endswith("&") and number < len(lines):
-            text = text.rstrip()[:-1] + " "
+        text += line.rstrip()
+        if text.endswith("&") and number < len(lines):
+            text = text[:-1] + " "
             continue
-        text = COMMENT.sub(r"\1", text).strip()
-        if text:
+        if text := COMMENT.sub(r"\1", text).strip():
             yield Command(text, file, first, number)
         text = ""
 
@@ -147,20 +143,16 @@ def expand(command: Command, folder: Path, depth: int = 0) -> Iterator[Command]:
     if command.name != "include":
         yield command
         return
-    name = command.word(1)
-    inner = folder / name
-    if "$" in name or depth == NESTED or not inner.is_file():
-        why = "does not exist" if "$" not in name else "has a variable in its name"
-        raise UsageError(
-            f"the file {name} that is included here "
-            + ("includes itself" if depth == NESTED else why),
-            where=command.place, remedy="include files by name, from the folder of the deck",
-        )  # fmt: skip
-    lines = read_lines(inner)
-    if any(MARK.match(line) for line in lines):
-        raise UsageError(
-            f"a mark stands in the included file {name}", where=command.place,
-            remedy="put both marks into the deck itself",
-        )  # fmt: skip
-    for one in join_lines(lines, name):
+    name, why = command.word(1), ""
+    if "$" in name:
+        why = "has a variable in its name: write it out"
+    elif depth == NESTED:
+        why = "includes itself"
+    elif not (folder / name).is_file():
+        why = "does not exist in the folder of the deck"
+    elif any(MARK.match(line) for line in read_lines(folder / name)):
+        why = "has a mark: put both into the deck itself"
+    if why:
+        raise UsageError(f"the file {name} that is included here {why}", where=command.place)
+    for one in join_lines(read_lines(folder / name), name):
         yield from expand(one, folder, depth + 1)

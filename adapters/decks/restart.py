@@ -1,70 +1,50 @@
-"""What LIGGGHTS keeps of a fix in its restart file: bodies of several spheres, corners of meshes.
+"""Grains, bodies of several spheres and meshes moved in a restart file; springs stay as they are.
 
-Read and written in place, as a record of doubles behind the fix's name and style; found by
-experiment in Debian's LIGGGHTS 3.8.0 and in its sources (``fix_multisphere.cpp``,
-``multi_node_mesh_I.h``).
+A sphere is known by its place, identifier and velocity, in this order as doubles, in LIGGGHTS and
+LAMMPS.  What a fix of LIGGGHTS keeps is a record of doubles behind its name and style (Debian's
+3.8.0: ``fix_multisphere.cpp``, ``multi_node_mesh_I.h``).
 """
 
 from __future__ import annotations
 
 import struct
-from pathlib import Path
 
 import numpy as np
 
-from adapters.bed import FloatArray
+from adapters.bed import FloatArray, IntArray
 from adapters.errors import EngineFailed
 
-STONE_LENGTH, STONE_ID, CENTRE, VELOCITY, SPIN = 0, 4, slice(5, 8), slice(8, 11), slice(14, 17)
-"""Columns of a body of several spheres: length of its record, identifier, centre [m], ..."""
-ANGULAR, BOUND = slice(11, 14), slice(1, 4)
-"""Its angular momentum, and the centre of the sphere around it [m]."""
+STONE_ID, MASS = 4, 24
+BOUND, CENTRE, VELOCITY = slice(1, 4), slice(5, 8), slice(8, 11)
+MOMENTUM, SPIN = slice(11, 14), slice(14, 17)
+"""Columns of a body of several spheres: centre of the sphere around it [m], its own centre [m],
+velocity [m/s], angular momentum, angular velocity [rad/s]."""
 
 
 def find_record(restart: bytearray, fix: str, style: str) -> FloatArray:
     """The doubles that a fix left in a restart file, a view that writes through, shape (d,).
 
-    Raises `EngineFailed` where there is none of this name and style.
+    Raises `EngineFailed` where there is no whole record of this name and style.
     """
     key = b"".join(struct.pack("<i", len(s) + 1) + s.encode() + b"\0" for s in (fix, style))
     start = restart.find(key) + len(key)
-    if start < len(key) or start + 4 > len(restart):
-        raise EngineFailed(f"the restart file holds nothing of fix {fix} {style}")
-    size = struct.unpack_from("<i", restart, start)[0]
-    if size < 0 or start + 4 + size > len(restart):
-        raise EngineFailed(f"the restart file is cut inside of fix {fix} {style}")
+    size = 0 if start < len(key) else int.from_bytes(restart[start : start + 4], "little")
+    if not 8 <= size <= len(restart) - start - 4:
+        raise EngineFailed(f"the restart file holds no whole record of fix {fix} {style}")
     return np.frombuffer(restart, "<f8", size // 8, start + 4)
 
 
-def find_corners(record: FloatArray) -> FloatArray:
-    """Corners of a mesh's triangles in its record [m], a view of shape (t, 3, 3).
+def find_mesh(restart: bytearray, fix: str, style: str) -> tuple[FloatArray, FloatArray]:
+    """Heights of a mesh's corners (t, 3) and of its points of reference (2,) [m], as views.
 
-    Raises `EngineFailed` for a record whose triangles are not all of one length.
+    Raises `EngineFailed` for no record, or one of a kind that is not known.
     """
-    count, length = int(record[0]), int(record[3])
-    end = 3 + count * length
-    if count < 1 or length < 10 or end > len(record) or (record[3:end:length] != length).any():
-        raise EngineFailed("the restart file keeps this mesh in a way that trackbed does not know")
-    return record[3:end].reshape(count, length)[:, 1:10].reshape(count, 3, 3)
-
-
-def measure_height(restart: Path, fix: str, style: str) -> float:
-    """Mean height of a mesh's corners in a restart file [m]."""
-    return float(
-        find_corners(find_record(bytearray(restart.read_bytes()), fix, style))[..., 2].mean()
-    )
-
-
-def move_mesh(restart: bytearray, fix: str, style: str, rise: float) -> None:
-    """Move a mesh by ``rise`` [m] along z: its corners and its points of reference."""
     record = find_record(restart, fix, style)
-    count, length = int(record[0]), int(record[3])
-    find_corners(record)
-    rows = record[3 : 3 + count * length].reshape(count, length)
-    rows[:, 3:10:3] += rise
-    behind = 3 + count * length
-    record[behind + 3] += rise
-    record[behind + 7] += rise
+    count, length = (int(x) for x in record[:4:3]) if len(record) > 3 else (0, 0)
+    end = 3 + count * length
+    if count < 1 or length < 10 or end + 8 > len(record) or (record[3:end:length] != length).any():
+        raise EngineFailed("the restart file keeps this mesh in a way that trackbed does not know")
+    return record[3:end].reshape(count, length)[:, 3:10:3], record[end + 3 : end + 8 : 4]
 
 
 def find_stones(restart: bytearray, fix: str) -> FloatArray:
@@ -73,14 +53,42 @@ def find_stones(restart: bytearray, fix: str) -> FloatArray:
     return record[1:].reshape(int(record[0]), -1)
 
 
-def move_stones(restart: bytearray, fix: str, identifier: FloatArray, shift: FloatArray) -> None:
+def move_stones(restart: bytearray, fix: str, identifier: IntArray, shift: FloatArray) -> None:
     """Move whole bodies by ``shift`` (s, 3) [m], rotations left alone, and bring them to rest.
 
-    ``identifier`` (s,) says whose each shift is.  The engine sets the spheres from the bodies.
+    ``identifier`` (s,), ascending, says whose each shift is.  The engine sets the spheres from the
+    bodies.
     """
     stones = find_stones(restart, fix)
     rows = np.searchsorted(identifier, stones[:, STONE_ID])
-    stones[:, CENTRE] += shift[rows]
-    stones[:, BOUND] += shift[rows]
-    for still in (VELOCITY, ANGULAR, SPIN):
+    for place in (CENTRE, BOUND):
+        stones[:, place] += shift[rows]
+    for still in (VELOCITY, MOMENTUM, SPIN):
         stones[:, still] = 0.0
+
+
+def move_grains(
+    restart: bytearray, identifier: IntArray, place: FloatArray, velocity: FloatArray,
+    shift: FloatArray,
+) -> None:  # fmt: skip
+    """Move spheres by ``shift`` (n, 3) [m] and bring them to rest; their spins go on.
+
+    ``identifier`` (n,), ascending, ``place`` (n, 3) [m] as folded into the box and ``velocity``
+    (n, 3) [m/s] are those of the file, to the last bit.  Raises `EngineFailed` unless each sphere
+    is found there, once.
+    """
+    found = np.zeros(len(identifier), int)
+    for offset in range(8):  # the engines align nothing
+        doubles = np.frombuffer(restart, "<f8", (len(restart) - offset) // 8, offset)
+        at = np.flatnonzero(np.isin(doubles[:-9], place[:, 0]))
+        for tags in (doubles, doubles.view("<i8")):  # LIGGGHTS and LAMMPS write them so
+            row = np.searchsorted(identifier, tags[at + 3]).clip(max=len(identifier) - 1)
+            known = np.column_stack([identifier[row], place[row], velocity[row]])
+            read = [tags[at + 3], *(doubles[at + k] for k in (0, 1, 2, 7, 8, 9))]
+            same = (known == np.column_stack(read)).all(axis=1)
+            for k in range(3):
+                doubles[at[same] + k] += shift[row[same], k]
+                doubles[at[same] + 7 + k] = 0.0
+            found += np.bincount(row[same], minlength=len(found))
+    if (found != 1).any():
+        raise EngineFailed("the restart file keeps grains in a way that trackbed does not know")

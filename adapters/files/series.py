@@ -67,7 +67,7 @@ def read_series(
         raise UsageError(f"{whose} in m, not in {unit}", where=str(path), remedy="leave --unit out")
     if tables:
         table = path / "settlement.csv" if path.is_dir() else path
-        if path.is_dir() and (kind := find_kind(path)) and kind.states:
+        if path.is_dir() and (kind := find_kind(path)) and kind.verb != "run":
             raise UsageError(
                 f"this is a {kind.verb} run, which has no settlement under load cycles",
                 where=str(path), remedy=f"its files are open: {kind.files}",

@@ -2,6 +2,7 @@
 
 from adapters.procedure import run
 from adapters.procedure.checks import BOUNDS
+from adapters.procedure.forecast import estimate_gain, estimate_sinking
 from adapters.procedure.history import (
     AVERAGED,
     History,
@@ -30,13 +31,15 @@ from adapters.procedure.record import (
 )
 from adapters.procedure.run import record_scene, refuse_differences, refuse_unloaded
 from adapters.procedure.seating import SEATING, find_hung_cycles, format_spans
+from adapters.procedure.stages import settle_by
 from adapters.procedure.status import judge_progress, read_status
 
 __all__ = [
     "AVERAGED", "BOUNDS", "CONTROL", "SEATING", "History", "Progress", "Record", "Settled", "Track",
-    "describe_result", "describe_sleeper", "estimate_band_of_run", "estimate_mean",
+    "describe_result", "describe_sleeper", "estimate_band_of_run", "estimate_gain",
+    "estimate_mean", "estimate_sinking",
     "find_comparable_cycle", "find_hung_cycles", "find_speed_up", "format_spans", "judge_members",
     "judge_progress", "list_checks", "list_decisions", "list_jumped_spans", "make_plain",
     "read_run_record", "read_status", "record_scene", "refuse_differences", "refuse_unloaded",
-    "run", "sum_cost",
+    "run", "settle_by", "sum_cost",
 ]  # fmt: skip

@@ -1,0 +1,287 @@
+"""Load cycles computed and jumped on an adopted deck, and a full run beside it.
+
+The procedure of lengths k and h (`adapters.procedure.fixed`), without what only a bed of trackbed's
+own has: a container, a piston's record, contacts.  Of a deck's walls nothing is known, so a moved
+bed is not relaxed: its healing cycles bring the overlaps back.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from adapters.bed import State
+from adapters.decks.detect import find_obstacles
+from adapters.decks.engine import Adopted, run_deck
+from adapters.decks.jump import jump
+from adapters.decks.restart import find_mesh, move_grains, move_stones
+from adapters.decks.scene import load_deck_scene
+from adapters.decks.split import format_prepare, format_whole, format_window
+from adapters.decks.states import States, load_states, read_states, save_states
+from adapters.engines import allow_interrupts, get_engine
+from adapters.errors import EngineFailed, NotCredible, SceneError
+from adapters.files import Outcome, RunFolder, explain_full_disk
+from adapters.jumps import SLOPES
+from adapters.procedure import (
+    CONTROL,
+    Progress,
+    estimate_gain,
+    estimate_sinking,
+    refuse_differences,
+    settle_by,
+    sum_cost,
+)
+from adapters.procedure import run as procedure
+from adapters.scene import Procedure
+from trackbed.memory import refuse_more_memory
+from trackbed.run_files import record_provenance, write_result, write_whole
+
+TRIES = 3
+"""Jumps tried at a place, each half as long; then cycles are computed."""
+CALM = 10.0
+"""Kinetic energy behind a jump and its healing over the greatest at cycle ends before it [-]: a
+jump that throws the bed apart leaves thousands of times as much, a calm one about as much."""
+
+
+@dataclass(frozen=True)
+class DeckRun:
+    """A run in progress."""
+
+    bed: Adopted
+    procedure: Procedure
+    folder: RunFolder
+    progress: Progress
+
+    def states(self, stage: str) -> States:
+        """What a finished stage left."""
+        return load_states(self.folder.path / stage / "states.npz")
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a run is: what the next window starts from."""
+
+    cycle: int  # cycles done, jumped ones included
+    window: str  # stage that left the states
+    healing: int = 0  # first cycles of that window to keep out of the fit
+    jumped: str = ""  # stage of the jump behind it; empty for none
+
+
+def run_deck_scene(
+    path: Path, run_path: Path, *, control: bool = False, overrides: Sequence[str] = ()
+) -> None:
+    """Run the scene of an adopted deck in the folder ``run_path``; with ``control`` all cycles too.
+
+    A folder that holds the same is gone on with.  Raises `SceneError` for a deck that can not be
+    cut, `EngineMissing`, `EngineFailed`, and `NotCredible` where grains come or go.
+    """
+    scene, bed = load_deck_scene(path, overrides)
+    if stops := [one for one in find_obstacles(bed.deck, bed.engine) if one.kind != "note"]:
+        raise SceneError(
+            "this deck can not be cut:\n  " + "\n  ".join(map(str, stops)),
+            where=str(bed.deck.path), remedy="change it, then: trackbed adopt DECK --check",
+        )  # fmt: skip
+    folder, progress, p = RunFolder(run_path), Progress(), scene.procedure
+    text = format_whole(bed.deck, bed.engine, 1).encode(errors="surrogateescape")
+    record = scene.model_dump(mode="json")
+    record["deck"]["digest"] = hashlib.sha256(text).hexdigest()
+    with allow_interrupts(), explain_full_disk(run_path), folder.lock():
+        if (run_path / "manifest.json").exists():
+            refuse_differences(folder.manifest()["scene"], record, run_path)
+            control |= folder.manifest()["control"]
+        else:
+            procedure.refuse_strangers(folder)
+        shutil.copyfile(path, run_path / "scene.toml")
+        manifest = {
+            "scene": record, "overrides": [*overrides], "control": control,
+            "provenance": record_provenance(sys.argv),
+        }  # fmt: skip
+        write_whole(run_path / "manifest.json", json.dumps(manifest, indent=1) + "\n")
+        with procedure.note_stop(folder):
+            folder.add_event("engine", name=bed.engine, version=get_engine(bed.engine).version())
+            # no piston is known here, so none is waited for
+            run = DeckRun(bed, p.model_copy(update={"seating": "any"}), folder, progress)
+            settle(run, jumps=True)
+            if control:
+                progress.print_line(CONTROL)
+                beside = folder.enter(CONTROL)
+                beside.share_start(folder, p.k_i + p.window_cycles)
+                settle(replace(run, folder=beside), jumps=False)
+            write_result(run_path, {"result": "; ".join(describe_deck_run(run_path))})
+
+
+def settle(run: DeckRun, jumps: bool) -> None:
+    """Preparation, k_i cycles, then k cycles and a jump of h until the end."""
+    p, k = run.procedure, run.procedure.window_cycles
+    if run.folder.outcome("preparation") is None:
+        started, folder = time.process_time(), run.folder.begin("preparation")
+        text = format_prepare(run.bed.deck, run.bed.engine)
+        cost = run_deck(run.bed, text, folder / "prepare.in")
+        finish(run, folder, Place(0, ""), [], read_states(folder, 0, 0, run.bed), cost, started)
+    place = compute(run, Place(0, "preparation"), p.k_i)
+    place = compute(run, place, min(k, p.total_cycles - place.cycle))
+    for number in range(p.total_cycles if jumps else 0):
+        longest = p.total_cycles - place.cycle - p.healing_cycles - k
+        if longest < max(min(p.h or (1,)), 1):
+            break
+        place = jump_and_heal(run, place, min(p.jump_cycles(number), longest))
+    while place.cycle < p.total_cycles:
+        place = compute(run, place, min(k, p.total_cycles - place.cycle))
+    run.folder.write_settlement()
+
+
+def compute(run: DeckRun, place: Place, cycles: int, healing: int = 0) -> Place:
+    """A window of ``cycles`` load cycles, the first ``healing`` of them not to be fitted."""
+    name, bed = f"window_{place.cycle:06d}", run.bed
+    outcome = run.folder.outcome(name)
+    if outcome is None or outcome.last_cycle != place.cycle + cycles:
+        started, start = time.process_time(), run.states(place.window)
+        refuse_more_memory(
+            procedure.STATE_BYTES * len(start.last) * (cycles + 1),
+            f"a window of {cycles} cycles", "procedure", "shorter windows (procedure.k_i and k)",
+        )  # fmt: skip
+        folder, before = run.folder.begin(name), start.energy.max()
+        start = write_start(run, place, start, folder)
+        cost = run_deck(bed, format_window(bed.deck, bed.engine, cycles), folder / "window.in")
+        states = read_states(folder, 1, cycles, bed).behind(start)
+        after = states.energy[healing:].max()
+        if place.jumped and after > CALM * before:
+            what = f"behind the jump the bed moves with {after:.3g} J, and with {before:.3g} before"
+            raise NotCredible(what, where=str(folder))
+        first = run.states("preparation")
+        rows = [make_row(first, states, c, place.cycle, healing) for c in range(1, cycles + 1)]
+        finish(run, folder, place, rows, states, cost, started)
+    return Place(place.cycle + cycles, name, healing)
+
+
+def write_start(run: DeckRun, place: Place, states: States, folder: Path) -> States:
+    """Write the restart file of the last of ``states``, moved where a jump was made; that state."""
+    restart, bed = bytearray((run.folder.path / place.window / "end.restart").read_bytes()), run.bed
+    move, drop = np.zeros(3), 0.0
+    if place.jumped:
+        with np.load(run.folder.path / place.jumped / "moved.npz") as data:
+            move, drop = data["move"], float(data["drop"])
+        if bed.stones:
+            move_stones(restart, bed.stones, states.identifier, move)
+        else:
+            last = states.last
+            move_grains(restart, states.identifier, last[:, 1:4], last[:, 4:], move)
+        for height in find_mesh(restart, *bed.loaded) if bed.loaded else ():
+            height -= drop
+    (folder / "cycle_0.restart").write_bytes(restart)
+    return replace(states, position=states.position + move, height=states.height - drop)
+
+
+def jump_and_heal(run: DeckRun, place: Place, h: int) -> Place:
+    """A jump of ``h`` cycles and the window behind it; what fails is tried again half as long."""
+    p = run.procedure
+    for attempt in range(1, TRIES + 1):
+        name = f"jump_{place.cycle:06d}_{attempt}"
+        if not run.folder.failure(name):
+            try:
+                jumped = jump_bed(run, place, h, name)
+                return compute(run, jumped, p.healing_cycles + p.window_cycles, p.healing_cycles)
+            except (EngineFailed, NotCredible) as error:
+                if isinstance(error, EngineFailed) and error.from_outside:
+                    raise
+                run.folder.give_up(name, str(error))
+                run.progress.print_line(f"the jump of {h} cycles failed: {error}")
+        h = max(h // 2, 1)
+    run.progress.print_line("no jump from here: computing on")
+    return compute(run, place, min(p.window_cycles, p.total_cycles - place.cycle))
+
+
+def jump_bed(run: DeckRun, place: Place, h: int, name: str) -> Place:
+    """Find where the bed will be ``h`` cycles on; the engine places it there in the next window."""
+    outcome = run.folder.outcome(name)
+    if outcome is None or outcome.last_cycle != place.cycle + h:
+        started, p, states = time.process_time(), run.procedure, run.states(place.window)
+        folder = run.folder.begin(name)
+        seen = states.position[place.healing :]
+        first = place.cycle + 1 - len(seen)
+        target = jump(seen, h, states.radius, law=p.law, move=p.move, first_cycle=first)
+        still = np.zeros_like(target)
+        before = State(states.identifier, seen[-1], states.radius, states.mass, still, still)
+        like: Any = SimpleNamespace(procedure=p, folder=run.folder)  # what forecasts ask of a run
+        at: Any = place
+        if p.settlement == "history":
+            gain = estimate_gain(like, at, h, run.folder.outcomes(), SLOPES)
+            target = settle_by(gain, before, target)
+        drop = estimate_sinking(like, at, h) if run.bed.loaded else 0.0
+        np.savez(folder / "moved.npz", move=target - seen[-1], drop=drop)
+        row = run.folder.outcomes()[-1].rows[-1] | {"cycle": place.cycle + h, "kind": "jumped"}
+        row["settlement"] -= float((target - seen[-1])[:, 2].mean())
+        for key, sign in (("piston_height", -1), ("loaded_body", 1)):
+            row[key] = None if row[key] is None else row[key] + sign * drop
+        cost = {"engine": 0.0, "other": time.process_time() - started}
+        run.folder.finish(folder, Outcome("jump", place.cycle, place.cycle + h, [row], cost))
+    return Place(place.cycle + h, place.window, place.healing, name)
+
+
+def make_row(first: States, states: States, c: int, start: int, healing: int) -> dict[str, Any]:
+    """The row of ``settlement.csv`` at the end of cycle ``c`` of a window from cycle ``start`` on.
+
+    ``first``: the states of the preparation.  None where there is no loaded body.
+    """
+    height = float(states.height[c])
+    loaded = np.isfinite(height)
+    return {
+        "cycle": start + c, "kind": "healing" if c <= healing else "computed",
+        "settlement": float((first.position[0] - states.position[c])[:, 2].mean()),
+        "loaded_body": float(first.height[0]) - height if loaded else None,
+        "piston_height": height if loaded else None, "coordination_number": None,
+        "elastic_deflection": None, "kinetic_translational": float(states.energy[c]),
+    }  # fmt: skip
+
+
+def finish(
+    run: DeckRun, folder: Path, place: Place, rows: list[dict[str, Any]], states: States,
+    engine_s: float, started: float,
+) -> None:  # fmt: skip
+    """Keep the states and the last restart file of a stage, and say how far the run is."""
+    save_states(states, folder / "states.npz")
+    (folder / f"cycle_{len(rows)}.restart").rename(folder / "end.restart")
+    for one in folder.glob("cycle_*"):
+        one.unlink()
+    cost = {"engine": engine_s, "other": time.process_time() - started}
+    stage, last = folder.name.partition("_")[0], place.cycle + len(rows)
+    run.folder.finish(folder, Outcome(stage, place.cycle, last, rows, cost))
+    said = describe_row(rows[-1]) if rows else "the bed before its first cycle"
+    run.progress.print_line(f"{folder.name}: {said}")
+
+
+def describe_row(row: dict[str, Any]) -> str:
+    """The settlements of a row, for a sentence."""
+    body = row["loaded_body"]
+    said = f"cycle {row['cycle']}, settlement of the mean grain {1e6 * row['settlement']:.2f} um"
+    return said + ("" if body is None else f", of the loaded body {1e6 * body:.2f} um")
+
+
+def describe_deck_run(path: Path) -> list[str]:
+    """What came out of a run, and what the full run beside it says, in sentences."""
+    runs = RunFolder(path).outcomes(), RunFolder(path / CONTROL).outcomes()
+    rows, full = ({row["cycle"]: row for one in run for row in one.rows} for run in runs)
+    last, computed = max(rows), sum(row["kind"] != "jumped" for row in rows.values())
+    said = [f"{describe_row(rows[last])}; {computed} cycles computed"]
+    first = next((one.first_cycle for one in runs[0] if one.stage == "jump"), None)
+    if first is None or last not in full:
+        return said
+    for name, key in (("mean grain", "settlement"), ("loaded body", "loaded_body")):
+        if full[last][key] is not None:
+            gained, error = full[last][key] - rows[first][key], rows[last][key] - full[last][key]
+            said.append(
+                f"full run, {name}: {1e6 * full[last][key]:.2f} um, of these {1e6 * gained:.2f} "
+                f"since the first jump, by which the run errs by {1e6 * error:+.2f} um"
+            )
+    spent = [sum(sum_cost(one.cost) for one in run if one.stage != "preparation") for run in runs]
+    return [*said, f"CPU time {spent[0]:.3g} s, of the full run {spent[1]:.3g} s"]

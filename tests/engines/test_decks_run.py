@@ -1,0 +1,114 @@
+"""Runs of adopted decks: what is moved in a restart file moves in the engine, and jumps go on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from adapters.bed import FloatArray
+from adapters.decks.adopt import adopt
+from adapters.decks.engine import Adopted, run_deck
+from adapters.decks.parse import BEGIN
+from adapters.decks.restart import find_mesh, move_grains, move_stones
+from adapters.decks.run import run_deck_scene
+from adapters.decks.scene import load_deck_scene
+from adapters.decks.split import format_prepare, format_whole, format_window
+from adapters.decks.states import States, load_states, read_states
+from adapters.errors import SceneError
+from adapters.files import RunFolder, read_frames
+from tests import own_decks
+from tests.unit.test_decks import write_deck
+from trackbed import command
+
+HEAD = own_decks.LIGGGHTS.partition(BEGIN)[0]
+STEP = f"{BEGIN}\nrun 1\n# trackbed: end\n"
+SHIFT = np.array([2e-6, -1e-6, 1e-5])
+"""Of all grains together [m]: no overlap changes but those with walls."""
+
+
+def read_spheres(path: Path) -> FloatArray:
+    """Centres in a dump [m], shape (n, 3)."""
+    return next(iter(read_frames(path))).block("x", "y", "z")
+
+
+def step_moved(bed: Adopted, folder: Path) -> tuple[States, States]:
+    """States before a step of time, and behind it from grains and loaded body moved by `SHIFT`."""
+    run_deck(bed, format_prepare(bed.deck, bed.engine), folder / "prepare.in")
+    before = read_states(folder, 0, 0, bed)
+    restart = bytearray((folder / "cycle_0.restart").read_bytes())
+    move = np.broadcast_to(SHIFT, before.position[0].shape)
+    if bed.stones:
+        move_stones(restart, bed.stones, before.identifier, move)
+    else:
+        move_grains(restart, before.identifier, before.last[:, 1:4], before.last[:, 4:], move)
+    for height in find_mesh(restart, *bed.loaded) if bed.loaded else ():
+        height += SHIFT[2]
+    (folder / "cycle_0.restart").write_bytes(restart)
+    run_deck(bed, format_window(bed.deck, bed.engine, 1), folder / "window.in")
+    return before, read_states(folder, 1, 1, bed)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("engine", "text"), [
+    pytest.param("liggghts", HEAD + own_decks.PLATE + STEP, marks=pytest.mark.engine("liggghts")),
+    pytest.param("liggghts", own_decks.STONES.partition(BEGIN)[0] + STEP,
+                 marks=pytest.mark.engine("liggghts")),
+    pytest.param("lammps", own_decks.LAMMPS.partition(BEGIN)[0] + STEP,
+                 marks=pytest.mark.engine("lammps")),
+], ids=["spheres and plate", "stones", "lammps"])  # fmt: skip
+def test_the_engine_goes_on_from_where_grains_were_put(
+    engine: str, text: str, tmp_path: Path
+) -> None:
+    """From rest a step of 2e-5 s carries none further than a dt^2, 4e-6 m under a thousand weights.
+    Bodies take their spheres with them; the plate is where it was put, to round-off."""
+    bed = load_deck_scene(adopt(write_deck(tmp_path, text), engine).scene, [
+        f'deck.loaded_body="{"plate" if "fix plate" in text else ""}"'
+    ])[1]  # fmt: skip
+    before, after = step_moved(bed, tmp_path)
+    far = after.position[0] - before.position[0] - SHIFT
+    assert np.abs(far).max() < 1000 * 9.81 * 2e-5**2
+    spheres = read_spheres(tmp_path / "cycle_1.dump") - read_spheres(tmp_path / "cycle_0.dump")
+    assert np.abs(spheres - SHIFT).max() < 1000 * 9.81 * 2e-5**2
+    if bed.loaded:
+        assert after.height[0] - before.height[0] == pytest.approx(SHIFT[2], abs=1e-12)
+
+
+KEYS = {"total_cycles": 30, "k_i": 6, "k": 4, "h": 5, "healing_cycles": 2, "settlement": '"law"'}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("engine", "text"), [
+    pytest.param("liggghts", own_decks.LIGGGHTS, marks=pytest.mark.engine("liggghts")),
+    pytest.param("lammps", own_decks.LAMMPS, marks=pytest.mark.engine("lammps")),
+])  # fmt: skip
+def test_a_deck_is_run_with_jumps_and_a_full_run_beside_it(
+    engine: str, text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Every cycle is computed or jumped once; the full run is the deck itself, to the last bit."""
+    scene = adopt(write_deck(tmp_path, text), engine).scene
+    words = [word for key, value in KEYS.items() for word in ("--set", f"procedure.{key}={value}")]
+    assert command.main(["run", str(scene), "--control", *words]) == 0
+    run = RunFolder(scene.parent / "run")
+    spans = [(one.stage, one.first_cycle, one.last_cycle) for one in run.outcomes()]
+    assert [last for _, _, last in spans][:-1] == [first for _, first, _ in spans][1:]
+    assert ("jump", 10, 15) in spans
+    assert spans[-1][2] == 30
+    bed = load_deck_scene(scene)[1]
+    (tmp_path / "whole").mkdir()
+    run_deck(bed, format_whole(bed.deck, engine, 30), tmp_path / "whole" / "whole.in")
+    last = read_states(tmp_path / "whole", 30, 30, bed).position[0]
+    control = RunFolder(run.path / "control")
+    states = load_states(control.path / control.stage_names()[-1] / "states.npz")
+    assert np.array_equal(states.position[-1], last)
+    said = capsys.readouterr().out
+    assert "since the first jump, by which the run errs by" in said
+    assert command.main(["status", str(run.path)]) == 0
+    assert "finished" in capsys.readouterr().out
+    # again: nothing is computed anew; another deck or length is another run
+    events = len(run.events())
+    assert command.main(["run", str(scene), "--control", *words]) == 0
+    assert [one["event"] for one in run.events()[events:]] == ["engine"]
+    with pytest.raises(SceneError, match="differs from the one this run was started with"):
+        run_deck_scene(scene, run.path, overrides=["procedure.total_cycles=50"])
