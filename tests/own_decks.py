@@ -54,20 +54,13 @@ fix plate all mesh/surface/stress file plate.stl type 1
 fix hold all wall/gran model hertz tangential history mesh n_meshes 1 meshes plate
 """
 """A plate on top of the bed, for `LIGGGHTS`: a mesh at the height of `PLATE_STL`."""
-PLATE_HEIGHT = 0.045
-PLATE_STL = (
-    "solid plate\n"
-    + "".join(
-        "facet normal 0 0 -1\nouter loop\n"
-        + "".join(f"vertex {x} {y} {PLATE_HEIGHT}\n" for x, y in corners)
-        + "endloop\nendfacet\n"
-        for corners in (
-            ((0.001, 0.001), (0.059, 0.001), (0.059, 0.059)),
-            ((0.001, 0.001), (0.059, 0.059), (0.001, 0.059)),
-        )
-    )
-    + "endsolid plate\n"
+CORNERS = ("0.001 0.001", "0.059 0.001", "0.059 0.059", "0.001 0.059")
+FACET = "facet normal 0 0 -1\nouter loop\n{}endloop\nendfacet\n"
+PLATE_STL = "".join(
+    FACET.format("".join(f"vertex {CORNERS[k]} 0.045\n" for k in facet))
+    for facet in ((0, 1, 2), (0, 2, 3))
 )
+PLATE_STL = f"solid plate\n{PLATE_STL}endsolid plate\n"
 PRESSED = """\
 # trackbed: cycle
 fix press all move/mesh mesh plate linear 0. 0. -0.02

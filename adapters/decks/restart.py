@@ -34,17 +34,19 @@ def find_record(restart: bytearray, fix: str, style: str) -> FloatArray:
     return np.frombuffer(restart, "<f8", size // 8, start + 4)
 
 
-def find_mesh(restart: bytearray, fix: str, style: str) -> tuple[FloatArray, FloatArray]:
-    """Heights of a mesh's corners (t, 3) and of its points of reference (2,) [m], as views.
+def find_mesh(restart: bytearray, fix: str, style: str) -> tuple[FloatArray, ...]:
+    """Heights of a mesh's corners (t, 3) and of its points of reference [m], as views.
 
-    Raises `EngineFailed` for no record, or one of a kind that is not known.
+    ``mesh/surface`` has none of these, ``/stress`` two and ``/servo`` four.  Raises `EngineFailed`
+    for no record, or one of a kind that is not known.
     """
     record = find_record(restart, fix, style)
     count, length = (int(x) for x in record[:4:3]) if len(record) > 3 else (0, 0)
     end = 3 + count * length
-    if count < 1 or length < 10 or end + 8 > len(record) or (record[3:end:length] != length).any():
+    if count < 1 or length < 10 or end > len(record) or (record[3:end:length] != length).any():
         raise EngineFailed("the restart file keeps this mesh in a way that trackbed does not know")
-    return record[3:end].reshape(count, length)[:, 3:10:3], record[end + 3 : end + 8 : 4]
+    corners, behind = record[3:end].reshape(count, length), record[end:]
+    return corners[:, 3:10:3], behind[3:8:4], behind[13:18:4]
 
 
 def find_stones(restart: bytearray, fix: str) -> FloatArray:
