@@ -76,7 +76,8 @@ def run_deck(bed: Adopted, text: str, path: Path) -> float:
     # of a scene, an engine's command line takes the launcher alone
     scene = cast(Scene, SimpleNamespace(engine=SimpleNamespace(launcher=bed.launcher)))
     engine = get_engine(bed.engine)
-    engine.version()  # raises where it is not installed, and says how it is
+    if engine.program() is None:
+        engine.version()  # raises, and says how it is installed
     status, cpu_s, _ = run_process(engine.command(scene, path.name), folder, lambda: None, SILENT_S)
     said = (folder / "screen.txt").read_text(errors="replace")
     if status != 0 or COMPLETE.search(said) is None:
