@@ -14,6 +14,7 @@ import numpy as np
 from adapters.bed import FloatArray, IntArray
 from adapters.engines import bound_section
 from adapters.errors import UsageError
+from adapters.files import Frame, Kind, explain_full_disk, write_dump
 from adapters.report.export.fields import (
     Array,
     gather_contacts,
@@ -23,7 +24,6 @@ from adapters.report.export.fields import (
     split_columns,
 )
 from adapters.report.export.instants import ExportedRun, Instant
-from adapters.files import Frame, Kind, explain_full_disk, write_dump
 from trackbed.run_files import replace_file, write_pvd
 
 ENGINE_NAME = {"velocity": "v"}

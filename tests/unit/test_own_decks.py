@@ -1,0 +1,325 @@
+"""Decks of the user's own: read, cut at their marks, and looked at for what a window would miss."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import trackbed
+from adapters.decks.adopt import adopt
+from adapters.decks.detect import find_obstacles
+from adapters.decks.engine import explain_failure, list_inputs, list_output_folders
+from adapters.decks.parse import BEGIN, Deck, join_lines, read_deck
+from adapters.decks.restart import find_mesh, find_record, move_grains, move_stones
+from adapters.decks.scene import load_deck_scene
+from adapters.decks.split import format_window, list_live
+from adapters.errors import EngineFailed, SceneError, UsageError
+from tests import own_decks
+from trackbed import command
+
+
+def write_deck(folder: Path, text: str = own_decks.LIGGGHTS) -> Path:
+    """A deck in a folder, with what it reads."""
+    (folder / "walls.in").write_text(own_decks.WALLS)
+    (folder / "plate.stl").write_text(own_decks.PLATE_STL)
+    path = folder / "in.mybed"
+    path.write_text(text)
+    return path
+
+
+def read_text(folder: Path, text: str) -> Deck:
+    """A deck of this text."""
+    return read_deck(write_deck(folder, text))
+
+
+def cut(before: str, cycle: str = "run 10", after: str = "") -> str:
+    """A marked deck of LAMMPS."""
+    start = f"units si\nregion r block 0 1 0 1 0 1\ncreate_box 1 r\n{before}\n"
+    return f"{start}# trackbed: cycle\n{cycle}\n# trackbed: end\n{after}\n"
+
+
+def test_commands_are_read_as_the_engines_read_them() -> None:
+    """Lines go on after &, a comment ends at the line's end, quotes keep a #."""
+    lines = ["fix a all print 10 &", '  "x # y" # c', "# no &", "# more", "run 5 # &", "  "]
+    found = [(one.short, one.line, one.last) for one in join_lines(lines, "in")]
+    assert found == [('fix a all print 10 "x # y"', 1, 2), ("run 5", 5, 6)]
+    assert next(join_lines(lines, "in")).words[-1] == "x # y"
+
+
+def test_a_deck_is_cut_at_its_marks_with_its_includes(tmp_path: Path) -> None:
+    """Commands above, between and below the marks, those of included files in their place."""
+    deck = read_deck(write_deck(tmp_path))
+    assert [one.name for one in deck.cycle] == ["unfix", "fix", "run"] * 2
+    assert [one.file for one in deck.before].count("walls.in") == 5
+    assert list_inputs(deck) == [Path("walls.in")]
+    assert list_output_folders(deck) == [Path("post")]
+
+
+def test_a_window_repeats_what_the_restart_file_does_not_hold(tmp_path: Path) -> None:
+    """Header, restart file, then live declarations: nothing that made the bed, nothing undone."""
+    deck = read_deck(write_deck(tmp_path))
+    lines = format_window(deck, "liggghts", 3).splitlines()
+    read = lines.index("read_restart cycle_0.restart")
+    live = " ".join(lines[read:])
+    assert ("units si" in lines[:read], "region reg" in live) == (True, True)
+    assert all(f"fix {name} " in live for name in ("m1", "x1", "z1", "integr", "grav"))
+    assert not any(word in live for word in ("create_box", "insert/pack", "run 9000"))
+
+
+def test_a_redefinition_stands_where_others_refer_to_it(tmp_path: Path) -> None:
+    """A region made again keeps its place before the wall on it; a fix made again goes last."""
+    deck = read_text(tmp_path, cut(
+        "region c block 0 1 0 1 0 1\nfix w all wall/gran/region hooke region c\nfix g all gravity 1"
+        "\nregion c delete\nregion c block 0 2 0 2 0 2\nunfix g\nfix i all nve\nfix g all gravity 2"
+        "\nvariable n index 5\nvariable n index 7\nfix_modify gone energy yes\nunfix gone"
+    ))  # fmt: skip
+    live = [one.text for one in list_live(deck.before)]
+    assert live[1:] == [
+        "region r block 0 1 0 1 0 1", "region c block 0 2 0 2 0 2",
+        "fix w all wall/gran/region hooke region c", "fix i all nve", "fix g all gravity 2",
+        "variable n index 5",
+    ]  # fmt: skip
+
+
+OBSTACLES = {
+    "insertion": ("liggghts", cut("fix ins all insert/pack seed 1 insert_every once"),
+                  "added", "fix ins still inserts grains"),
+    "pour": ("lammps", cut("fix p all pour 100 1 4 region r"), "added", "still inserts"),
+    "left fix": ("liggghts", cut("", "fix m all move/mesh mesh a\nrun 5"), "added", "unfix m"),
+    "taken fix": ("liggghts", cut("fix m all nve", "unfix m\nrun 5"), "stops", "fix m all nve"),
+    "left region": ("lammps", cut("", "region q plane 0 0 0 0 0 1\nrun 5"),
+                    "added", "region q delete"),
+    "upto": ("liggghts", cut("run 40\nrun 60", "run 300 upto"), "stops", "-> run 200"),
+    "no run": ("liggghts", cut("", "fix m all nve\nunfix m"), "stops", "nothing is run"),
+    "another bed": ("lammps", cut("", "clear\nrun 5"), "stops", "begins another bed"),
+    "frozen step": ("lammps", cut("variable a equal step*2\nvariable b equal ${a}+v_a\n"
+                                  "fix m all gravity ${b}"), "stops", "comes of step"),
+    "frozen compute": ("lammps", cut("variable a equal c_1[1]\nfix m all gravity ${a}"),
+                       "stops", "comes of c_1"),
+    "elapsed": ("lammps", cut("variable t equal 2*PI*elapsed/100"), "note", "start of each run"),
+    "wiggle": ("lammps", cut("fix w all wall/gran hooke zplane 0 NULL wiggle z 1 2"),
+               "stops", "first phase"),
+    "mesh wiggle": ("liggghts", cut("fix w all move/mesh mesh a wiggle period 1"),
+                    "note", "8e-7 m"),
+    "mesh force": ("liggghts", cut("fix a all mesh/surface/stress file a.stl\n"
+                                   "variable v equal f_a[3]/2"), "note", "doubled"),
+    "servo": ("liggghts", cut("fix p all mesh/surface/stress/servo file a.stl"),
+              "note", "starts again"),
+    "rigid": ("lammps", cut("fix i all rigid/small molecule"), "stops", "holds grains together"),
+    "stones of a group": ("liggghts", cut("fix i some multisphere"),
+                          "stops", "-> fix i all multisphere"),
+    "missing region": ("lammps", cut("region c plane 0 0 0 0 0 1\n"
+                                     "fix w all wall/gran/region hooke region c\nregion c delete"),
+                       "stops", "needs the region c"),
+    "include in if": ("liggghts", cut('if "1 > 0" then "include a.in"'), "stops", "refuses"),
+    "fix in if": ("lammps", cut('if "1 > 0" then "fix a all nve"'), "stops", "without if"),
+    "leaving": ("lammps", cut("label out", "run 5\nnext c\njump SELF out"),
+                "stops", "leaves the cycle"),
+    "another file": ("lammps", cut("jump in.other here"), "stops", "another file"),
+    "outer loop": ("lammps", cut("variable c loop 9\nlabel out", after="next c\njump SELF out"),
+                   "note", "is left out"),
+    "absolute": ("lammps", cut("dump d all custom 10 /tmp/d.txt id"), "note", "/tmp/d.txt"),
+    "lost": ("lammps", cut("thermo_modify lost ignore"), "note", "vanish"),
+    "units": ("lammps", cut("").replace("units si", "units lj"), "note", "units lj, no metres"),
+    "dynamic": ("lammps", cut("group g dynamic all var v"), "note", "group g keeps"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", OBSTACLES)
+def test_what_a_window_would_miss_is_said(name: str, tmp_path: Path) -> None:
+    """Each of the things that were measured, once, of its kind, with the line to add."""
+    engine, text, kind, said = OBSTACLES[name]
+    found = find_obstacles(read_text(tmp_path, text), engine)
+    assert {one.kind for one in found if said in str(one)} == {kind}, found
+
+
+@pytest.mark.parametrize(("engine", "text"), [("liggghts", own_decks.LIGGGHTS),
+                                              ("lammps", own_decks.LAMMPS)])  # fmt: skip
+def test_a_sound_deck_has_no_obstacle(engine: str, text: str, tmp_path: Path) -> None:
+    """What is said of obstacles is said of nothing else."""
+    assert find_obstacles(read_text(tmp_path, text), engine) == []
+
+
+@pytest.mark.parametrize(("text", "said"), [
+    ("# trackbed: end\nrun 5\n# trackbed: cycle", "'end' in line 1"),
+    ("# trackbed: cycle\nrun 5", "not one pair"),
+    ("include none.in\nrun 5", "does not exist"),
+    ("include ${a}.in\nrun 5", "variable in its name"),
+    ("include in.mybed\nrun 5", "includes itself"),
+    ("include marked.in\nrun 5", "has a mark"),
+    ("units si", "nothing is run"),
+    ("run\0 5", "it is no text"),
+])  # fmt: skip
+def test_decks_that_can_not_be_cut_are_refused(text: str, said: str, tmp_path: Path) -> None:
+    """With the place and what to do; nothing is written."""
+    (tmp_path / "marked.in").write_text(f"{BEGIN}\n")
+    path = write_deck(tmp_path, text)
+    with pytest.raises(UsageError, match=said):
+        adopt(path, "liggghts")
+    assert not (tmp_path / "mybed").exists()
+
+
+def test_adopting_leaves_the_deck_as_it_was(tmp_path: Path) -> None:
+    """The copy has marks and lines that were missing, in any encoding; twice is once."""
+    text = own_decks.LIGGGHTS.replace("unfix ins\n", "").replace("# a bed", "# B\xf6schung")
+    text = "\n".join(line for line in text.split("\n") if "trackbed:" not in line)
+    path = write_deck(tmp_path)
+    path.write_bytes(text.encode("latin-1"))
+    adoption = adopt(path, "liggghts")
+    assert path.read_bytes() == text.encode("latin-1")
+    copy = (tmp_path / "mybed" / "in.mybed").read_bytes().decode("latin-1").splitlines()
+    added = [line for line in copy if line not in text.splitlines()]
+    assert added == ["unfix ins", "# trackbed: cycle", "# trackbed: end"]
+    assert copy[-4:] == ["unfix ins", "# trackbed: cycle", "run 400", "# trackbed: end"]
+    assert (tmp_path / "mybed" / "walls.in").read_text() == own_decks.WALLS
+    assert not adoption.stops
+    assert adopt(path, "liggghts").findings == adoption.findings
+    assert adopt(tmp_path / "mybed" / "in.mybed", "liggghts").findings == ()
+    (tmp_path / "mybed" / "in.mybed").write_text("run 5\n")
+    with pytest.raises(UsageError, match="is there already and is kept"):
+        adopt(path, "liggghts")
+
+
+def test_the_loaded_body_is_the_mesh_that_moves(tmp_path: Path) -> None:
+    """And the scene that is written is one that can be read."""
+    plated = own_decks.LIGGGHTS.partition(BEGIN)[0] + own_decks.PLATE + own_decks.PRESSED
+    adoption = adopt(write_deck(tmp_path, plated), "liggghts")
+    assert adoption.contents.moved == {"plate": "fix press, inside the cycle"}
+    scene, bed = load_deck_scene(tmp_path / "mybed" / "scene.toml", ["procedure.total_cycles=90"])
+    assert bed.loaded == ("plate", "mesh/surface/stress")
+    assert (scene.deck.loaded_body, scene.procedure.total_cycles) == ("plate", 90)
+    assert (tmp_path / "mybed" / "plate.stl").exists()
+
+
+@pytest.mark.parametrize(("override", "said"), [
+    ("deck.engine=yade", "must be 'liggghts' or 'lammps'"),
+    ("procedure.tolerance=0.02", "jumps that choose themselves"),
+    ("procedure.k_i=300", "must exceed k_i"),
+    ("procedure.members=3", "without members"),
+    ("deck.body=a", "unknown key"),
+    ("deck.loaded_body=a", "its meshes are: none"),
+    ("deck.file=walls.in", "no load cycle is marked"),
+])  # fmt: skip
+def test_scenes_of_decks_are_checked(override: str, said: str, tmp_path: Path) -> None:
+    """Each fault by its key."""
+    adopt(write_deck(tmp_path), "liggghts")
+    with pytest.raises(SceneError, match=said):
+        load_deck_scene(tmp_path / "mybed" / "scene.toml", [override])
+
+
+def test_what_runs_of_decks_do_not_do_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A sentence and a way on, before anything is run."""
+    scene = adopt(write_deck(tmp_path), "liggghts").scene
+    for words, said in ((["--dry-run"], "--check runs two"), (["--members", "3"], "members")):
+        assert command.main(["run", str(scene), *words]) in (2, 3)
+        assert said in capsys.readouterr().err
+    assert not (scene.parent / "run").exists()
+
+
+def test_the_command_says_what_stops(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Exit code 3, the line to change and the command to go on with."""
+    path = write_deck(tmp_path, own_decks.LIGGGHTS.replace("run 400\n#", "run 9801 upto\n#"))
+    assert command.main(["adopt", str(path), "--engine", "liggghts"]) == 3
+    said = capsys.readouterr()
+    assert "in.mybed, line 39: 'run 9801 upto'" in said.err
+    assert f"trackbed adopt {tmp_path / 'mybed' / 'in.mybed'} --engine liggghts" in said.err
+    assert "loaded body: none known" in said.out
+
+
+def test_an_engine_that_failed_is_quoted() -> None:
+    """Its error line, and what it means in a deck where that is known."""
+    text = "Setting up\nERROR on proc 0: Attempt to remove non-existent Atom::grow() callback\n"
+    error = explain_failure(1, text, Path("window.in"))
+    assert ("non-existent" in error.what, "region is missing" in error.remedy) == (True, True)
+
+
+def test_a_jump_follows_the_law_of_the_states() -> None:
+    """u = a ln N of every grain, and the same a: the logarithm's increment to round-off."""
+    start = np.random.default_rng(1).uniform(0, 1, (50, 3))
+    rate = np.array([0.0, 0.0, -1e-3])
+    settled = np.log(np.arange(1.0, 11.0))[:, None, None] * rate
+    states = np.concatenate([start[None], start + settled])  # before any load, and N = 1 to 10
+    after = trackbed.jump(states, 90, 0.02, law="log", move="per-grain")
+    assert np.allclose(after, states[-1] + np.log(10) * rate, rtol=0, atol=1e-15)
+    smoothed = trackbed.jump(states, 90, np.full(50, 0.02))
+    assert smoothed[:, 2].mean() - states[-1, :, 2].mean() == pytest.approx(np.log(10) * -1e-3)
+    assert np.array_equal(trackbed.jump(states, 0, 0.02, move="still"), states[-1])
+
+
+@pytest.mark.parametrize(("states", "radius", "said"), [
+    (np.zeros((3, 4)), 1.0, r"no \(cycles"),
+    (np.zeros((3, 4, 3)), np.ones(5), "are not those of 4"),
+    (np.zeros((3, 4, 3)), -1.0, "above 0"),
+    (np.full((3, 4, 3), np.nan), 1.0, "not finite"),
+    (np.zeros((1, 4, 3)), 1.0, "determine"),
+])  # fmt: skip
+def test_a_jump_refuses_what_are_no_states(states: object, radius: object, said: str) -> None:
+    """Each with a sentence."""
+    with pytest.raises(UsageError, match=said):
+        trackbed.jump(states, 5, radius, law="log")
+
+
+def pack(fix: str, style: str, record: list[float]) -> bytearray:
+    """A restart file with one record, as LIGGGHTS writes it, and other bytes about it."""
+    key = b"".join(np.int32(len(s) + 1).tobytes() + s.encode() + b"\0" for s in (fix, style))
+    return bytearray(b"head" + key + np.int32(8 * len(record)).tobytes()
+                     + np.array(record).tobytes() + b"tail")  # fmt: skip
+
+
+def test_meshes_and_stones_are_moved_in_their_records() -> None:
+    """z of corners and reference points by the rise, all else as it was; bodies by a shift."""
+    triangles = [13.0, *range(9), 0.5, 0.5, 0.5] * 2
+    restart = pack("m", "mesh/surface", [2, 0, 0, *triangles, *([7.0] * 22)])
+    before = find_record(restart, "m", "mesh/surface").copy()
+    for heights in find_mesh(restart, "m", "mesh/surface"):
+        heights -= 0.25
+    moved = find_record(restart, "m", "mesh/surface") - before
+    assert np.flatnonzero(moved).tolist() == [6, 9, 12, 19, 22, 25, 32, 36, 42, 46]
+    assert set(moved[np.flatnonzero(moved)]) == {-0.25}
+    stones = np.arange(2 * 55.0).reshape(2, 55)
+    stones[:, 4] = [7, 3]
+    restart = pack("i", "multisphere", [2, *stones.ravel()])
+    move_stones(restart, "i", np.array([3, 7]), np.array([[1.0, 2, 3], [4, 5, 6]]))
+    found = find_record(restart, "i", "multisphere")[1:].reshape(2, 55)
+    for place in (slice(1, 4), slice(5, 8)):
+        assert np.array_equal(found[:, place] - stones[:, place], [[4, 5, 6], [1, 2, 3]])
+    assert not found[:, 8:17].any()
+    assert np.array_equal(found[:, 17:], stones[:, 17:])
+
+
+@pytest.mark.parametrize("restart", [
+    bytearray(b""), pack("m", "mesh", [2, 0, 0, 13])[:-12], pack("m", "mesh", [2, 0, 0, 13.0, 1]),
+])  # fmt: skip
+def test_damaged_restart_files_are_refused(restart: bytearray) -> None:
+    """No record, one that is cut, one of another layout."""
+    with pytest.raises(EngineFailed, match="restart file"):
+        find_mesh(restart, "m", "mesh")
+
+
+def pack_spheres(place: np.ndarray, velocity: np.ndarray, tag: type, offset: int) -> bytearray:
+    """A restart file of spheres 1, 2, ... as an engine writes them, identifiers as ``tag``."""
+    rows = b""
+    for number, (x, v) in enumerate(zip(place, velocity, strict=True), 1):
+        inside = (
+            np.array([number], tag).tobytes() + np.array([1.0, 1, 512, *v, 0.01, 5e-3]).tobytes()
+        )
+        rows += x.tobytes() + inside
+    return bytearray(b"x" * offset + rows + bytes(16))
+
+
+@pytest.mark.parametrize("offset", [0, 3, 8])
+@pytest.mark.parametrize("tag", [np.float64, np.int64])
+def test_spheres_are_moved_in_the_restart_file(offset: int, tag: type) -> None:
+    """Each by its own shift, wherever it stands and though two share a height; all come to rest."""
+    place = np.array([[0.1, 0.2, 0.3], [0.1, 0.5, 0.3], [0.4, 0.5, 0.6]])
+    velocity = np.array([[1.0, 2, 3], [4, 5, 6], [7, 8, 9]])
+    shift = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1]])
+    restart = pack_spheres(place, velocity, tag, offset)
+    move_grains(restart, np.array([1, 2, 3]), place, velocity, shift)
+    assert restart == pack_spheres(place + shift, 0 * velocity, tag, offset)
+    with pytest.raises(EngineFailed, match="keeps grains in a way"):
+        move_grains(restart, np.array([1, 2, 3]), place, velocity, shift)
