@@ -10,7 +10,7 @@ from adapters.decks.check import check_cut
 from adapters.decks.engine import Adopted
 from adapters.decks.parse import BEGIN, read_deck
 from tests import own_decks
-from tests.unit.test_decks import write_deck
+from tests.unit.test_own_decks import write_deck
 from trackbed import command
 
 PLATED = own_decks.LIGGGHTS.partition(BEGIN)[0] + own_decks.PLATE + own_decks.PRESSED

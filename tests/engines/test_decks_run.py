@@ -18,7 +18,7 @@ from adapters.decks.states import States, load_states, read_states
 from adapters.errors import SceneError
 from adapters.files import RunFolder, read_frames
 from tests import own_decks
-from tests.unit.test_decks import write_deck
+from tests.unit.test_own_decks import write_deck
 from trackbed import command
 
 HEAD = own_decks.LIGGGHTS.partition(BEGIN)[0]
