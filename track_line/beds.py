@@ -10,14 +10,18 @@ import numpy as np
 from pydantic import Field
 from scipy.signal import lfilter
 
-from track_line.arrays import Floats
-from trackbed.scene_files import NonNegative, Positive, Real, Table
+from track_line.arrays import Bools, Floats
+from trackbed.scene_files import NonNegative, Real, Table
 
 Variation = Annotated[Real, Field(ge=0, le=3)]
 STEPS_A_MEMORY = 8
 """Renewals of the scatter in the settlement that it takes to be forgotten by a factor e."""
 STIFFNESS, SETTLEMENT, LEVEL, RENEWAL = range(4)
 """Streams of random numbers of a scene's seed."""
+
+
+EDGE = 1e-6
+"""From the end of a zone a sleeper still stands at it [m]: places are multiples of the spacing."""
 
 
 class Scatter(Table):
@@ -45,13 +49,17 @@ class Zone(Table):
 
     begin: Real
     end: Real
-    """[m]"""
-    stiffness: Positive = 1.0
+    """[m]; a zone that reaches an end of the line goes on through its margin."""
+    stiffness: Annotated[Real, Field(ge=1e-3, le=1e3)] = 1.0
     """By which the beds' stiffness is multiplied [-]."""
     settlement: NonNegative = 1.0
     """By which their settlement is multiplied [-]."""
     void: Annotated[Real, Field(ge=0, le=0.1)] = 0.0
     """How much deeper they lie at first [m]."""
+
+    def find_inside(self, place: Floats) -> Bools:
+        """Which of the beds at ``place`` (n,) [m] it has, those at its ends counted."""
+        return np.asarray((place >= self.begin - EDGE) & (place <= self.end + EDGE))
 
 
 @dataclass(frozen=True)
@@ -124,7 +132,7 @@ def draw_beds(
     bed = stiffness * spread_around_one(alike, scatter.stiffness)
     scale = np.ones(len(place))
     for zone in zones:
-        inside = ((place >= zone.begin) & (place <= zone.end)).astype(float)
+        inside = zone.find_inside(place).astype(float)
         bed *= 1 + (zone.stiffness - 1) * inside
         scale *= 1 + (zone.settlement - 1) * inside
         level += zone.void * inside

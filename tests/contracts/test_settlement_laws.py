@@ -57,6 +57,21 @@ def test_what_it_adds_is_the_integral_of_its_rate(name: str) -> None:
 
 
 @every_law
+def test_kinds_of_axles_add_their_rates(name: str) -> None:
+    """``advance_mixed`` solves ds/dN = sum of share_i rate(F_i, s, N); another integrator, too."""
+    law, shares = make(name), np.array([0.01, 0.99])
+    force = np.stack([2 * FORCE[2:], 0.7 * FORCE[2:]])
+    load, begin = BedLoad(force, LOAD.bed[2:]), np.full(3, 2e-3)
+
+    def slope(cycle: float, settled: np.ndarray) -> np.ndarray:
+        return shares @ np.array([law.rate(BedLoad(f, load.bed), settled, cycle) for f in force])
+
+    found = solve_ivp(slope, (50.0, 5e4), begin, method="LSODA", rtol=1e-10, atol=1e-16)
+    grown = law.advance_mixed(load, shares, begin, 50.0, 5e4 - 50.0)
+    assert begin + grown == pytest.approx(found.y[:, -1], rel=1e-6)
+
+
+@every_law
 @pytest.mark.parametrize(("cycle", "first", "second"), [(0.0, 3.0, 9e4), (1e5, 1e-3, 1e6)])
 def test_two_spans_are_one(name: str, cycle: float, first: float, second: float) -> None:
     """Axles in two lots settle a bed as those in one do, from the first axle on."""

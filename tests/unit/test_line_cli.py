@@ -9,7 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from track_line.scene import run
+from track_line.scene import load_scene, run
+from track_line.scene.file import build_line
+from track_line.settling import march_line, start_line
 from trackbed.command import main
 from trackbed.scenes import read_template
 
@@ -38,6 +40,22 @@ def test_a_run_leaves_table_page_and_sentence(words, capsys):
     assert answer["d1_low_m"] <= answer["d1_median_m"] <= answer["d1_high_m"]
     assert answer["error_of_blocks"] < 0.02
     assert answer["sentence"] in (folder / "report.html").read_text()
+
+
+def test_a_summary_is_of_the_last_record(words):
+    """Band, tonnage, voids, and the error: twice the difference to half the blocks over that."""
+    file = load_scene(words[1], [*SMALL, "scatter.settlement=0.4", "zone=[{begin=30.0, end=33.0, "
+                                 "void=2e-3}]"])  # fmt: skip
+    line = build_line(file)
+    last, finer = ([one for _, one in march_line(line, start_line(line), 1e4, finer=f)][-1]
+                   for f in (1.0, 2.0))  # fmt: skip
+    found = run.summarise_run(file, [one for _, one in march_line(line, start_line(line), 1e4)])
+    band = [found[f"d1_{name}_m"] for name in ("low", "median", "high")]
+    assert band == pytest.approx(np.quantile(last.deviation, (0.05, 0.5, 0.95)), rel=1e-12)
+    assert found["tonnage_mgt"] == pytest.approx(1e4 * 200e3 / 9.81 / 1e9)
+    assert found["hanging_over_0.1_mm"] == last.voids[0].mean() > found["hanging_over_1_mm"]
+    coarse, fine = (np.sqrt((one.deviation**2).mean()) for one in (last, finer))
+    assert found["error_of_blocks"] == pytest.approx(2 * abs(coarse - fine) / fine, rel=1e-9)
 
 
 @pytest.mark.long
@@ -78,6 +96,8 @@ def test_a_run_goes_on_to_the_same_bits(damage, words, capsys, monkeypatch):
         ("track.spacing=3.0", "must be at most 1.2, not 3.0"),
         ("scatter.together=-2.0", "must be at least -1, not -2.0"),
         ("line.length=1e9", "must be at most 20000"),
+        ("zone=[{begin=10.0, end=10.1}]", "no sleeper lies from 10 to 10.1 m"),
+        ("track={rail_mass=0.0, sleeper_mass=0.0}", "without weight lie on no bed"),
     ],
 )
 def test_a_scene_that_makes_no_line_is_refused(words, override, said, capsys):
@@ -97,6 +117,7 @@ def test_a_dry_run_says_what_the_law_is_good_for(words, capsys):
     [
         ((31.0, 38.0, 47.0), "D1 reaches the limit of 1.5 mm at 38 MGT (31 ... 47)."),
         ((31.0, 38.0, None), "D1 reaches the limit of 1.5 mm at 38 MGT (31 ... later than"),
+        ((0.0, 0.0, 0.0), "D1 is above the limit of 1.5 mm before the first axle."),
         ((31.0, None, None), "D1 is 1.1 mm (1 ... 1.2) at 50 MGT; 12 % of the sections reach the"),
         ((None, None, None), "D1 is 1.1 mm (1 ... 1.2) at 50 MGT and stays below the limit of"),
     ],

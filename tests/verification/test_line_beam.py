@@ -17,7 +17,6 @@ from track_line.beam import (
     rest_wheels,
     roll_axle,
 )
-from track_line.beam.contact import COMB
 from track_line.beam.kernel import choose_bearing
 from trackbed.errors import NotConverged
 
@@ -213,7 +212,7 @@ def test_an_axle_that_rolls_is_each_of_its_places() -> None:
         alone = rest(TRACK, settled, point_load(121, i), bed)
         assert passage.force[0, i] == pytest.approx(alone.force[0, i], abs=1e-5 * WHEEL)
         assert passage.level[0, i] == pytest.approx(alone.rail[0, i], abs=1e-7)
-    assert passage.bears.shape == (1, COMB.period, 121)
+    assert passage.bears.shape == (1, support.period, 121)
     moved = roll_axle(rail, support, settled[None] * 1.5, WHEEL)
     warm = roll_axle(rail, support, settled[None] * 1.5, WHEEL, passage.bears)
     np.testing.assert_allclose(warm.force, moved.force, rtol=0, atol=1e-9 * WHEEL)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,10 +13,11 @@ from scipy.signal import butter, sosfreqz
 from track_line.beam import Track, roll_axle
 from track_line.beds import Scatter, Zone, draw_normal, renew_scores
 from track_line.laws import BedLoad, get_law
-from track_line.settling import Axle, Line, find_crossings, make_line
+from track_line.settling import Axle, Line, find_alert_limit, find_crossings, make_line
 from track_line.settling.blocks import measure_gain
 from track_line.settling.level import measure_deviations, smooth_level
 from track_line.settling.march import march_line, start_line
+from trackbed.errors import NotConverged
 
 TRACK, BED = Track(), 28e6
 SERIES = TRACK.pad * BED / (TRACK.pad + BED)
@@ -63,6 +65,27 @@ def test_rose_example() -> None:
     load = BedLoad(np.array([41.6607e3]), np.array([BED]))
     assert law.advance(load, np.zeros(1), 0.0, 1.0)[0] == pytest.approx(0.120841e-3, rel=1e-5)
     assert law.advance(load, np.zeros(1), 0.0, 12288)[0] == pytest.approx(3.053204e-3, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("name", "keys", "force", "cycles", "settled"),
+    [
+        ("power", {}, 68e3, 1e5, 0.7e-3 * 2**1.6 * 10),
+        ("shenton", {}, 34e3, 1e6, 1.1 * (0.69e-3 * 10**1.2 + 2.7e-3)),
+        ("shenton", {"lift": 0.02}, 17e3, 1e6, 0.55 * ((0.69e-3 + 0.56e-3) * 10**1.2 + 2.7e-3)),
+        ("sato", {}, 29.9e3, 1e6, 1e-3 * (1 - np.exp(-10)) + 1e-19 * 50e3**2 * 1e6),
+        ("guerin", {}, 42e3, 1e4, 1.44e-9 * 1.5**2.51 * 1e4),
+        ("li-selig", {}, 81.25e3, 1e6, 2 * 0.012 * 0.5**2.4 * 10**1.08),
+    ],
+)
+def test_laws_by_hand(
+    name: str, keys: dict[str, float], force: float, cycles: float, settled: float
+) -> None:
+    """The formulas of the sources at round numbers: F = 2 F0, p - p0 = 50 kPa, F/k_b = 1.5 mm,
+    sigma_d = sigma_s/2; with the lift of 20 mm half of the force."""
+    load = BedLoad(np.array([force]), np.array([28e6]))
+    found = get_law(name)(**keys).advance(load, np.zeros(1), 0.0, cycles)
+    assert found[0] == pytest.approx(settled, rel=1e-9)
 
 
 def find_seat_forces(line: Line, state: Any) -> np.ndarray:
@@ -145,6 +168,8 @@ def test_gain_is_the_closed_form() -> None:
     grown = line.law.advance(BedLoad(force, line.support.bed), 0 * force, 10.0, 1e4)
     gain = measure_gain(line, force[None], 0 * force, np.ones_like(force), 10.0, 1e4)
     np.testing.assert_allclose(gain, (2.4 * grown / force * SERIES).ravel(), rtol=2e-4)
+    twice = measure_gain(line, force[None], 0 * force, np.full_like(force, 2.0), 10.0, 1e4)
+    np.testing.assert_allclose(twice, 2 * gain, rtol=1e-12)
 
 
 def predict_deviation(line: Line, settlement: float, variation: float) -> float:
@@ -179,6 +204,52 @@ def test_kinds_of_axles_share_the_settlement() -> None:
     whole = march(build("guerin"), 5e4)[-1][1].settlement[0]
     assert half == pytest.approx(whole, rel=1e-3)
     assert line.find_tonnage(np.array(2e6)) == pytest.approx(100.0005e3 * 2e6 / 9.81 / 1e9)
+
+
+def test_rare_heavy_axles_settle_a_bed_that_hardens_by_strain() -> None:
+    """One axle in a hundred of 225 kN among those of 100 kN: u^(1/b) is the mean of theirs, on a
+    level line whatever the blocks are."""
+    some = Axle(load=225e3, share=0.01), Axle(load=100e3, share=0.99)
+    line = build("power", axles=some)
+    state, record = march(line, 1e6)[-1]
+    law, forces = line.law, [find_wheel_force(line, state, one.wheel) for one in some]
+    alone = [law.advance(BedLoad(f, np.full(1, BED)), np.zeros(1), 0.0, 1e6)[0] for f in forces]
+    expected = (0.01 * alone[0] ** 5 + 0.99 * alone[1] ** 5) ** 0.2
+    assert record.settlement[0] == pytest.approx(expected, rel=1e-5)
+
+
+def find_wheel_force(line: Line, state: Any, wheel: float) -> np.ndarray:
+    """Peak force of a bed far from the ends [N], (1,)."""
+    passage = roll_axle(line.rail, line.support, state.settled, wheel)
+    return passage.force[0, [line.beds.place.size // 2]]
+
+
+def test_zones_reach_their_ends_and_those_of_the_line() -> None:
+    """Sleepers at an end of a zone are in it, whatever their place is rounded to; a zone that
+    begins where the line does holds the margin too, so that no step is made there."""
+    for k in range(1, 101):
+        line = build(length=120.0, zones=(Zone(begin=0.6 * k, end=0.6 * (k + 1), void=1e-3),))
+        assert (line.beds.level > 0).sum() == 2
+    still = build(length=60.0, zones=(Zone(begin=0.0, end=60.0, settlement=0.0),))
+    assert march(still, 1e5)[-1][1].deviation.max() < 1e-7  # m: the free ends
+
+
+@pytest.mark.parametrize(("spacing", "bed"), [(0.2, 5e6), (0.6, 1e5), (1.2, 28e6)])
+def test_wheels_of_the_comb_are_out_of_reach(spacing: float, bed: float) -> None:
+    """On soft beds and narrow sleepers too: forces are those of wheels twice as far apart, 1e-5."""
+    track = Track(bed=bed, spacing=spacing)
+    line = make_line(150.0, track, get_law("shenton")(), ONE_KIND, EVEN)
+    near, far = (
+        roll_axle(line.rail, replace(line.support, period=n * line.support.period),
+                  line.beds.level, 100e3).force[:, line.inside]
+        for n in (1, 2)
+    )  # fmt: skip
+    np.testing.assert_allclose(near, far, rtol=1e-5)
+
+
+def test_settlement_beyond_all_sense_ends_a_run() -> None:
+    with pytest.raises(NotConverged, match=r"a bed has settled by .* m, which no line does"):
+        march(make_line(60.0, TRACK, get_law("shenton")(quality=1e6), ONE_KIND, EVEN), 1e6)
 
 
 # --- scatter ---------------------------------------------------------------------------------
@@ -257,3 +328,17 @@ def test_crossing_is_where_the_curve_first_meets_the_limit() -> None:
     tonnage = np.array([0.0, 10.0, 20.0, 30.0])
     curves = np.array([[0, 0, 3], [1, 0.5, 3], [3, 1, 3], [2, 1.5, 3.0]])
     assert find_crossings(tonnage, curves, 2.0).tolist() == [15.0, np.inf, 0.0]
+    assert find_crossings(tonnage, curves, 2.5).tolist() == [17.5, np.inf, 0.0]
+
+
+def test_alert_limits_are_by_kilometres_an_hour() -> None:
+    assert [find_alert_limit(v / 3.6) for v in (60, 140, 400)] == [2.3e-3, 1.4e-3, 1.0e-3]
+
+
+def test_unevenness_is_there_before_the_first_axle_and_no_settlement() -> None:
+    line = build(scatter=Scatter(stiffness=0.0, settlement=0.0, unevenness=1e-3), lines=50)
+    assert line.beds.level.std() == pytest.approx(1e-3, rel=0.03)
+    first, last = (march(line, 1e3)[k][1] for k in (0, -1))
+    assert (first.settlement == 0).all()
+    even = march(build(), 1e3)[-1][1].settlement[0]
+    assert last.settlement.mean() == pytest.approx(even, rel=0.05)

@@ -10,6 +10,8 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
 from track_line.arrays import Floats
 
 
@@ -42,3 +44,13 @@ class Law(ABC):
     @abstractmethod
     def advance(self, load: BedLoad, settled: Floats, cycle: float, cycles: float) -> Floats:
         """The integral of `rate` over ``cycles`` further axles at constant load [m]."""
+
+    def advance_mixed(
+        self, load: BedLoad, shares: Floats, settled: Floats, cycle: float, cycles: float
+    ) -> Floats:
+        """`advance` under axles of several kinds in turn, ``load.force`` (kinds, ...) of ``shares``
+        (kinds,) that add up to one.
+
+        The mean of the kinds, which is exact where the rate does not depend on the settlement.
+        """
+        return np.asarray(np.tensordot(shares, self.advance(load, settled, cycle, cycles), 1))

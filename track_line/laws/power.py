@@ -43,7 +43,21 @@ class Power(Law):
         return np.asarray(self.b * first ** (1 / self.b) * settled ** (1 - 1 / self.b))
 
     def advance(self, load: BedLoad, settled: Floats, cycle: float, cycles: float) -> Floats:
+        return self._grow(self._first(load), settled, cycles)
+
+    def advance_mixed(
+        self, load: BedLoad, shares: Floats, settled: Floats, cycle: float, cycles: float
+    ) -> Floats:
+        """As one kind of axle with u^(1/b) = sum of share u_i^(1/b): hardening by strain adds the
+        rates at one settlement."""
         first = self._first(load)
+        greatest = first.max(axis=0)
+        ratio = first / np.where(greatest > 0, greatest, 1.0)
+        mean = np.tensordot(shares, ratio ** (1 / self.b), 1) ** self.b
+        return self._grow(greatest * mean, settled, cycles)
+
+    def _grow(self, first: Floats, settled: Floats, cycles: float) -> Floats:
+        """Settlement by further axles, of which the ``first`` ever would settle u [m]."""
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             further = cycles * (first / settled) ** (1 / self.b)  # over the axles that it had
             grown = settled * np.expm1(self.b * np.log1p(further))

@@ -33,7 +33,10 @@ class Shenton(Law):
 
     formula = "s = K F/F0 ((0.69 mm + 0.028 L) N^0.2 + 2.7e-6 mm N)"
     source = "Shenton 1985 (Track Technology), as quoted in reviews; read there from memory"
-    validity = "British main lines up to some 1e7 axles; mixed axles by their fifth-power mean"
+    validity = (
+        "British main lines up to some 1e7 axles; Shenton takes mixed axles by their fifth-power "
+        "mean, here each counts by its own force"
+    )
 
     def rate(self, load: BedLoad, settled: Floats, cycle: float) -> Floats:
         seating = self.b * (self.seating + 0.028 * self.lift) * cycle ** (self.b - 1)

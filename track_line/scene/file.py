@@ -33,7 +33,7 @@ BYTES_A_BED = 250
 
 LEFT_OUT = (
     "dynamic wheel loads: an uneven line is loaded as a level one is, but for its voids",
-    "axles less than 14 m apart: each rolls by alone",
+    "axles near one another: each rolls by alone",
     "the other rail: no cant, no twist, no lateral forces",
     "unevenness of the rail itself, of welds and joints",
     "what tamping leaves behind: the memory of old voids, broken stones",
@@ -88,12 +88,17 @@ def find_faults(tables: SceneTables) -> Iterator[Problem]:
         yield Problem(f"law.parameters.{name}", f"unknown parameter{suggest_word(name, known)}")
     if not strange and not is_sound(tables):
         yield Problem("law.parameters", f"the law {law.name} finds no settlement with these")
+    if tables.track.rail_mass == 0 and tables.track.sleeper_mass == 0:
+        yield Problem("track", "a rail and sleepers without weight lie on no bed: give one a mass")
+    place = np.arange(tables.line.length / tables.track.spacing + 1) * tables.track.spacing
     for i, zone in enumerate(tables.zone):
         if not 0 <= zone.begin <= zone.end <= tables.line.length:
             yield Problem(
                 f"zone.{i}", f"from {zone.begin:g} to {zone.end:g} m is no part of the line, "
                 f"which goes from 0 to {tables.line.length:g} m",
             )  # fmt: skip
+        elif not zone.find_inside(place).any():
+            yield Problem(f"zone.{i}", f"no sleeper lies from {zone.begin:g} to {zone.end:g} m")
 
 
 def is_sound(tables: SceneTables) -> bool:

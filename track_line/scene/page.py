@@ -33,8 +33,9 @@ COLUMNS = (
     "hanging_over_0.1_mm", "hanging_over_1_mm",
 )  # fmt: skip
 CAPTION = (
-    "Standard deviation of D1 (3 to 25 m, EN 13848) of the loaded line in sections of about 200 m: "
-    "median, and the band of nine sections in ten, over all realisations; the line is the limit."
+    "Standard deviation of D1 (3 to 25 m, EN 13848) of the loaded line in sections of about 200 m "
+    "(a shorter line is one): median, and the band of nine sections in ten, over all realisations; "
+    "the line is the limit."
 )
 
 

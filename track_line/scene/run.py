@@ -156,11 +156,13 @@ def describe_when(summary: dict[str, Any]) -> str:
         (summary[f"tamping_{name}_mgt"], 1e3 * summary[f"d1_{name}_m"])
         for name in ("low", "median", "high")
     )
+    if median == 0:
+        return f"D1 is above the {limit} before the first axle."
     if median is not None:
         latest = "later than the run" if high is None else f"{high:.3g}"
         return f"D1 reaches the {limit} at {median:.3g} MGT ({low:.3g} ... {latest})."
     found = (
-        f"D1 is {middle:.3g} mm ({least:.2g} ... {most:.3g}) at {summary['tonnage_mgt']:.3g} MGT"
+        f"D1 is {middle:.3g} mm ({least:.3g} ... {most:.3g}) at {summary['tonnage_mgt']:.3g} MGT"
     )
     if low is None:
         return f"{found} and stays below the {limit}."

@@ -52,13 +52,12 @@ def measure_gain(
     given = (line.support.bed, line.support.series, hardened, factor)
     bed, series, hardened, factor = (values.ravel()[::every] for values in given)
     force = force.reshape(len(force), -1)[:, ::every]
-    apart = BLOCKS.nudge * force
+    apart = BLOCKS.nudge * force.max(axis=0)
     more, less = (
-        line.law.advance(BedLoad(one, bed), hardened, cycle, cycles)
-        for one in (force + apart, force)
+        line.law.advance_mixed(BedLoad(one, bed), line.shares, hardened, cycle, cycles)
+        for one in (np.where(force > 0, force + apart, 0.0), force)
     )
-    slope = (more - less) / np.where(apart > 0, apart, 1.0)
-    return np.asarray(np.tensordot(line.shares, slope, 1) * factor * series)
+    return np.asarray((more - less) / np.where(apart > 0, apart, 1.0) * factor * series)
 
 
 def find_block(

@@ -57,6 +57,14 @@ class Line:
         return slice(margin, len(self.beds.place) - margin)
 
 
+def extend_zone(zone: Zone, length: float) -> Zone:
+    """A zone that goes on through the margin where it reaches an end of the line."""
+    begin = -np.inf if zone.begin <= 0 else zone.begin
+    return zone.model_copy(
+        update={"begin": begin, "end": np.inf if zone.end >= length else zone.end}
+    )
+
+
 def make_line(
     length: float, track: Track, law: Law, axles: Sequence[Axle], scatter: Scatter, *,
     zones: Sequence[Zone] = (), lines: int = 1, seed: int = 1,
@@ -68,7 +76,8 @@ def make_line(
     inside = round(length / track.spacing) + 1
     margin = round(LEVEL.margin / track.spacing)
     place = np.arange(-margin, inside + margin) * np.float64(track.spacing)
-    beds = draw_beds(place, track.bed, scatter, zones, lines, seed)
+    wide = [extend_zone(one, length) for one in zones]
+    beds = draw_beds(place, track.bed, scatter, wide, lines, seed)
     whole = sum(one.share for one in axles)
     kinds = (Axle(load=one.load, share=one.share / whole) for one in axles)
     rail, support = assemble_rail(place, track), make_support(track, beds.stiffness)

@@ -14,7 +14,10 @@ from track_line.laws import BedLoad
 from track_line.settling.blocks import find_block
 from track_line.settling.level import measure_deviations
 from track_line.settling.line import Line
+from trackbed.errors import NotConverged
 
+DEEPEST = 1.0
+"""Settlement at which a run ends with a sentence [m]: beds of ballast are not so thick."""
 VOIDS = (0.1e-3, 1e-3)
 """Gaps under hanging sleepers that are counted [m]."""
 
@@ -81,13 +84,19 @@ def _settle_block(line: Line, state: State, force: Floats, end: float, finer: fl
     factor = line.beds.find_factors(state.score)
     cycles = find_block(line, force, state.hardened, factor, state.cycle, end, finer)
     load = BedLoad(force, line.support.bed)
-    each = line.law.advance(load, state.hardened, state.cycle, cycles)
-    grown = np.tensordot(line.shares, each, 1)
+    grown = line.law.advance_mixed(load, line.shares, state.hardened, state.cycle, cycles)
     hardened = state.hardened + grown
     span = float(state.hardened.mean()), float(hardened.mean())
     score, factor = renew_scores(line.beds, state.score, *span)
     cycle = end if cycles == end - state.cycle else state.cycle + cycles  # not by round-off
-    return State(cycle, state.settled + factor * grown, hardened, score, state.bears)
+    settled = state.settled + factor * grown
+    if not float(abs(settled).max()) < DEEPEST:
+        raise NotConverged(
+            f"by {cycle:.3g} axles a bed has settled by {abs(settled).max():.3g} m, which no line "
+            "does", where="the law of settlement",
+            remedy="correct its parameters, the axles or the scatter",
+        )  # fmt: skip
+    return State(cycle, settled, hardened, score, state.bears)
 
 
 def _take_record(line: Line, state: State, passage: Passage) -> Record:
