@@ -74,7 +74,7 @@ def tabulate_fast(runs: dict[str, dict[int, Row]]) -> str:
         cells = []
         for key in FAST:
             values = pair(runs, f"{engine}, fast", engine, key)
-            whole = np.mean([row[key] for row in runs[engine].values()])
+            whole = np.mean([row[key] for row in runs[engine].values() if key in row])
             mean, half = 100 * np.array(estimate_mean(values / whole))
             cells.append(f"{mean:+.0f} ± {half:.0f} %")
         cost = [runs[f"{engine}, fast"][s]["engine_cpu_s"] / runs[engine][s]["engine_cpu_s"]

@@ -51,8 +51,9 @@ def group_by_way(rows: Sequence[Row]) -> dict[str, dict[int, Row]]:
 
 
 def pair(runs: dict[str, dict[int, Row]], way: str, other: str, key: str) -> FloatArray:
-    """Differences ``way`` less ``other`` over the beds that both have, shape (beds, ...)."""
-    seeds = sorted(runs[way].keys() & runs[other].keys())
+    """Differences ``way`` less ``other`` over the beds that both have it of, shape (beds, ...)."""
+    seeds = [seed for seed in sorted(runs[way].keys() & runs[other].keys())
+             if key in runs[way][seed] and key in runs[other][seed]]  # fmt: skip
     mine, theirs = ([runs[name][seed][key] for seed in seeds] for name in (way, other))
     return np.subtract(mine, theirs)
 
