@@ -70,15 +70,21 @@ def describe(adoption: Adoption) -> list[str]:
 
 def check(adoption: Adoption) -> None:
     """Run a deck both ways and print how far they part; raises `NotCredible` where they do."""
-    from adapters.decks import check_cut, load_deck_scene
+    from adapters.decks import check_cut, keep_check, load_deck_scene
 
+    bed = load_deck_scene(adoption.scene)[1]
     with TemporaryDirectory(prefix="trackbed-check-") as folder:
-        found = check_cut(load_deck_scene(adoption.scene)[1], Path(folder))
+        found = check_cut(bed, Path(folder))
     print(f"one process against windows of one cycle, {found.grains} grains:")
     for cycle, (place, way) in enumerate(zip(found.place, found.path, strict=True), 1):
         print(f"  cycle {cycle}: places differ by {place:.3g} m at most; grains went {way:.3g} m")
     if adoption.contents.loaded_body:
         print(f"  heights of the loaded body differ by {found.height.max():.3g} m")
+    if not found.path.max() > 0:
+        raise NotCredible(
+            "no grain moves in the marked cycle", where=str(adoption.deck.path),
+            remedy="put the marks around the commands that load the bed",
+        )  # fmt: skip
     if not found.agrees:
         raise NotCredible(
             "windows of this deck compute another bed than one process does",
@@ -86,3 +92,4 @@ def check(adoption: Adoption) -> None:
             remedy="look for what the engine keeps in no restart file: phases of motions, "
             "insertions, forces read where a run begins",
         )  # fmt: skip
+    keep_check(adoption.scene, bed)

@@ -1,12 +1,12 @@
 """Decks of the user's own: cut at two marks, checked, and run with cycle jumps."""
 
 from adapters.decks.adopt import Adoption, adopt
-from adapters.decks.check import check_cut
+from adapters.decks.check import check_cut, keep_check
 from adapters.decks.jump import jump
 from adapters.decks.run import describe_deck_run, run_deck_scene
 from adapters.decks.scene import is_deck_scene, load_deck_scene
 
 __all__ = [
     "Adoption", "adopt", "check_cut", "describe_deck_run", "is_deck_scene", "jump",
-    "load_deck_scene", "run_deck_scene",
+    "keep_check",    "load_deck_scene", "run_deck_scene",
 ]  # fmt: skip

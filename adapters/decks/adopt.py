@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,7 +24,7 @@ SCENE = """\
 # {name}: load cycles computed and jumped on a deck of your own.  Written by trackbed adopt.
 
 [deck]
-file = "{file}"
+file = {file}
 engine = "{engine}"
 loaded_body = "{body}"  # ID of a mesh that stands for the sleeper; "": the mean grain alone
 
@@ -55,6 +56,8 @@ def adopt(path: Path, engine: str) -> Adoption:
     read or marked, and for another file where the copy should be.
     """
     path = path.absolute()
+    if not path.name.isprintable():  # a scene could not name it
+        raise UsageError("the deck's name is no text", where=ascii(path.name), remedy="rename it")
     marked, found, copy = read_deck(path), list[Finding](), path
     if not (is_deck_scene(path.parent / "scene.toml") and marked.marks):
         if marked.marks is None:
@@ -76,7 +79,8 @@ def adopt(path: Path, engine: str) -> Adoption:
         text, copy = "\n".join(add_lines(marked, found)) + "\n", folder / path.name
         write_new(copy, text.encode(errors="surrogateescape"))
         body = list_contents(marked).loaded_body if engine == "liggghts" else ""
-        text = SCENE.format(name=name, file=path.name, engine=engine, body=body)
+        file = json.dumps(path.name, ensure_ascii=False)
+        text = SCENE.format(name=name, file=file, engine=engine, body=body)
         write_new(folder / "scene.toml", text.encode())
     deck = read_deck(copy)
     found += find_obstacles(deck, engine)

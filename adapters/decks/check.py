@@ -6,6 +6,7 @@ part by round-off; more than that is a thing that the cut lost.
 
 from __future__ import annotations
 
+import hashlib
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,7 @@ from adapters.bed import FloatArray
 from adapters.decks.engine import Adopted, run_deck
 from adapters.decks.split import format_whole, format_window
 from adapters.decks.states import States, read_states
+from trackbed.run_files import write_whole
 
 ROUND_OFF = 1e-6
 """Greatest difference over the longest way of a grain [-]: LAMMPS parts by the last digits, which
@@ -35,7 +37,26 @@ class Difference:
     def agrees(self) -> bool:
         """Whether they part by round-off at most: `ROUND_OFF` of the longest way of a grain."""
         worst = max(self.place.max(), np.nan_to_num(self.height).max())
-        return bool(worst <= ROUND_OFF * self.path.max())
+        return bool(self.path.max() > 0 and worst <= ROUND_OFF * self.path.max())
+
+
+def digest_deck(bed: Adopted) -> str:
+    """SHA-256 of what a deck computes."""
+    text = format_whole(bed.deck, bed.engine, 1).encode(errors="surrogateescape")
+    return hashlib.sha256(text).hexdigest()
+
+
+def keep_check(scene: Path, bed: Adopted) -> None:
+    """Note beside a deck's scene that windows of it compute what one process does."""
+    write_whole(scene.with_name("checked.txt"), digest_deck(bed) + "\n")
+
+
+def is_checked(scene: Path, bed: Adopted) -> bool:
+    """Whether `keep_check` noted this deck as it is."""
+    try:
+        return scene.with_name("checked.txt").read_text().strip() == digest_deck(bed)
+    except (OSError, ValueError):
+        return False
 
 
 def check_cut(bed: Adopted, folder: Path, cycles: int = 2) -> Difference:

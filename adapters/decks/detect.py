@@ -10,6 +10,7 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
+from adapters.decks.engine import is_outside
 from adapters.decks.parse import BEGIN, END, Command, Deck
 from adapters.decks.split import BOX, KEYED, find_named, list_live
 
@@ -241,9 +242,25 @@ def find_losses(deck: Deck, engine: str) -> Iterator[Finding]:
             yield note(one, what, "a relative name: each window has a folder of its own")
         if one.name == "units" and one.word(1) != "si":
             yield note(one, f"lengths are in units {one.word(1)}, no metres")
+        if one.name == "fix" and one.word(3) == "gravity" and "vector" in one.words:
+            at = one.words.index("vector")
+            if any(word.strip("-+0.") for word in one.words[at + 1 : at + 3]):
+                yield stop(one, "gravity is not along -z, where settlement is", "turn the deck")
+        if one.name == "fix" and one.word(3) in ("freeze", "move", "setforce"):
+            what = f"fix {one.word(1)} {one.word(3)} holds or moves grains of {one.word(2)}"
+            yield note(one, what, "grains that do not move in a window are not moved by a jump")
         if one.name == "thermo_modify" and {"ignore", "warn"} & {*one.words}:
             what = "grains that leave the box vanish without stopping the engine"
             yield note(one, what, "thermo_modify lost error")
+    for one in deck.commands:
+        for word in one.words[1:]:
+            if is_outside(word) and "/" in word and one.name not in OUTPUTS:
+                what = f"{word} lies outside of the folder of the deck, and is not carried along"
+                yield stop(one, what, "put it beside the deck, and name it so")
+    sides = [one.words[1:4] for one in deck.before if one.name == "boundary"]
+    if not sides or any("p" in side for side in sides[-1]):
+        what = "the box is periodic: a jump that moves a grain over its side fails, and is computed"
+        yield Finding("note", "", what, "boundary f f f where walls hold the grains")
     for one in deck.before:
         if one.name == "group" and "dynamic" in one.words:
             yield note(one, f"group {one.word(1)} keeps the grains it has at the mark")

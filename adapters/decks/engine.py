@@ -44,11 +44,16 @@ def list_inputs(deck: Deck) -> list[Path]:
     """Files that a deck names, from its folder: meshes, data, tables, included decks."""
     found = {Path(one.file) for one in deck.commands} - {Path(deck.path.name)}
     for word in (word for one in deck.commands for word in one.words[1:]):
-        if re.search(r"[./]", word) and not word.startswith(("/", "..")):
+        if re.search(r"[./]", word) and not is_outside(word):
             pattern = VARIABLE.sub("*", word) if "$" in word else glob.escape(word)
             names = glob.glob(pattern, root_dir=deck.path.parent)
             found.update(Path(n) for n in names if (deck.path.parent / n).is_file())
     return sorted(found)
+
+
+def is_outside(name: str) -> bool:
+    """Whether a file of this name lies outside of its deck's folder, wherever that is."""
+    return Path(name).is_absolute() or ".." in Path(name).parts
 
 
 def list_output_folders(deck: Deck) -> list[Path]:
@@ -70,8 +75,10 @@ def run_deck(bed: Adopted, text: str, path: Path) -> float:
     folder, inputs = path.parent, list_inputs(bed.deck)
     for inner in (*list_output_folders(bed.deck), *(name.parent for name in inputs)):
         (folder / inner).mkdir(parents=True, exist_ok=True)
+    lent = {}
     for name in inputs:
         shutil.copyfile(bed.deck.path.parent / name, folder / name)
+        lent[folder / name] = (folder / name).stat().st_mtime_ns
     write_whole(path, text.encode(errors="surrogateescape"))
     # of a scene, an engine's command line takes the launcher alone
     scene = cast(Scene, SimpleNamespace(engine=SimpleNamespace(launcher=bed.launcher)))
@@ -82,8 +89,9 @@ def run_deck(bed: Adopted, text: str, path: Path) -> float:
     said = (folder / "screen.txt").read_text(errors="replace")
     if status != 0 or COMPLETE.search(said) is None:
         raise explain_failure(status, said, path)
-    for name in inputs:
-        (folder / name).unlink()
+    for copy, written in lent.items():
+        if copy.exists() and copy.stat().st_mtime_ns == written:  # else the deck wrote it
+            copy.unlink()
     return cpu_s
 
 

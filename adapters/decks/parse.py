@@ -14,7 +14,9 @@ from pathlib import Path
 from adapters.errors import UsageError
 from trackbed.memory import read_bounded
 
-MARK = re.compile(r"^\s*#\s*trackbed\s*:\s*(\S*)\s*$")
+MARK = re.compile(r"^\s*#\s*trackbed\s*:\s*(cycle|end)\s*$")
+NEAR_MARK = re.compile(r"^\s*#\s*trackbed\s*:", re.IGNORECASE)
+"""A comment that is meant as a mark, whether it is one or not."""
 BEGIN, END = "# trackbed: cycle", "# trackbed: end"
 WORD = re.compile(r"\"[^\"]*\"|'[^']*'|[^\s\"']+")
 COMMENT = re.compile(r"^((?:\"[^\"]*\"|'[^']*'|[^#\"'])*)#.*$", re.DOTALL)
@@ -98,8 +100,9 @@ def read_deck(path: Path, lines: Sequence[str] | None = None) -> Deck:
 def read_lines(path: Path) -> list[str]:
     """Lines of a deck; raises `UsageError` for a file that is not there or is no text."""
     try:
-        text = read_bounded(path, errors="surrogateescape")  # comments may be in any encoding
-        reason = "it is no text" if "\0" in text else ""
+        plain = path.is_file() or not path.exists()  # what is read from a pipe is not there again
+        text = read_bounded(path, errors="surrogateescape") if plain else ""  # in any encoding
+        reason = "" if plain and "\0" not in text else "it is no text file"
     except OSError as error:
         text, reason = "", error.strerror or str(error)
     if reason:
@@ -112,7 +115,13 @@ def read_lines(path: Path) -> list[str]:
 
 def find_marks(path: Path, lines: Sequence[str]) -> tuple[int, int] | None:
     """Lines of the two marks, from 1; None where there is none."""
-    found = {n: mark[1] for n, line in enumerate(lines, 1) if (mark := MARK.match(line))}
+    meant = {n: line.strip() for n, line in enumerate(lines, 1) if NEAR_MARK.match(line)}
+    found = {n: mark[1] for n, line in meant.items() if (mark := MARK.match(line))}
+    if strange := [n for n in meant if n not in found]:
+        raise UsageError(
+            f"'{meant[strange[0]]}' is no mark", where=f"{path}, line {strange[0]}",
+            remedy=f"write just '{BEGIN}' or '{END}'",
+        )  # fmt: skip
     if not found:
         return None
     if list(found.values()) != ["cycle", "end"]:
@@ -134,7 +143,13 @@ def join_lines(lines: Sequence[str], file: str) -> Iterator[Command]:
             text = text[:-1] + " "
             continue
         if text := COMMENT.sub(r"\1", text).strip():
-            yield Command(text, file, first, number)
+            one = Command(text, file, first, number)
+            if not one.words:
+                raise UsageError(
+                    f"'{one.short}' is no command: a quote is not closed", where=one.place,
+                    remedy="close it, or leave the line out",
+                )  # fmt: skip
+            yield one
         text = ""
 
 
@@ -144,7 +159,9 @@ def expand(command: Command, folder: Path, depth: int = 0) -> Iterator[Command]:
         yield command
         return
     name, why = command.word(1), ""
-    if "$" in name:
+    if Path(name).is_absolute() or ".." in Path(name).parts:
+        why = "lies outside of the folder of the deck: put it there"
+    elif "$" in name:
         why = "has a variable in its name: write it out"
     elif depth == NESTED:
         why = "includes itself"

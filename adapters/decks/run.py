@@ -7,7 +7,6 @@ bed is not relaxed: its healing cycles bring the overlaps back.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import shutil
 import sys
@@ -21,13 +20,14 @@ from typing import Any
 import numpy as np
 
 from adapters.bed import State
+from adapters.decks.check import digest_deck, is_checked
 from adapters.decks.detect import find_obstacles
 from adapters.decks.engine import Adopted, run_deck
 from adapters.decks.jump import jump
 from adapters.decks.restart import find_mesh, move_grains, move_stones
 from adapters.decks.scene import load_deck_scene
-from adapters.decks.split import format_prepare, format_whole, format_window
-from adapters.decks.states import States, load_states, read_states, save_states
+from adapters.decks.split import format_prepare, format_window
+from adapters.decks.states import States, find_overlap, load_states, read_states, save_states
 from adapters.engines import allow_interrupts, get_engine
 from adapters.errors import EngineFailed, NotCredible, SceneError
 from adapters.files import Outcome, RunFolder, explain_full_disk
@@ -51,6 +51,8 @@ TRIES = 3
 CALM = 10.0
 """Kinetic energy behind a jump and its healing over the greatest at cycle ends before it [-]: a
 jump that throws the bed apart leaves thousands of times as much, a calm one about as much."""
+PRESSED = 0.1
+"""By how much a jump may deepen the greatest overlap of two grains, over the least radius [-]."""
 
 
 @dataclass(frozen=True)
@@ -92,9 +94,8 @@ def run_deck_scene(
             where=str(bed.deck.path), remedy="change it, then: trackbed adopt DECK --check",
         )  # fmt: skip
     folder, progress, p = RunFolder(run_path), Progress(), scene.procedure
-    text = format_whole(bed.deck, bed.engine, 1).encode(errors="surrogateescape")
     record = scene.model_dump(mode="json")
-    record["deck"]["digest"] = hashlib.sha256(text).hexdigest()
+    record["deck"]["digest"] = digest_deck(bed)
     with allow_interrupts(), explain_full_disk(run_path), folder.lock():
         if (run_path / "manifest.json").exists():
             refuse_differences(folder.manifest()["scene"], record, run_path)
@@ -111,6 +112,9 @@ def run_deck_scene(
             folder.add_event("engine", name=bed.engine, version=get_engine(bed.engine).version())
             # no piston is known here, so none is waited for
             run = DeckRun(bed, p.model_copy(update={"seating": "any"}), folder, progress)
+            if not is_checked(path, bed):
+                words = f"trackbed adopt {bed.deck.path} --engine {bed.engine} --check"
+                progress.print_line(f"warning: never checked that windows compute its bed: {words}")
             settle(run, jumps=True)
             if control:
                 progress.print_line(CONTROL)
@@ -217,6 +221,12 @@ def jump_bed(run: DeckRun, place: Place, h: int, name: str) -> Place:
         if p.settlement == "history":
             gain = estimate_gain(like, at, h, run.folder.outcomes(), SLOPES)
             target = settle_by(gain, before, target)
+        held = np.ptp(seen, axis=0).max(axis=1) == 0  # by the deck
+        target[held] = seen[-1][held]
+        pressed = [find_overlap(x, states.radius) for x in (seen[-1], target)]
+        if not run.bed.stones and pressed[1] > pressed[0] + PRESSED * states.radius.min():
+            what = f"it presses grains into one another by {pressed[1]:.3g} m"
+            raise NotCredible(what, where=str(folder))
         drop = estimate_sinking(like, at, h) if run.bed.loaded else 0.0
         np.savez(folder / "moved.npz", move=target - seen[-1], drop=drop)
         row = run.folder.outcomes()[-1].rows[-1] | {"cycle": place.cycle + h, "kind": "jumped"}

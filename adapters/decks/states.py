@@ -84,6 +84,13 @@ def read_states(folder: Path, first: int, last: int, bed: Adopted) -> States:
     return States(identifier.astype(np.int64), radius, mass, position, velocity, height, spheres)
 
 
+def find_overlap(position: FloatArray, radius: FloatArray) -> float:
+    """Greatest overlap of two grains [m]: places (n, 3) and radii (n,) [m]; zero without."""
+    pairs = cKDTree(position).query_pairs(2 * radius.max(), output_type="ndarray")
+    apart = np.linalg.norm(position[pairs[:, 0]] - position[pairs[:, 1]], axis=1)
+    return float((radius[pairs].sum(axis=1) - apart).max(initial=0.0))
+
+
 def save_states(states: States, path: Path) -> None:
     """Write states to ``path`` (npz), without loss, atomically."""
     with replace_file(path) as temporary, temporary.open("wb") as stream:

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import trackbed
+from adapters.decks import engine
 from adapters.decks.adopt import adopt
 from adapters.decks.detect import find_obstacles
-from adapters.decks.engine import explain_failure, list_inputs, list_output_folders
+from adapters.decks.engine import Adopted, explain_failure, list_inputs, list_output_folders
 from adapters.decks.parse import BEGIN, Deck, join_lines, read_deck
 from adapters.decks.restart import find_mesh, find_record, move_grains, move_stones
 from adapters.decks.scene import load_deck_scene
 from adapters.decks.split import format_window, list_live
+from adapters.decks.states import find_overlap
 from adapters.errors import EngineFailed, SceneError, UsageError
 from tests import own_decks
 from trackbed import command
@@ -323,3 +326,70 @@ def test_spheres_are_moved_in_the_restart_file(offset: int, tag: type) -> None:
     assert restart == pack_spheres(place + shift, 0 * velocity, tag, offset)
     with pytest.raises(EngineFailed, match="keeps grains in a way"):
         move_grains(restart, np.array([1, 2, 3]), place, velocity, shift)
+
+
+# --- what a referee found ---------------------------------------------------------------------
+
+
+def make_folder(home: Path) -> Path:
+    """A folder for a deck, with something beside it."""
+    (home / "deck").mkdir()
+    return home / "deck"
+
+
+@pytest.mark.parametrize("name", ["../w.in", "in/../../w.in", "/tmp/w.in"])
+def test_a_file_outside_of_the_folder_is_refused_and_kept(name: str, tmp_path: Path) -> None:
+    """Included, or named as a mesh: no run lends it, so none can take it away."""
+    (tmp_path / "w.in").write_text("# mine\n")
+    path = write_deck(make_folder(tmp_path), cut(f"include {name}"))
+    with pytest.raises(UsageError, match="lies outside of the folder of the deck"):
+        read_deck(path)
+    path.write_text(cut(f"fix m all mesh/surface file {name} type 1"))
+    found = [one for one in find_obstacles(read_deck(path), "liggghts") if "outside" in one.what]
+    assert [one.kind for one in found] == ["stops"]
+    assert list_inputs(read_deck(path)) == []
+    assert (tmp_path / "w.in").read_text() == "# mine\n"
+
+
+def test_a_file_that_the_deck_writes_over_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An old table beside the deck is lent; what the engine writes in its place is no loan."""
+    path = write_deck(make_folder(tmp_path), cut("fix p all print 1 x file hist.txt"))
+    (path.parent / "hist.txt").write_text("old")
+    (path.parent / "same.txt").write_text("same")
+    path.write_text(cut("fix p all print 1 x file hist.txt\nvariable s file same.txt"))
+
+    def write(command: object, folder: Path, *_: object) -> tuple[int, float, float]:
+        os.utime(folder / "hist.txt", ns=(1, 1))
+        (folder / "screen.txt").write_text("COMPLETE step 1\n")
+        return 0, 0.0, 0.0
+
+    monkeypatch.setattr(engine, "run_process", write)
+    (tmp_path / "stage").mkdir()
+    engine.run_deck(Adopted(read_deck(path), "liggghts"), "run 1\n", tmp_path / "stage" / "in.x")
+    left = {one.name for one in (tmp_path / "stage").iterdir()}
+    assert "hist.txt" in left
+    assert "same.txt" not in left
+    assert (path.parent / "hist.txt").read_text() == "old"
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [("# Trackbed: Cycle", "is no mark"), ("# trackbed: cycle (my load)", "is no mark"),
+     ('"', "a quote is not closed")],
+)  # fmt: skip
+def test_what_is_nearly_a_mark_or_a_command_is_a_sentence(
+    line: str, said: str, tmp_path: Path
+) -> None:
+    with pytest.raises(UsageError, match=said):
+        read_text(tmp_path, cut(line))
+
+
+def test_gravity_aside_stops_and_overlaps_are_seen(tmp_path: Path) -> None:
+    text = cut("fix g all gravity 9.81 vector 0 -1 0")
+    found = find_obstacles(read_text(tmp_path, text), "lammps")
+    assert "gravity is not along -z" in " ".join(one.what for one in found if one.kind == "stops")
+    place = np.array([[0, 0, 0], [0, 0, 1.5], [0, 9, 0.0]])
+    assert find_overlap(place, np.array([1.0, 0.75, 1.0])) == pytest.approx(0.25)
+    assert find_overlap(place[::2], np.ones(2)) == 0.0
