@@ -76,7 +76,8 @@ def tabulate_fast(runs: dict[str, dict[int, Row]]) -> str:
             values = pair(runs, f"{engine}, fast", engine, key)
             whole = np.mean([row[key] for row in runs[engine].values() if key in row])
             mean, half = 100 * np.array(estimate_mean(values / whole))
-            cells.append(f"{mean:+.0f} ± {half:.0f} %")
+            text = f"{mean:+.0f} ± {half:.0f} %"
+            cells.append(f"**{text}**" if excludes_zero(values) else text)
         cost = [runs[f"{engine}, fast"][s]["engine_cpu_s"] / runs[engine][s]["engine_cpu_s"]
                 for s in sorted(runs[engine].keys() & runs[f"{engine}, fast"].keys())]  # fmt: skip
         lines.append([TITLES[engine], *cells, f"{np.median(cost):.2f}", str(len(cost))])
