@@ -38,7 +38,7 @@ def run_line(arguments: argparse.Namespace) -> int:
 
 def _run(file: SceneFile, path: Path, arguments: argparse.Namespace) -> dict[str, Any]:
     """The whole run with its report; its summary."""
-    from track_line.scene import RunFolder, run_scene, summarise_run, write_report
+    from track_line.scene import PLAN, RunFolder, run_scene, summarise_run, write_report
     from trackbed.run_files import raise_on_signals, record_provenance, write_result
 
     folder = RunFolder(path)
@@ -63,4 +63,6 @@ def _run(file: SceneFile, path: Path, arguments: argparse.Namespace) -> dict[str
         write_result(path, summary)
     if doubt := describe_implausible("settlement", summary["settlement_m"], "mean settlement"):
         print(f"warning: {doubt}", file=sys.stderr)
+    if (error := summary["error_of_blocks"]) > PLAN.doubtful:
+        print(f"warning: D1 errs by about {100 * error:.2g} % by its blocks", file=sys.stderr)
     return summary | {"folder": str(path)}

@@ -10,8 +10,7 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from adapters.decks.engine import is_outside
-from adapters.decks.parse import BEGIN, END, Command, Deck
+from adapters.decks.parse import BEGIN, END, Command, Deck, is_outside
 from adapters.decks.split import BOX, KEYED, find_named, list_live
 
 INSERTION = re.compile(r"insert/.*|pour|deposit")

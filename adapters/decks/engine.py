@@ -11,7 +11,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
 
-from adapters.decks.parse import VARIABLE, Deck
+from adapters.decks.parse import VARIABLE, Deck, is_outside
 from adapters.engines import get_engine, run_process
 from adapters.errors import EngineFailed
 from adapters.scene import Scene
@@ -49,11 +49,6 @@ def list_inputs(deck: Deck) -> list[Path]:
             names = glob.glob(pattern, root_dir=deck.path.parent)
             found.update(Path(n) for n in names if (deck.path.parent / n).is_file())
     return sorted(found)
-
-
-def is_outside(name: str) -> bool:
-    """Whether a file of this name lies outside of its deck's folder, wherever that is."""
-    return Path(name).is_absolute() or ".." in Path(name).parts
 
 
 def list_output_folders(deck: Deck) -> list[Path]:

@@ -20,7 +20,8 @@ def jump(
     ``states``: centres at the ends of c cycles one after another [m], shape (c, n, 3), the first
     after ``first_cycle`` cycles, at 0 before any load.  ``radius``: radii [m], shape (n,), or one
     of all.  ``law``: how a displacement grows with cycles; ``move``: what each grain's own becomes,
-    see `adapters.moves`.  Overlaps are left as they come: some cycles heal them.
+    see `adapters.moves`.  Overlaps are left as they come: some cycles heal them.  A grain at one
+    place in all states stays there.
 
     Raises `UsageError` for arrays that do not fit, are not finite, or are too few for the law.
     """
@@ -39,4 +40,11 @@ def jump(
     size = np.ptp(position[-1], axis=0) + 2 * radii.max()
     container = Container("box", size_x=float(size[0]), size_y=float(size[1]))
     seen = Jump(cycle, position, radii, get_law(law), h, container)
-    return position[-1] + get_move(move).displacement(seen)
+    return keep_held(position, position[-1] + get_move(move).displacement(seen))
+
+
+def keep_held(seen: FloatArray, target: FloatArray) -> FloatArray:
+    """Where grains are to go, (n, 3) [m]; those at one place in all states ``seen`` (c, n, 3) [m]
+    are held by the user's own program, and stay."""
+    held = (seen == seen[-1]).all(axis=(0, 2)) & (len(seen) > 1)
+    return np.where(held[:, None], seen[-1], target)

@@ -153,13 +153,18 @@ def join_lines(lines: Sequence[str], file: str) -> Iterator[Command]:
         text = ""
 
 
+def is_outside(name: str) -> bool:
+    """Whether a file of this name lies outside of its deck's folder, wherever that is."""
+    return Path(name).is_absolute() or ".." in Path(name).parts
+
+
 def expand(command: Command, folder: Path, depth: int = 0) -> Iterator[Command]:
     """A command, or those of the file that it includes."""
     if command.name != "include":
         yield command
         return
     name, why = command.word(1), ""
-    if Path(name).is_absolute() or ".." in Path(name).parts:
+    if is_outside(name):
         why = "lies outside of the folder of the deck: put it there"
     elif "$" in name:
         why = "has a variable in its name: write it out"

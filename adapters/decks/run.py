@@ -23,7 +23,7 @@ from adapters.bed import State
 from adapters.decks.check import digest_deck, is_checked
 from adapters.decks.detect import find_obstacles
 from adapters.decks.engine import Adopted, run_deck
-from adapters.decks.jump import jump
+from adapters.decks.jump import jump, keep_held
 from adapters.decks.restart import find_mesh, move_grains, move_stones
 from adapters.decks.scene import load_deck_scene
 from adapters.decks.split import format_prepare, format_window
@@ -220,9 +220,7 @@ def jump_bed(run: DeckRun, place: Place, h: int, name: str) -> Place:
         at: Any = place
         if p.settlement == "history":
             gain = estimate_gain(like, at, h, run.folder.outcomes(), SLOPES)
-            target = settle_by(gain, before, target)
-        held = np.ptp(seen, axis=0).max(axis=1) == 0  # by the deck
-        target[held] = seen[-1][held]
+            target = keep_held(seen, settle_by(gain, before, target))
         pressed = [find_overlap(x, states.radius) for x in (seen[-1], target)]
         if not run.bed.stones and pressed[1] > pressed[0] + PRESSED * states.radius.min():
             what = f"it presses grains into one another by {pressed[1]:.3g} m"

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,11 +15,13 @@ from adapters.decks import engine
 from adapters.decks.adopt import adopt
 from adapters.decks.detect import find_obstacles
 from adapters.decks.engine import Adopted, explain_failure, list_inputs, list_output_folders
+from adapters.decks.jump import keep_held
 from adapters.decks.parse import BEGIN, Deck, join_lines, read_deck
 from adapters.decks.restart import find_mesh, find_record, move_grains, move_stones
+from adapters.decks.run import Place, write_start
 from adapters.decks.scene import load_deck_scene
 from adapters.decks.split import format_window, list_live
-from adapters.decks.states import find_overlap
+from adapters.decks.states import States, find_overlap
 from adapters.errors import EngineFailed, SceneError, UsageError
 from tests import own_decks
 from trackbed import command
@@ -253,6 +257,19 @@ def test_a_jump_follows_the_law_of_the_states() -> None:
     assert np.array_equal(trackbed.jump(states, 0, 0.02, move="still"), states[-1])
 
 
+def test_grains_that_a_deck_holds_stay() -> None:
+    """Five of ten do not move in the window: no move and no strain of the mean takes them along."""
+    start = np.random.default_rng(2).uniform(0, 0.1, (10, 3))
+    settled = np.log(np.arange(1.0, 8.0))[:, None, None] * np.array([0.0, 0.0, -1e-3])
+    states = start + settled * (np.arange(10) >= 5)[:, None]
+    after = trackbed.jump(states, 20, 0.02)
+    assert np.array_equal(after[:5], start[:5])
+    assert (after[5:, 2] < states[-1, 5:, 2]).all()
+    strained = keep_held(states, after - [0, 0, 1e-3])
+    assert np.array_equal(strained[:5], start[:5])
+    assert np.allclose(strained[5:], after[5:] - [0, 0, 1e-3], rtol=0, atol=0)
+
+
 @pytest.mark.parametrize(("states", "radius", "said"), [
     (np.zeros((3, 4)), 1.0, r"no \(cycles"),
     (np.zeros((3, 4, 3)), np.ones(5), "are not those of 4"),
@@ -292,6 +309,35 @@ def test_meshes_and_stones_are_moved_in_their_records() -> None:
         assert np.array_equal(found[:, place] - stones[:, place], [[4, 5, 6], [1, 2, 3]])
     assert not found[:, 8:17].any()
     assert np.array_equal(found[:, 17:], stones[:, 17:])
+
+
+def test_a_window_starts_with_its_grains_and_plate_where_the_jump_puts_them(tmp_path: Path) -> None:
+    """In the restart file and in the state that the window's rows go on from: each grain by its
+    move and at rest, the plate down by its drop."""
+    place, velocity = np.random.default_rng(3).normal(size=(2, 3, 3))
+    corners = [13.0, 0, 0, 5.0, 0, 0, 5.0, 0, 0, 5.0, 0.5, 0.5, 0.5]
+    restart = pack("m", "mesh/surface", [1, 0, 0, *corners, *([5.0] * 22)])
+    for number in range(3):
+        restart += np.array([*place[number], number + 1, 0, 0, 0, *velocity[number]]).tobytes()
+    for name in ("window_000000", "jump_000004_1", "next"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "window_000000" / "end.restart").write_bytes(restart)
+    move = np.arange(9.0).reshape(3, 3) * 1e-3
+    np.savez(tmp_path / "jump_000004_1" / "moved.npz", move=move, drop=0.25)
+    last = np.column_stack([[1, 2, 3], place, velocity])
+    states = States(np.array([1, 2, 3]), np.ones(3), np.ones(3), place[None], velocity[None],
+                    np.array([5.0]), last)  # fmt: skip
+    bed = SimpleNamespace(stones="", loaded=("m", "mesh/surface"))
+    run: Any = SimpleNamespace(folder=SimpleNamespace(path=tmp_path), bed=bed)
+    at = Place(9, "window_000000", jumped="jump_000004_1")
+    found = write_start(run, at, states, tmp_path / "next")
+    assert np.array_equal(found.position[0], place + move)
+    assert found.height.tolist() == [4.75]
+    written = bytearray((tmp_path / "next" / "cycle_0.restart").read_bytes())
+    assert all((height == 4.75).all() for height in find_mesh(written, "m", "mesh/surface")[:1])
+    grains = np.frombuffer(written[-240:], float).reshape(3, 10)
+    assert np.array_equal(grains[:, :3], place + move)
+    assert not grains[:, 7:].any()
 
 
 @pytest.mark.parametrize("restart", [

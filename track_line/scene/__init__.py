@@ -2,9 +2,9 @@
 
 from track_line.scene.file import SceneFile, load_scene
 from track_line.scene.page import write_report
-from track_line.scene.run import RunFolder, preview_run, run_scene, summarise_run
+from track_line.scene.run import PLAN, RunFolder, preview_run, run_scene, summarise_run
 
 __all__ = [
-    "RunFolder", "SceneFile", "load_scene", "preview_run", "run_scene",
+    "PLAN", "RunFolder", "SceneFile", "load_scene", "preview_run", "run_scene",
     "summarise_run", "write_report",
 ]  # fmt: skip

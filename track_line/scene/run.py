@@ -30,6 +30,8 @@ class RunPlan:
     """Between states that are written [s]."""
     checked: int = 10
     """Lines that are computed again with half the blocks, for the error."""
+    doubtful: float = 0.05
+    """Error of the last D1 by its blocks, over itself, from which a run warns [-]."""
     band: tuple[float, float, float] = (0.05, 0.5, 0.95)
     """Shares of all sections of all lines that lie below low, median and high [-]."""
 
@@ -134,7 +136,8 @@ def summarise_run(file: SceneFile, records: Sequence[Record]) -> dict[str, Any]:
     d1 = np.quantile(last.deviation, PLAN.band)
     tamping = np.quantile(crossings, PLAN.band, method="inverted_cdf")
     summary = {
-        "title": file.tables.title, "law": file.tables.law.name,
+        "title": file.tables.title, "law": file.tables.law.name, "source": line.law.source,
+        "validity": line.law.validity,
         "realisations": file.tables.line.realisations, "sections": crossings.size,
         "axles": last.cycle, "tonnage_mgt": float(tonnage[-1]), "blocks": len(tonnage) - 1,
         "settlement_m": float(last.settlement.mean()), "limit_m": file.limit,

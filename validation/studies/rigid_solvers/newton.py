@@ -34,7 +34,7 @@ def polish_forces(
     w = problem.delassus
     rho = np.repeat(1.0 / w.diagonal().reshape(-1, dim).mean(axis=1), dim)
     shifted = w + sp.diags_array(SHIFT / rho)
-    end = time.process_time() + budget_s
+    end = time.thread_time() + budget_s
     r = best = force.copy()
     least = np.inf
     value, derivative = _evaluate_map(problem, r, rho)
@@ -42,7 +42,7 @@ def polish_forces(
         error = problem.residual(r)
         if error < least:
             best, least = r, error
-        if least <= tolerance or time.process_time() > end:
+        if least <= tolerance or time.thread_time() > end:
             return best, step
         projection, dual = derivative
         blocks = projection @ dual
