@@ -18,7 +18,8 @@ STEPS_A_MEMORY = 8
 """Renewals of the scatter in the settlement that it takes to be forgotten by a factor e."""
 STIFFNESS, SETTLEMENT, LEVEL, RENEWAL = range(4)
 """Streams of random numbers of a scene's seed."""
-
+SHORTEST_MEMORY = 1e-4
+"""Shortest memory that a scene may ask for [m]: each renewal draws all beds."""
 
 EDGE = 1e-6
 """From the end of a zone a sleeper still stands at it [m]: places are multiples of the spacing."""
@@ -37,7 +38,7 @@ class Scatter(Table):
     together: Annotated[Real, Field(ge=-1, le=1)] = 0.0
     """Correlation of settlement with stiffness, of their logarithms [-]; below 0 where soft beds
     settle more under equal load."""
-    memory: Annotated[Real, Field(ge=1e-4)] | None = None
+    memory: Annotated[Real, Field(ge=SHORTEST_MEMORY)] | None = None
     """Mean settlement after which the scatter of settlement is forgotten by e [m]; None where it
     stays for ever."""
     unevenness: NonNegative = 0.0

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from trackbed.errors import UsageError
 from trackbed.plausible import describe_implausible
 from trackbed.run_files import Progress, add_run_arguments, place_run
 from trackbed.run_verbs import print_fields
@@ -18,7 +20,15 @@ if TYPE_CHECKING:
 def register(verb: str, parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``line`` to its parser."""
     assert verb == "line"
-    add_run_arguments(parser, "a scene of a line (TOML)", "line.axles=1e7", "the last saved state")
+    add_run_arguments(
+        parser, "a scene of a line (TOML); not needed beside --beds", "line.axles=1e7",
+        "the last saved state", needed=False,
+    )  # fmt: skip
+    parser.add_argument(
+        "--beds", type=Path, metavar="PATH",
+        help="folder of a sweep, or a table of cycles and a column for each sleeper: law, scatter "
+        "and persistence of these beds; beside SCENE they replace its own, before --set",
+    )  # fmt: skip
     parser.set_defaults(command=run_line)
 
 
@@ -26,14 +36,55 @@ def run_line(arguments: argparse.Namespace) -> int:
     """Run a scene, or say what would run; the last line is the engineer's sentence."""
     from track_line.scene import load_scene, preview_run
 
+    _refuse_no_scene(arguments)
+    settings = _fit_beds(arguments) if arguments.beds else []
+    if arguments.scene is None:
+        return 0
     path = place_run(arguments)
-    file = load_scene(arguments.scene, arguments.overrides)
+    file = load_scene(arguments.scene, [*settings, *arguments.overrides])
     answer = preview_run(file) if arguments.dry_run else _run(file, path, arguments)
     sentence = "" if arguments.json else answer.pop("sentence", "")
     print_fields(answer, arguments.json)
     if sentence:
         print(sentence)
     return 0
+
+
+def _refuse_no_scene(arguments: argparse.Namespace) -> None:
+    """Raise `UsageError` where there is no scene, and beds alone are not all that is asked."""
+    given = vars(arguments)
+    names = ("run_folder", "overrides", "dry_run", "resume", "force", "no_pictures")
+    if given["scene"] is None and (given["beds"] is None or any(given[name] for name in names)):
+        raise UsageError(
+            "no scene is given", remedy="trackbed new line my-line writes one; without a scene "
+            "there are --beds and --json alone",
+        )  # fmt: skip
+
+
+def _fit_beds(arguments: argparse.Namespace) -> list[str]:
+    """Fit measured beds and say what they know; the keys of a scene that they give."""
+    from track_line.measured import (
+        fit_beds,
+        format_figures,
+        format_settings,
+        list_doubts,
+        read_beds,
+        summarise_fit,
+    )
+
+    ensemble = read_beds(arguments.beds)
+    fit = fit_beds(ensemble)
+    settings, doubts = format_settings(fit), list(list_doubts(ensemble, fit))
+    if arguments.scene is None:
+        figures = summarise_fit(ensemble, fit)
+        if arguments.json:
+            print_fields(figures | {"settings": settings, "doubts": doubts}, True)
+        else:
+            keys = (f"--set {shlex.quote(one)}" for one in settings)
+            print(format_figures(figures), "", *keys, "", *doubts, sep="\n")
+    else:
+        print(*(f"note: {one}" for one in (*settings, *doubts)), sep="\n", file=sys.stderr)
+    return settings
 
 
 def _run(file: SceneFile, path: Path, arguments: argparse.Namespace) -> dict[str, Any]:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from track_line.laws.contract import BedLoad, Law
+from track_line.laws.contract import SEAT_AREA, BedLoad, Law
 from trackbed.choices import find_choice, find_choices
 
-__all__ = ["BedLoad", "Law", "get_law", "list_laws"]
+__all__ = ["SEAT_AREA", "BedLoad", "Law", "get_law", "list_laws"]
 
 
 def list_laws() -> tuple[str, ...]:

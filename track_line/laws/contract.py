@@ -14,6 +14,9 @@ import numpy as np
 
 from track_line.arrays import Floats
 
+SEAT_AREA = 0.325
+"""Of half a sleeper on its bed, 0.26 m by 1.25 m [m^2]."""
+
 
 @dataclass(frozen=True)
 class BedLoad:

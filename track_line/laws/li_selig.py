@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from track_line.arrays import Floats
-from track_line.laws.contract import BedLoad, Law
+from track_line.laws.contract import SEAT_AREA, BedLoad, Law
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class LiSelig(Law):
     """sigma_s: unconfined, compressive [Pa]."""
     spread: float = 0.4
     """Deviator stress in the layer over the pressure under the sleeper [-]; an example."""
-    area: float = 0.325
+    area: float = SEAT_AREA
     """Of half a sleeper on its bed [m^2]."""
 
     formula = "s = H a (sigma_d/sigma_s)^m N^b"

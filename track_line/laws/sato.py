@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from track_line.arrays import Floats
-from track_line.laws.contract import BedLoad, Law
+from track_line.laws.contract import SEAT_AREA, BedLoad, Law
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Sato(Law):
     """a [m/Pa^2] an axle."""
     threshold: float = 42e3
     """p0 [Pa]"""
-    area: float = 0.325
+    area: float = SEAT_AREA
     """Of half a sleeper on its bed [m^2]."""
 
     formula = "s = gamma (1 - e^(-alpha N)) + a (p - p0)^2 N"

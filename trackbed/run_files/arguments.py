@@ -17,10 +17,15 @@ TRIAL = 0.5
 
 
 def add_run_arguments(
-    parser: argparse.ArgumentParser, scene: str, override: str, resumed_from: str
-) -> None:
-    """Add SCENE and its flags; the words say what a scene is, an override, and what goes on."""
-    parser.add_argument("scene", metavar="SCENE", type=Path, help=scene)
+    parser: argparse.ArgumentParser, scene: str, override: str, resumed_from: str,
+    *, needed: bool = True,
+) -> None:  # fmt: skip
+    """Add SCENE and its flags; the words say what a scene is, an override, and what goes on.
+
+    ``needed``: whether there is nothing to do without a scene.
+    """
+    count = None if needed else "?"
+    parser.add_argument("scene", metavar="SCENE", type=Path, nargs=count, help=scene)
     parser.add_argument(
         "--run-folder", type=Path, metavar="FOLDER", help="default: SCENE-run beside the scene"
     )

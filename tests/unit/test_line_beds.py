@@ -1,0 +1,258 @@
+"""Beds as measured: law, load, scatter and persistence are found again where they are known."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import dblquad
+from scipy.signal import lfilter
+
+from track_line.beds import Beds, Scatter, renew_scores, spread_around_one
+from track_line.measured import fit_beds, read_beds
+from track_line.measured.fit import (
+    estimate_variation,
+    find_correlation,
+    find_likeness,
+    find_memory,
+    share_kept,
+)
+from trackbed.command import main
+from trackbed.scenes import read_template
+
+CYCLES = np.unique(np.rint(np.geomspace(1, 1e4, 80)))
+A, B, M, AREA = 0.8e-3, 0.22, 1.4, 0.325
+
+
+def write_sweep(
+    folder: Path, pressures: list[float], seeds: int, factor: np.ndarray, **others: Any
+) -> Path:
+    """A folder as `trackbed sweep` leaves one: beds of the law c + A (p/46 kPa)^M N^B times their
+    ``factor`` (seeds, cycles), which go down by 50 um for each 46 kPa, softer ones by more.
+
+    ``others``: a further column of the members.
+    """
+    members, rows = [], []
+    for pressure in pressures:
+        for seed in range(seeds):
+            name = f"loading.amplitude={pressure},sample.seed={seed}"
+            head = {"member": name, "loading.amplitude": pressure, "sample.seed": seed}
+            members.append(head | {key: value[seed % 2] for key, value in others.items()}
+                           | {"state": "finished", "run_folder": f"members/{name}"})  # fmt: skip
+            scene = {"loading": {"amplitude": pressure, "mean": pressure / 2}}
+            (folder / "members" / name).mkdir(parents=True)
+            (folder / "members" / name / "manifest.json").write_text(json.dumps({"scene": scene}))
+            law = 2e-4 + A * (pressure / 46e3) ** M * factor[seed] * CYCLES**B
+            spring = 50e-6 * pressure / 46e3 * factor[seed, -1]
+            rows += [
+                head | {"cycle": int(n), "loaded_body_settlement": s, "elastic_deflection": spring,
+                        "kind": "computed"}
+                for n, s in zip(CYCLES, law, strict=True)
+            ]  # fmt: skip
+    for name, table in (("members", members), ("settlement", rows)):
+        with (folder / f"{name}.csv").open("w", newline="") as stream:
+            writer = csv.DictWriter(stream, list(table[0]), quoting=csv.QUOTE_NONNUMERIC)
+            writer.writeheader()
+            writer.writerows(table)
+    return folder
+
+
+def draw_factors(seeds: int, variation: float = 0.3, seed: int = 1) -> np.ndarray:
+    """Lasting factors of beds, (seeds, 1) for all cycles."""
+    return spread_around_one(np.random.default_rng(seed).normal(size=(seeds, 1)), variation)
+
+
+def test_law_load_and_scatter_are_found_again(tmp_path, capsys):
+    """Three loads on 40 packings: m exactly, as the scatter is a factor; b but for what is lost
+    between rows; a but for 1 % by which a mean over the last tenth of the cycles lags, 1 - 0.05 b;
+    the variation is that of the draws; beds that settle more are softer, r = -1; scatter lasts."""
+    factor = draw_factors(40) * np.ones(len(CYCLES))
+    folder = write_sweep(tmp_path, [23e3, 46e3, 92e3], 40, factor)
+    assert main(["line", "--beds", str(folder), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["beds"], found["packings"], found["loads"]) == (120, 40, 3)
+    assert found["b"] == pytest.approx(B, abs=5e-4)
+    assert found["m"] == pytest.approx(M, abs=1e-6)
+    assert found["m_low"] <= found["m"] <= found["m_high"] < M + 1e-3
+    assert found["force_n"] == pytest.approx(92e3 * AREA)
+    a = A * 2**M * factor[:, 0].mean()
+    assert found["a_m"] == pytest.approx(0.99 * a, rel=5e-3)
+    assert found["seated_m"] == pytest.approx(2e-4, rel=0.05)
+    spread = np.log(factor[:, 0]).std(ddof=1)
+    assert found["variation_of_gain"] == pytest.approx(np.expm1(spread**2) ** 0.5, rel=0.02)
+    assert found["variation_of_gain_low"] < 0.3 < found["variation_of_gain_high"]
+    assert found["gain_with_stiffness"] == pytest.approx(-1)
+    assert found["bed_n_per_m"] == pytest.approx(
+        46e3 * AREA / 50e-6 * (1 / factor[:, 0]).mean(), rel=1e-6
+    )
+    assert found["persistence_1"] == pytest.approx(1)
+    assert found["memory_m"] is None  # for ever
+    assert not any("persistence is not shown" in one for one in found["doubts"])
+
+
+@pytest.mark.long
+def test_a_scene_runs_with_measured_beds(tmp_path, capsys):
+    """The keys go into the scene before the user's own, and the run's manifest has them."""
+    factor = draw_factors(9) * np.ones(len(CYCLES))
+    folder = write_sweep(tmp_path / "sweep", [46e3], 9, factor)
+    scene = tmp_path / "line.toml"
+    scene.write_text(read_template("line"))
+    words = ["line.length=60", "line.realisations=2", "line.axles=1e3", "scatter.stiffness=0.1"]
+    sets = [word for key in words for word in ("--set", key)]
+    assert main(["line", str(scene), "--beds", str(folder), *sets, "--no-pictures"]) == 0
+    told = capsys.readouterr().err
+    assert "note: one load shows no load dependence: m stays 1.6" in told
+    manifest = json.loads((tmp_path / "line-run" / "manifest.json").read_text())["scene"]
+    assert manifest["law"]["name"] == "power"
+    assert set(manifest["law"]["parameters"]) == {"a", "b", "force"}
+    assert manifest["law"]["parameters"]["force"] == pytest.approx(46e3 * AREA, rel=1e-3)
+    assert manifest["scatter"]["stiffness"] == 0.1
+    assert manifest["scatter"]["together"] == pytest.approx(-1)
+
+
+def iterate_gains(memory: float, beds: int, seed: int) -> Iterator[np.ndarray]:
+    """Settlements at `CYCLES` [m] of beds whose scatter a line renews, from the first cycle on."""
+    score = np.random.default_rng(seed).normal(size=(1, beds))
+    flat = np.zeros((1, beds))
+    line = Beds(np.arange(beds) * 0.6, flat, score, flat[0] + 1, flat,
+                Scatter(settlement=0.3, memory=memory), seed)  # fmt: skip
+    settled, mean = np.zeros(beds), 0.0
+    for then in A * CYCLES**B:
+        score, factor = renew_scores(line, score, mean, then)
+        settled = settled + factor[0] * (then - mean)
+        mean = float(then)
+        yield settled
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("memory", [1e-3, 4e-3])
+def test_memory_of_a_line_is_found_in_its_beds(tmp_path, memory):
+    """`fit_beds` is the inverse of what a line does: memory and variation of its beds.  A draw of
+    400 has an error of a tenth; the mean of six is within three of its own, and of the 2 % by which
+    logarithms of means differ from scores."""
+    found = []
+    for seed in range(6):
+        settled = np.array(list(iterate_gains(memory, 400, seed)))
+        path = tmp_path / "beds.csv"
+        head = ",".join(["cycle", *(f"s{i} [mm]" for i in range(400))])
+        np.savetxt(path, np.column_stack([CYCLES, 1e3 * settled]), delimiter=",", header=head,
+                   comments="")  # fmt: skip
+        fit = fit_beds(read_beds(path))
+        found.append((fit.memory.value, fit.settlement))
+        assert fit.memory.low < fit.memory.value < fit.memory.high
+        assert fit.total.value < fit.settlement
+        assert np.isnan(fit.force)
+    assert np.mean(found, axis=0) == pytest.approx([memory, 0.3], rel=0.14)
+    assert np.mean(found, axis=0)[1] == pytest.approx(0.3, rel=0.04)
+
+
+@pytest.mark.parametrize(("late", "early", "memory"), [(2.0, 1.0, 3.0), (1.0, 4.0, 0.5)])
+def test_memory_is_the_double_integral(late, early, memory):
+    """Correlation of means over adjacent windows under e^(-|x - y|/L), by quadrature; the mean over
+    both scatters less than a reading by the square root of the double integral over both."""
+
+    def overlap(x: tuple[float, float], y: tuple[float, float]) -> float:
+        def split(a: float) -> float:
+            return min(max(a, y[0]), y[1])
+
+        def alike(b: float, a: float) -> float:
+            return float(np.exp(-abs(a - b) / memory))
+
+        left = dblquad(alike, *x, lambda a: y[0], split, epsabs=1e-10)[0]
+        return float(left + dblquad(alike, *x, split, lambda a: y[1], epsabs=1e-10)[0])
+
+    first, second = (0.0, early), (early, early + late)
+    own = overlap(first, first) * overlap(second, second)
+    found = find_memory(overlap(first, second) / own**0.5, late, early)
+    assert found == pytest.approx(memory, rel=1e-6)
+    whole = (0.0, early + late)
+    kept = overlap(whole, whole) ** 0.5 / (early + late)
+    assert share_kept(early + late, memory) == pytest.approx(kept, rel=1e-6)
+
+
+def test_intervals_hold_what_they_are_of():
+    """90 % of 1,000 draws of twelve lognormal beds: variation, and correlation of 0.6, and that of
+    400 neighbours; give or take three errors of the count, and 2 % by which Fisher's normal is off.
+    """
+    rng, alike = np.random.default_rng(7), np.exp(-0.2)
+    width, load, held = np.sqrt(np.log1p(0.3**2)), np.zeros(12, int), np.zeros(3)
+    for _ in range(1000):
+        x, other = rng.normal(size=(2, 12))
+        y = 0.6 * x + 0.8 * other
+        one = estimate_variation(width * (x - x.mean()), load, 12)
+        two = find_correlation(x, y, 12)
+        along = lfilter([(1 - alike**2) ** 0.5], [1.0, -alike], rng.normal(size=500))[100:]
+        three = find_likeness(along - along.mean())
+        held += one.low < 0.3 < one.high, two.low < 0.6 < two.high, three.low < alike < three.high
+    assert held / 1000 == pytest.approx([0.9] * 3, abs=3 * (0.09 / 1000) ** 0.5 + 0.02)
+
+
+def test_neighbours_of_a_track_give_its_length(tmp_path):
+    """Sleepers that follow each other, correlated by e^(-0.6/3): a length of 3 m, within three
+    errors, l^2/0.6 m sqrt(e^(2 0.6/l) - 1)/20 each."""
+    rng, alike = np.random.default_rng(2), np.exp(-0.2)
+    score = [rng.normal()]
+    for _ in range(399):
+        score.append(alike * score[-1] + np.sqrt(1 - alike**2) * rng.normal())
+    factor = spread_around_one(np.array(score), 0.3)
+    path, mm = tmp_path / "track.csv", 1e3 * A * factor
+    rows = [";".join([f"{n:g}", *(f"{one * n**B:.6f}" for one in mm)]) for n in CYCLES]
+    path.write_text("\n".join([";".join(["cycle", *(f"s{i}_mm" for i in range(400))]), *rows]))
+    fit = fit_beds(read_beds(path))
+    assert fit.length.value == pytest.approx(3.0, abs=45 / 20 * np.expm1(0.4) ** 0.5)
+    assert fit.total.value == pytest.approx(0.3, rel=0.15)
+    assert fit.a == pytest.approx(0.99 * A * factor.mean(), rel=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("cycle,a,b\n1,1,1\n100,2,2\n", "2 beds show no scatter"),
+        ("cycle,a,b,c\n1,1,1,1\n5,2,2,2\n", "cycles 1 to 5 only"),
+        ("cycle,a,b,c\n100,1,1,1\n5,2,2,2\n", "cycles do not ascend"),
+        ("cycle,a,b,c\n1,1,1,1\n100,2,2,0.5\n", "1 of 3 beds rise from cycle"),
+        ("cycle,a,b,c\n1,1,1,1\n100,2,2,x\n", "'x' is not a number"),
+        ("cycle,a [kN],b,c\n1,1,1,1\n100,2,2,2\n", "is in kN, which is not known here"),
+    ],
+)
+def test_a_table_that_shows_no_scatter_is_refused(tmp_path, text, said, capsys):
+    """Exit code 2, with the place and what to do."""
+    path = tmp_path / "beds.csv"
+    path.write_text(text)
+    assert main(["line", "--beds", str(path)]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_a_sweep_that_is_none_is_refused(tmp_path, capsys):
+    """A folder without tables; beds that differ by another key; run flags without a scene."""
+    assert main(["line", "--beds", str(tmp_path)]) == 2
+    assert "give the folder that trackbed sweep --into wrote" in capsys.readouterr().err
+    factor = draw_factors(4) * np.ones(len(CYCLES))
+    folder = write_sweep(tmp_path / "s", [46e3], 4, factor, **{"material.friction": [0.5, 0.6]})
+    assert main(["line", "--beds", str(folder)]) == 2
+    assert "the beds differ by material.friction" in capsys.readouterr().err
+    assert main(["line", "--beds", str(folder), "--dry-run"]) == 2
+    assert main(["line"]) == 2
+    assert "no scene is given" in capsys.readouterr().err
+
+
+def test_members_that_are_not_finished_are_named(tmp_path, capsys):
+    """Left out, with a sentence; without its manifest a member's load is not known."""
+    factor = draw_factors(5) * np.ones(len(CYCLES))
+    folder = write_sweep(tmp_path, [46e3], 5, factor)
+    path = folder / "members.csv"
+    lines = path.read_text().splitlines()
+    lines[3] = lines[3].replace("finished", "failed")
+    path.write_text("\n".join(lines))
+    for one in folder.glob("members/*/manifest.json"):
+        one.unlink()
+    assert main(["line", "--beds", str(folder)]) == 0
+    printed = capsys.readouterr().out
+    assert f"sample.seed=2 is failed with {len(CYCLES)} cycles, and left out" in printed
+    assert "the load is not known" in printed
+    assert "force=" not in printed

@@ -1,0 +1,233 @@
+"""What an ensemble of beds says of the law, the scatter and its persistence, with intervals.
+
+A gain is the settlement of a bed between two cycles.  Scatter and correlations are of logarithms
+of gain and stiffness, less the mean of the beds under the same load.  Intervals are those of normal
+logarithms; a packing that was loaded several times counts once in them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from math import isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq, minimize_scalar
+from scipy.stats import chi2, norm, t
+
+from track_line.arrays import Floats
+from track_line.beam import Track
+from track_line.beds import SHORTEST_MEMORY
+from track_line.laws import SEAT_AREA
+from track_line.measured.ensemble import A_DECADE, Ensemble
+from trackbed.errors import UsageError
+
+LEVEL = 0.9
+"""Probability that an interval holds what it is of [-]."""
+EXPONENTS = (0.01, 1.0)
+"""Between which b is looked for: about a logarithm, a constant rate [-]."""
+
+ONE = 1 - 1e-12
+"""Greatest correlation that has an interval [-]."""
+SMALL = 1e-6
+"""Settlement over memory from which on scatter lasts for ever, to round-off [-]."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A value with its interval; nan for what is not known."""
+
+    value: float = np.nan
+    low: float = np.nan
+    high: float = np.nan
+
+
+@dataclass(frozen=True)
+class BedFit:
+    """The law s = c + a (F/F0)^m N^b of a mean bed, and how beds scatter about it."""
+
+    force: float
+    """F0, on half a sleeper: the pressure under most beds times `SEAT_AREA` [N]."""
+    a: float
+    """[m]"""
+    b: Estimate
+    """[-]"""
+    m: Estimate
+    """[-]"""
+    seated: float
+    """c, which is no part of the law of a line [m]."""
+    bed: float
+    """Mean stiffness under half a sleeper [N/m]."""
+    stiffness: Estimate
+    """Its coefficient of variation [-]."""
+    total: Estimate
+    """Coefficient of variation of the gain over all cycles [-]."""
+    together: Estimate
+    """Correlation of gain with stiffness [-]."""
+    window: float
+    """Last cycle of a window over its first: a decade, or half of less than two [-]."""
+    persistence: tuple[Estimate, ...]
+    """Correlation of the gains in two windows that follow one another, the latest first [-]."""
+    rose: int
+    """Beds that rose in a window, and are in no correlation of it."""
+    memory: Estimate
+    """Mean settlement after which scatter is forgotten by e [m], by the latest persistence."""
+    settlement: float
+    """Coefficient of variation of ds/dN [-], of which ``total`` is what lasts."""
+    length: Estimate
+    """Along the line, over which beds are alike, where sleepers are `Track.spacing` apart [m]."""
+    unseen: float
+    """Constant rate that would make the whole of the last window's gain [m a cycle]."""
+
+
+def fit_beds(ensemble: Ensemble) -> BedFit:
+    """Law, scatter and persistence of an ensemble; raises `UsageError` for beds that rise."""
+    cycle, settled, load = ensemble.cycle, ensemble.settled, ensemble.load
+    gain, n = settled[:, -1] - settled[:, 0], ensemble.packings
+    if (rising := np.count_nonzero(~(gain > 0))) > 0:
+        raise UsageError(
+            f"{rising} of {len(gain)} beds rise from cycle {cycle[0]:.3g} to {cycle[-1]:.3g}",
+            remedy="settlement is positive downwards; leave out beds whose readings are wrong",
+        )
+    here = load == max(load, key=lambda one: (np.count_nonzero(load == one), one))
+    seated, a, b = fit_power(cycle, settled[here].mean(axis=0))
+    stiff, uneven = (centre(np.log(of), load) for of in (ensemble.bedding, gain))
+
+    steps = min(A_DECADE, (len(cycle) - 1) // 2)
+    ends = np.arange(len(cycle) - 1, -1, -steps)
+    gains = -np.diff(settled[:, ends], axis=1).T
+    logs = [centre(np.log(np.where(one > 0, one, np.nan)), load) for one in gains]
+    persistence = tuple(find_correlation(*pair, n) for pair in pairwise(logs))
+    late, early = gains[:2, here].mean(axis=1)
+    memory = Estimate(*(find_memory(r, late, early) for r in vars(persistence[0]).values()))
+    total = estimate_variation(uneven, load, n)
+    neighbours = find_likeness(uneven) if ensemble.in_order else Estimate()
+    return BedFit(
+        force=float(ensemble.force[here][0]), a=a, m=fit_load(ensemble, gain),
+        b=Estimate(b, *bound_exponent(cycle, settled[here])), seated=seated,
+        bed=float(np.mean(ensemble.bedding[here])) * SEAT_AREA,
+        stiffness=estimate_variation(stiff, load, n), total=total,
+        together=find_correlation(stiff, uneven, n), window=float(cycle[ends[0]] / cycle[ends[1]]),
+        persistence=persistence, rose=int(np.count_nonzero(~(gains > 0).all(axis=0))),
+        memory=memory, settlement=total.value / share_kept(gain[here].mean(), memory.value),
+        length=Estimate(*map(find_length, vars(neighbours).values())),
+        unseen=float(late / (cycle[ends[0]] - cycle[ends[1]])),
+    )  # fmt: skip
+
+
+def centre(logs: Floats, group: NDArray[np.int64]) -> Floats:
+    """Logarithms (n,) less the mean of those known of their ``group`` (n,)."""
+    centred = np.where(np.isfinite(logs), logs, np.nan)
+    for one in np.unique(group):
+        mine = (group == one) & np.isfinite(centred)
+        centred[mine] -= centred[mine].mean() if mine.any() else 0.0
+    return centred
+
+
+def fit_power(cycle: Floats, settled: Floats) -> tuple[float, float, float]:
+    """c [m], a [m] and b [-] of s = c + a N^b, by least squares over all cycles (k,)."""
+
+    def find_slope(b: float) -> tuple[float, float]:
+        x, y = cycle**b, settled - settled.mean()
+        x -= x.mean()
+        a = float(x @ y / (x @ x))
+        return a, float(((y - a * x) ** 2).sum())
+
+    found = minimize_scalar(lambda b: find_slope(b)[1], bounds=EXPONENTS, method="bounded",
+                            options={"xatol": 1e-6})  # fmt: skip
+    b = float(found.x)
+    a = find_slope(b)[0]
+    return float(settled.mean() - a * (cycle**b).mean()), a, b
+
+
+def bound_exponent(cycle: Floats, settled: Floats) -> tuple[float, float]:
+    """Interval of b, by leaving out each of the beds (n, k) in turn (jackknife)."""
+    n = len(settled)
+    left = np.array([fit_power(cycle, np.delete(settled, i, 0).mean(axis=0))[2] for i in range(n)])
+    b = fit_power(cycle, settled.mean(axis=0))[2]
+    half = t.ppf((1 + LEVEL) / 2, n - 1) * np.sqrt((n - 1) * left.var())
+    return b - half, b + half
+
+
+def fit_load(ensemble: Ensemble, gain: Floats) -> Estimate:
+    """m: slope of ln gain over ln load, within packings where they have several loads."""
+    x, y = np.log(ensemble.force), np.log(gain)
+    if not np.ptp(ensemble.load):
+        return Estimate()
+    within = len(np.unique(ensemble.packing)) < len(x)
+    group = ensemble.packing if within else np.zeros(len(x), int)
+    x, y = centre(x, group), centre(y, group)
+    freedom = len(x) - len(np.unique(group)) - 1
+    m = float(x @ y / (x @ x))
+    if freedom < 1:
+        return Estimate(m)
+    error = np.sqrt(((y - m * x) ** 2).sum() / freedom / (x @ x))
+    half = float(t.ppf((1 + LEVEL) / 2, freedom) * error)
+    return Estimate(m, m - half, m + half)
+
+
+def estimate_variation(logs: Floats, load: NDArray[np.int64], packings: int) -> Estimate:
+    """Coefficient of variation of lognormal numbers, from what is known of their centred
+    logarithms (n,)."""
+    known = np.isfinite(logs)
+    freedom = min(packings, int(np.count_nonzero(known))) - 1
+    spare = np.count_nonzero(known) - len(np.unique(load[known]))
+    if freedom < 1 or spare < 1:
+        return Estimate()
+    variance = float((logs[known] ** 2).sum()) / spare
+    bounds = freedom / chi2.ppf([(1 + LEVEL) / 2, (1 - LEVEL) / 2], freedom)
+    return Estimate(*(float(np.sqrt(np.expm1(variance * one))) for one in (1.0, *bounds)))
+
+
+def find_correlation(x: Floats, y: Floats, packings: int) -> Estimate:
+    """Correlation of two quantities (n,) where both are known; its interval after Fisher."""
+    both = np.isfinite(x) & np.isfinite(y)
+    if np.count_nonzero(both) < 3 or not (np.ptp(x[both]) and np.ptp(y[both])):
+        return Estimate()
+    r = float(np.corrcoef(x[both], y[both])[0, 1])
+    counted = min(packings, int(np.count_nonzero(both))) - 3
+    if counted < 1:
+        return Estimate(r, -1.0, 1.0)
+    half = norm.ppf((1 + LEVEL) / 2) / np.sqrt(counted)
+    score = np.arctanh(np.clip(r, -ONE, ONE))
+    return Estimate(r, float(np.tanh(score - half)), float(np.tanh(score + half)))
+
+
+def find_likeness(x: Floats) -> Estimate:
+    """Correlation of each with the next (n,); of beds that are alike fewer count (Bartlett)."""
+    r = find_correlation(x[1:], x[:-1], len(x)).value
+    return find_correlation(x[1:], x[:-1], int(len(x) * (1 - r**2))) if isfinite(r) else Estimate()
+
+
+def find_memory(persistence: float, late: float, early: float) -> float:
+    """L [m] of scatter with correlation e^(-|ds|/L), whose means over two adjacent windows of mean
+    settlements ``late`` and ``early`` [m] have this correlation; 0 where it is none."""
+
+    def miss(logarithm: float) -> float:
+        one, other = late / np.exp(logarithm), early / np.exp(logarithm)
+        common = np.expm1(-one) * np.expm1(-other)
+        own = 4 * (one + np.expm1(-one)) * (other + np.expm1(-other))
+        return float(common / np.sqrt(own) - persistence)
+
+    if not persistence > 0:
+        return 0.0 if persistence <= 0 else np.nan
+    longest = np.log(1e3 * (late + early))  # of the windows: correlation 0.9993
+    shortest = np.log(1e-3 * min(late, early))
+    if miss(longest) < 0:
+        return np.inf
+    return 0.0 if miss(shortest) > 0 else float(np.exp(brentq(miss, shortest, longest)))
+
+
+def share_kept(settlement: float, memory: float) -> float:
+    """Standard deviation of a mean over a ``settlement`` [m] of scatter with this ``memory`` [m],
+    for ever where it is not known, over that of the scatter [-]."""
+    x = settlement / max(SHORTEST_MEMORY, memory)
+    return float(np.sqrt(2 * (x + np.expm1(-x))) / x) if x > SMALL else 1.0
+
+
+def find_length(correlation: float) -> float:
+    """l [m] of e^(-x/l) from the correlation of neighbours; 0 where it is none."""
+    if not correlation > 0:
+        return 0.0 if correlation <= 0 else np.nan
+    return float(-Track().spacing / np.log(correlation)) if correlation < 1 else np.inf
