@@ -103,22 +103,27 @@ def draw_normal(seed: tuple[int, ...], shape: tuple[int, int], spacing: float,
     return np.asarray(lfilter([1.0], [1.0, -alike], white, axis=1))
 
 
-def renew_scores(beds: Beds, score: Floats, before: float, after: float) -> tuple[Floats, Floats]:
-    """Scores behind a mean settlement from ``before`` to ``after`` [m], and the mean of
-    `Beds.find_factors` on the way, (b, n) each.
+def renew_scores(
+    beds: Beds, score: Floats, before: Floats, after: Floats
+) -> tuple[Floats, Floats]:  # fmt: skip
+    """Scores behind a mean settlement of each line from ``before`` to ``after``, (b,) each [m], and
+    the mean of `Beds.find_factors` on the way, (b, n) each.
 
-    Scores are renewed at equal steps of settlement, whatever the blocks of axles are.
+    Scores are renewed at equal steps of settlement, whatever blocks and other lines are.
     """
-    if beds.scatter.memory is None or not after > before:
+    if beds.scatter.memory is None:
         return score, beds.find_factors(score)
     step, kept = beds.scatter.memory / STEPS_A_MEMORY, np.exp(-1 / STEPS_A_MEMORY)
-    total, here, spacing = np.zeros_like(score), before, float(beds.place[1] - beds.place[0])
-    for number in range(int(before / step) + 1, int(after / step) + 1):
-        total += (number * step - here) * beds.find_factors(score)
-        here = number * step
+    here, after = (np.broadcast_to(one, len(score))[:, None] for one in (before, after))
+    total, grown, spacing = np.zeros_like(score), after - here, beds.place[1] - beds.place[0]
+    for number in range(int(here.min() / step) + 1, int(after.max() / step) + 1):
+        due = (here < number * step) & (number * step <= after)
+        total += np.where(due, number * step - here, 0.0) * beds.find_factors(score)
+        here = np.where(due, number * step, here)
         fresh = draw_normal((beds.seed, RENEWAL, number), score.shape, spacing, beds.scatter.length)
-        score = kept * score + np.sqrt(1 - kept**2) * fresh
-    return score, (total + (after - here) * beds.find_factors(score)) / (after - before)
+        score = np.where(due, kept * score + np.sqrt(1 - kept**2) * fresh, score)
+    total += (after - here) * beds.find_factors(score)
+    return score, np.where(grown > 0, total / np.where(grown > 0, grown, 1.0), 1.0)
 
 
 def draw_beds(

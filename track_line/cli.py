@@ -98,7 +98,8 @@ def _run(file: SceneFile, path: Path, arguments: argparse.Namespace) -> dict[str
         "provenance": record_provenance(["trackbed", *sys.argv[1:]]),
     }
     given = {"resume": arguments.resume, "force": arguments.force}
-    if finished := folder.look_ahead(manifest, **given):
+    finished = folder.look_ahead(manifest, **given)
+    if finished and finished.get("limit_m") == file.limit:
         return finished | {"folder": str(path)}
     progress = Progress()
 

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Callable, Sequence
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from adapters.procedure.sweep import member as sweep_member
-from tests.small_bed import small_bed
+from tests.small_bed import read_rows, small_bed
 from track_line.measured import read_beds
 from trackbed.command import main
 
@@ -22,17 +20,12 @@ pytestmark = [
 ]
 
 
-def test_a_sweep_on_the_fake_engine(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_sweep_on_the_fake_engine(tmp_path, monkeypatch, capsys):
     """Two loads on three packings: pressures are mean + amplitude/2, settlements and stiffness
     those of the tables, jumps are named; the figures come out, whatever they are."""
 
-    def run(
-        words: Sequence[str], folder: Path, watch: Callable[[], None]
-    ) -> tuple[int, float, float]:
-        words = list(words)
-        return main([*words[words.index("trackbed") + 1 :]]), 0.0, 0.0
+    def run(words, folder, watch):
+        return main(words[words.index("trackbed") + 1 :]), 0.0, 0.0
 
     monkeypatch.setattr(sweep_member, "run_process", run)
     scene, into = tmp_path / "scene.toml", tmp_path / "sweep"
@@ -44,12 +37,10 @@ def test_a_sweep_on_the_fake_engine(
     np.testing.assert_allclose(beds.pressure, np.repeat([10612.5, 14150.0], 3))
     assert beds.packing.tolist() == [1, 2, 3, 1, 2, 3]
     with (into / "members.csv").open() as stream:
-        for bed, member in zip(beds.settled, csv.DictReader(stream), strict=True):
-            run_folder = into / member["run_folder"]
-            with (run_folder / "settlement.csv").open() as table:
-                rows = list(csv.DictReader(table))
-            late = [float(row["loaded_body_settlement"]) for row in rows[-5:]]
-            assert min(late) <= bed[-1] <= max(late)
+        runs = [into / row["run_folder"] for row in csv.DictReader(stream)]
+    for bed, run_folder in zip(beds.settled, runs, strict=True):
+        late = [float(row["loaded_body_settlement"]) for row in read_rows(run_folder)[-5:]]
+        assert min(late) <= bed[-1] <= max(late)
     assert (beds.bedding > 0).all()
     assert all("has jumps" in note for note in beds.notes)
     assert len(beds.notes) == 6

@@ -13,7 +13,7 @@ import numpy as np
 from track_line.arrays import Floats
 from track_line.scene.file import LEFT_OUT
 from track_line.scene.run import PLAN, RunFolder, collect_records
-from track_line.settling import Record
+from track_line.settling import BANDS, Record
 from trackbed.report import (
     make_list,
     make_page,
@@ -30,22 +30,30 @@ if TYPE_CHECKING:
 
 COLUMNS = (
     "axles", "tonnage_mgt", "settlement_m", "d1_low_m", "d1_median_m", "d1_high_m",
-    "hanging_over_0.1_mm", "hanging_over_1_mm",
+    "hanging_over_0.1_mm", "hanging_over_1_mm", "reached_limit",
 )  # fmt: skip
 CAPTION = (
-    "Standard deviation of D1 (3 to 25 m, EN 13848) of the loaded line in sections of about 200 m "
-    "(a shorter line is one): median, and the band of nine sections in ten, over all realisations; "
-    "the line is the limit."
+    "Above: standard deviation of D1 (3 to 25 m, EN 13848) of the loaded line in sections of about "
+    "200 m (a shorter line is one), median and the band of nine sections in ten over all "
+    "realisations, the line is the limit; and the share of sections that have reached it, whose "
+    "next tamping is due.  Below: root mean square of the loaded level in thirds of an octave, at "
+    "equal steps of tonnage; and where sleepers hang by more than 0.1 mm, as a share of the "
+    "realisations."
 )
+BLUE, RED = "#0b5fa5", "#d1495b"
+TIMES = 4
+"""Spectra that are drawn, at equal steps of tonnage to the last."""
 
 
-def tabulate_records(records: Sequence[Record], tonnage: float) -> Floats:
-    """A row for each record, in the order of `COLUMNS`; ``tonnage`` of all [MGT]."""
-    band = np.quantile(collect_records(records, "deviation"), PLAN.band, axis=(1, 2))
+def tabulate_records(records: Sequence[Record], tonnage: float, limit: float) -> Floats:
+    """A row for each record, in the order of `COLUMNS`; ``tonnage`` of all [MGT], ``limit`` [m]."""
+    deviation = collect_records(records, "deviation")
+    band = np.quantile(deviation, PLAN.band, axis=(1, 2))
+    reached = (np.maximum.accumulate(deviation) >= limit).mean(axis=(1, 2))
     settled = collect_records(records, "settlement").mean(axis=1)
     voids = collect_records(records, "voids").mean(axis=2)
     cycle = collect_records(records, "cycle")
-    return np.column_stack([cycle, tonnage * cycle / cycle[-1], settled, *band, *voids.T])
+    return np.column_stack([cycle, tonnage * cycle / cycle[-1], settled, *band, *voids.T, reached])
 
 
 def write_report(
@@ -54,13 +62,14 @@ def write_report(
 ) -> Path:  # fmt: skip
     """Write ``geometry.csv`` and the report of a finished run, with its picture if ``draw``; its
     path.  Raises as `write_whole`."""
-    table = tabulate_records(records, summary["tonnage_mgt"])
+    table = tabulate_records(records, summary["tonnage_mgt"], summary["limit_m"])
     lines = [",".join(COLUMNS), *(",".join(map(repr, row)) for row in table.tolist())]
     write_whole(folder.path / "geometry.csv", "\n".join(lines) + "\n")
     picture = None
     if draw:
         picture = save_figure(
-            lambda: draw_geometry(table, summary["limit_m"]), folder.path / "geometry.svg"
+            lambda: draw_geometry(table, summary["limit_m"], records, summary["length_m"]),
+            folder.path / "geometry.svg",
         )
     title = summary["title"] or "A line under its axles"
     rows = [
@@ -80,16 +89,35 @@ def write_report(
     return path
 
 
-def draw_geometry(table: Floats, limit: float) -> Figure:
-    """D1 with its band against tonnage, from the rows of `tabulate_records`."""
+def draw_geometry(
+    table: Floats, limit: float, records: Sequence[Record], length: float
+) -> Figure:  # fmt: skip
+    """D1 with its band and the sections at their limit against tonnage, from the rows of
+    `tabulate_records`; spectra of the level; voids over ``length`` [m] and tonnage."""
     from matplotlib.figure import Figure
 
-    _, tonnage, _, low, median, high, *_ = table.T
-    figure = Figure(figsize=(7, 3.6))
-    axes = figure.add_subplot()
-    axes.fill_between(tonnage, 1e3 * low, 1e3 * high, color="#0b5fa5", alpha=0.2, lw=0)
-    axes.plot(tonnage, 1e3 * median, color="#0b5fa5")
-    axes.axhline(1e3 * limit, color="#d1495b", lw=1)
-    axes.set(xlabel="MGT", ylabel="standard deviation of D1 [mm]")
-    axes.set(xlim=(0, tonnage[-1]), ylim=(0, None))
+    _, tonnage, _, low, median, high, _, _, reached = table.T
+    figure = Figure(figsize=(9, 6.4))
+    (deviation, tamping), (waves, voids) = figure.subplots(2, 2)
+    deviation.fill_between(tonnage, 1e3 * low, 1e3 * high, color=BLUE, alpha=0.2, lw=0)
+    deviation.plot(tonnage, 1e3 * median, color=BLUE)
+    deviation.axhline(1e3 * limit, color=RED, lw=1)
+    deviation.set(title="D1", ylabel="standard deviation [mm]", ylim=(0, None))
+    tamping.plot(tonnage, 100 * reached, color=RED)
+    tamping.set(title="Next tamping", ylabel="sections at their limit [%]", ylim=(0, 100))
+    for axes in (deviation, tamping):
+        axes.set(xlabel="MGT", xlim=(0, tonnage[-1]))
+    for part in np.arange(1, TIMES + 1) / TIMES:
+        at = int(np.argmin(abs(tonnage - part * tonnage[-1])))
+        level = np.where(records[at].spectrum > 0, 1e3 * records[at].spectrum, np.nan)
+        waves.plot(np.sqrt(BANDS[1:] * BANDS[:-1]), level, color=BLUE, alpha=part,
+                   label=f"{tonnage[at]:.3g} MGT")  # fmt: skip
+    waves.set(title="Spectrum", xlabel="wavelength [m]", xscale="log", ylabel="level [mm]",
+              yscale="log")  # fmt: skip
+    waves.legend()
+    hanging = 100 * np.array([one.hanging for one in records])
+    place = np.linspace(0, length, hanging.shape[1])
+    map_of_voids = voids.pcolormesh(place, tonnage, hanging, cmap="Reds", rasterized=True)
+    figure.colorbar(map_of_voids, label="hang [%]")
+    voids.set(title="Voids", xlabel="along the line [m]", ylabel="MGT")
     return figure

@@ -47,7 +47,7 @@ class RunFolder(run_folder.RunFolder):
         "geometry.svg", ".*.partial",
     )  # fmt: skip
     states = STATE
-    free = ("scene.title",)
+    free = ("scene.title", "scene.line.limit", "scene.line.speed")  # speed decides the limit alone
 
 
 def collect_records(records: Sequence[Record], name: str) -> Floats:
@@ -137,7 +137,7 @@ def summarise_run(file: SceneFile, records: Sequence[Record]) -> dict[str, Any]:
     tamping = np.quantile(crossings, PLAN.band, method="inverted_cdf")
     summary = {
         "title": file.tables.title, "law": file.tables.law.name, "source": line.law.source,
-        "validity": line.law.validity,
+        "validity": line.law.validity, "length_m": file.tables.line.length,
         "realisations": file.tables.line.realisations, "sections": crossings.size,
         "axles": last.cycle, "tonnage_mgt": float(tonnage[-1]), "blocks": len(tonnage) - 1,
         "settlement_m": float(last.settlement.mean()), "limit_m": file.limit,

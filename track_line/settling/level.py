@@ -37,6 +37,10 @@ ALERT = ((80, 2.3e-3), (120, 1.8e-3), (160, 1.4e-3), (230, 1.2e-3), (300, 1.0e-3
 """Speed up to which [km/h], standard deviation of D1 at the alert limit, its lower end [m]."""
 
 
+BANDS = 96.0 / 2 ** (np.arange(19) / 3)
+"""Ends of the bands of wavelength of a spectrum, each a third of an octave [m]."""
+
+
 def find_alert_limit(speed: float) -> float:
     """Standard deviation of D1 [m] at which to plan tamping, at a speed [m/s]."""
     return next((limit for most, limit in ALERT if 3.6 * speed <= most), ALERT[-1][1])
@@ -64,6 +68,20 @@ def measure_deviations(level: Floats, spacing: float) -> Floats:
     sections = max(1, round(inside.shape[1] * spacing / LEVEL.section))
     parts = np.array_split(inside, sections, axis=1)
     return np.stack([part.std(axis=1) for part in parts], axis=1)
+
+
+def measure_spectrum(level: Floats, spacing: float) -> Floats:
+    """Root mean square of levels (b, n) [m] in each of `BANDS`, over all lines, shape (bands,) [m].
+
+    Without the margins, through a Hann window; 0 where a line is too short for a band.
+    """
+    cut = round(LEVEL.margin / spacing)
+    inside = level[:, cut : level.shape[1] - cut]
+    n, window = inside.shape[1], np.hanning(inside.shape[1])
+    waves = np.fft.rfft((inside - inside.mean(axis=1, keepdims=True)) * window)
+    power = 2 * (abs(waves) ** 2).mean(axis=0) / (n * (window**2).sum())
+    total, _ = np.histogram(np.fft.rfftfreq(n, spacing), 1 / BANDS, weights=power)
+    return np.sqrt(total)
 
 
 def find_crossings(tonnage: Floats, deviation: Floats, limit: float) -> Floats:

@@ -12,7 +12,7 @@ from track_line.beam import Passage, rest_wheels, roll_axle
 from track_line.beds import renew_scores
 from track_line.laws import BedLoad
 from track_line.settling.blocks import find_block
-from track_line.settling.level import measure_deviations
+from track_line.settling.level import measure_deviations, measure_spectrum
 from track_line.settling.line import Line
 from trackbed.errors import NotConverged
 
@@ -51,6 +51,10 @@ class Record:
     """Share of sleepers that hang by more than each of `VOIDS`, shape (2, b) [-]."""
     deepest: Floats
     """Greatest gap, shape (b,) [m]."""
+    spectrum: Floats
+    """Root mean square of the level under the first axle in each of `level.BANDS`, (bands,) [m]."""
+    hanging: Floats
+    """Share of realisations in which each sleeper hangs by more than the first of `VOIDS`, (n,)."""
 
 
 def start_line(line: Line) -> State:
@@ -86,7 +90,7 @@ def _settle_block(line: Line, state: State, force: Floats, end: float, finer: fl
     load = BedLoad(force, line.support.bed)
     grown = line.law.advance_mixed(load, line.shares, state.hardened, state.cycle, cycles)
     hardened = state.hardened + grown
-    span = float(state.hardened.mean()), float(hardened.mean())
+    span = state.hardened.mean(axis=1), hardened.mean(axis=1)
     score, factor = renew_scores(line.beds, state.score, *span)
     cycle = end if cycles == end - state.cycle else state.cycle + cycles  # not by round-off
     settled = state.settled + factor * grown
@@ -104,5 +108,8 @@ def _take_record(line: Line, state: State, passage: Passage) -> Record:
     rest = rest_wheels(line.rail, line.support, state.settled, np.zeros(len(line.beds.place)))
     gap, settled = (a[:, line.inside] for a in (rest.gap, state.settled - line.beds.level))
     voids = np.array([(gap > least).mean(axis=1) for least in VOIDS])
-    deviation = measure_deviations(passage.level, line.track.spacing)
-    return Record(state.cycle, settled.mean(axis=1), deviation, voids, gap.max(axis=1))
+    seen = passage.level, line.track.spacing
+    return Record(
+        state.cycle, settled.mean(axis=1), measure_deviations(*seen), voids, gap.max(axis=1),
+        measure_spectrum(*seen), (gap > VOIDS[0]).mean(axis=0),
+    )  # fmt: skip

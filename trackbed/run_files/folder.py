@@ -181,18 +181,21 @@ class RunFolder:
         An empty folder is taken.  One with another scene's run, a finished run, or an unfinished
         run without ``resume``, raises `UsageError` and is left as it is, unless ``force``: then
         the run's own files are removed.  So does a folder with files of other people and no run,
-        always.
+        always.  A run that goes on with other `free` keys gets their scene and manifest.
         """
-        if self._judge(manifest, resume=resume, force=force):
-            return True
-        with whole.refuse_writing(self.path):
-            for pattern in self.own:
-                for path in self.path.glob(pattern):
-                    path.unlink()
+        if goes_on := self._judge(manifest, resume=resume, force=force):
+            there = whole.read_object(self.path / MANIFEST) or {}
+            if all(there.get(part) == manifest.get(part) for part in self.compared):
+                return True
+        else:
+            with whole.refuse_writing(self.path):
+                for pattern in self.own:
+                    for path in self.path.glob(pattern):
+                        path.unlink()
         whole.write_whole(self.path / "scene.toml", scene)
         content = {"format": FORMAT, **manifest}
         whole.write_whole(self.path / MANIFEST, json.dumps(content, indent=1) + "\n")
-        return False
+        return goes_on
 
     def look_ahead(
         self, manifest: Mapping[str, Any], *, resume: bool, force: bool
