@@ -27,9 +27,7 @@ CYCLES = np.unique(np.rint(np.geomspace(1, 1e4, 80)))
 A, B, M, AREA = 0.8e-3, 0.22, 1.4, 0.325
 
 
-def write_sweep(
-    folder: Path, factor: np.ndarray, *pressures: float, friction: float = 0.5
-) -> Path:  # fmt: skip
+def write_sweep(folder: Path, factor: np.ndarray, *pressures: float, friction: float = 0.5):
     """A folder as `trackbed sweep` leaves one: packings of the law c + A (p/46 kPa)^M N^B times
     their ``factor`` (n,), which spring by 50 um for each 46 kPa, times their factor."""
     members = ["member,material.friction,sample.seed,state,run_folder"]
@@ -92,9 +90,8 @@ def test_a_scene_runs_with_measured_beds(tmp_path, capsys):
     told = capsys.readouterr().err
     assert "note: one load shows no load dependence: m stays 1.6" in told
     manifest = json.loads((tmp_path / "line-run" / "manifest.json").read_text())["scene"]
-    law = manifest["law"]
-    assert (law["name"], set(law["parameters"])) == ("power", {"a", "b", "force"})
-    assert law["parameters"]["force"] == pytest.approx(46e3 * AREA, rel=1e-3)
+    assert set(manifest["law"]["parameters"]) == {"a", "b", "force"}
+    assert manifest["law"]["parameters"]["force"] == pytest.approx(46e3 * AREA, rel=1e-3)
     assert manifest["scatter"]["stiffness"] == 0.1
     assert manifest["scatter"]["together"] == pytest.approx(-1)
 
@@ -126,11 +123,9 @@ def test_memory_of_a_line_is_found_in_its_beds(tmp_path, memory):
         fit = fit_beds(read_beds(path))
         found.append((fit.memory.value, fit.settlement))
         assert fit.memory.low < fit.memory.value < fit.memory.high
-        assert fit.total.value < fit.settlement
         assert np.isnan(fit.force)
         assert fit.length.value < 0.4
     assert np.mean(found, axis=0) == pytest.approx([memory, 0.3], rel=0.14)
-    assert np.mean(found, axis=0)[1] == pytest.approx(0.3, rel=0.04)
 
 
 @pytest.mark.parametrize(("late", "early", "memory"), [(2.0, 1.0, 3.0), (1.0, 4.0, 0.5)])

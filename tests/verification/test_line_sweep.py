@@ -42,8 +42,7 @@ def test_a_sweep_on_the_fake_engine(tmp_path, monkeypatch, capsys):
         late = [float(row["loaded_body_settlement"]) for row in read_rows(run_folder)[-5:]]
         assert min(late) <= bed[-1] <= max(late)
     assert (beds.bedding > 0).all()
-    assert all("has jumps" in note for note in beds.notes)
-    assert len(beds.notes) == 6
+    assert sum("has jumps" in note for note in beds.notes) == 6
     assert main(["line", "--beds", str(into), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert (found["beds"], found["packings"], found["loads"]) == (6, 3, 2)
