@@ -75,13 +75,9 @@ def _run(file: SceneFile, path: Path, arguments: argparse.Namespace) -> dict[str
     """The whole run with its report; its summary."""
     from rigid_lcp.report import write_report
     from rigid_lcp.scene import RunFolder, make_simulation, run_scene, summarise_run
-    from trackbed.run_files import raise_on_signals, record_provenance, write_result
+    from trackbed.run_files import make_manifest, open_run, write_result
 
-    folder = RunFolder(path)
-    manifest = {
-        "scene": file.tables.model_dump(mode="json"),
-        "provenance": record_provenance(["trackbed", *sys.argv[1:]]),
-    }
+    folder, manifest = RunFolder(path), make_manifest(file.tables.model_dump(mode="json"))
     given = {"resume": arguments.resume, "force": arguments.force}
     if finished := folder.look_ahead(manifest, **given):
         return finished | {"folder": str(path)}
@@ -92,9 +88,7 @@ def _run(file: SceneFile, path: Path, arguments: argparse.Namespace) -> dict[str
         progress.report(now, end, f"{now:.4g} of {end:.4g} s, {len(run.contacts)} contacts")
 
     kept = "every finished frame is saved"
-    remedy = "the same command with --resume goes on from the last one"
-    with folder.lock(), raise_on_signals(kept, remedy, str(path)):
-        goes_on = folder.prepare(manifest, file.text, **given)
+    with open_run(folder, manifest, file.text, arguments, kept) as goes_on:
         run_scene(file, run, folder, resume=goes_on, progress=show)
         summary = summarise_run(file, scene, run, folder)
         write_report(folder, scene, manifest, summary, draw=not arguments.no_pictures)

@@ -90,13 +90,9 @@ def _fit_beds(arguments: argparse.Namespace) -> list[str]:
 def _run(file: SceneFile, path: Path, arguments: argparse.Namespace) -> dict[str, Any]:
     """The whole run with its report; its summary."""
     from track_line.scene import PLAN, RunFolder, run_scene, summarise_run, write_report
-    from trackbed.run_files import raise_on_signals, record_provenance, write_result
+    from trackbed.run_files import make_manifest, open_run, write_result
 
-    folder = RunFolder(path)
-    manifest = {
-        "scene": file.tables.model_dump(mode="json"),
-        "provenance": record_provenance(["trackbed", *sys.argv[1:]]),
-    }
+    folder, manifest = RunFolder(path), make_manifest(file.tables.model_dump(mode="json"))
     given = {"resume": arguments.resume, "force": arguments.force}
     finished = folder.look_ahead(manifest, **given)
     if finished and finished.get("limit_m") == file.limit:
@@ -106,9 +102,8 @@ def _run(file: SceneFile, path: Path, arguments: argparse.Namespace) -> dict[str
     def show(now: float, end: float, blocks: int) -> None:
         progress.report(now**0.2, end**0.2, f"{now:.3g} of {end:.3g} axles, {blocks} blocks")
 
-    kept, remedy = "the last saved state is kept", "the same command with --resume goes on from it"
-    with folder.lock(), raise_on_signals(kept, remedy, str(path)):
-        goes_on = folder.prepare(manifest, file.text, **given)
+    kept = "the last saved state is kept"
+    with open_run(folder, manifest, file.text, arguments, kept) as goes_on:
         records = run_scene(file, folder, resume=goes_on, progress=show)
         summary = summarise_run(file, records)
         write_report(folder, records, manifest, summary, draw=not arguments.no_pictures)

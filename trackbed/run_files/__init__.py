@@ -1,7 +1,14 @@
 """Run folders: one lock, whole files with digests, provenance, signals."""
 
 from trackbed.run_files import folder
-from trackbed.run_files.arguments import Progress, add_run_arguments, place_run, time_step
+from trackbed.run_files.arguments import (
+    Progress,
+    add_run_arguments,
+    make_manifest,
+    open_run,
+    place_run,
+    time_step,
+)
 from trackbed.run_files.folder import (
     MANIFEST,
     RESULT,
@@ -31,8 +38,8 @@ from trackbed.run_files.whole import (
 __all__ = [
     "MANIFEST", "RESULT", "Progress", "add_run_arguments", "append_text", "digest_file",
     "folder", "is_written", "list_changed_tables", "list_differences", "lock_folder",
-    "note_interrupts", "note_signals", "open_unlinked", "place_run", "raise_on_signals",
-    "read_object", "record_provenance", "refuse_format", "refuse_links", "refuse_writing",
-    "replace_file", "seal_file", "sync_folder", "time_step", "write_pvd", "write_result",
-    "write_whole",
+    "make_manifest", "note_interrupts", "note_signals", "open_run", "open_unlinked", "place_run",
+    "raise_on_signals", "read_object", "record_provenance", "refuse_format", "refuse_links",
+    "refuse_writing", "replace_file", "seal_file", "sync_folder", "time_step", "write_pvd",
+    "write_result", "write_whole",
 ]  # fmt: skip

@@ -6,11 +6,15 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from trackbed.errors import UsageError
+from trackbed.run_files.folder import RunFolder
+from trackbed.run_files.provenance import record_provenance
+from trackbed.run_files.signals import raise_on_signals
 
 TRIAL = 0.5
 """Time that a dry run may spend on trial steps to find the cost [s]."""
@@ -54,6 +58,25 @@ def place_run(arguments: argparse.Namespace) -> Path:
         raise UsageError("--resume and --force exclude each other", remedy="give one of them")
     scene: Path = arguments.scene
     return arguments.run_folder or scene.with_name(f"{scene.stem}-run")
+
+
+def make_manifest(scene: dict[str, Any]) -> dict[str, Any]:
+    """What a run folder keeps of a ``scene`` that the command line asks for."""
+    return {"scene": scene, "provenance": record_provenance(["trackbed", *sys.argv[1:]])}
+
+
+@contextmanager
+def open_run(
+    folder: RunFolder, manifest: Mapping[str, Any], scene: str, arguments: argparse.Namespace,
+    kept: str,
+) -> Iterator[bool]:  # fmt: skip
+    """Hold the ``folder`` of a run, made ready by `RunFolder.prepare`; gives whether a run goes on.
+
+    ``kept`` says what a signal leaves.  Raises as `RunFolder.prepare`, and `Interrupted`.
+    """
+    remedy = "the same command with --resume goes on from there"
+    with folder.lock(), raise_on_signals(kept, remedy, str(folder.path)):
+        yield folder.prepare(manifest, scene, resume=arguments.resume, force=arguments.force)
 
 
 def time_step(advance: Callable[[float], object], step: float, most: int) -> float:
