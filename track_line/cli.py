@@ -37,12 +37,12 @@ def run_line(arguments: argparse.Namespace) -> int:
     from track_line.scene import load_scene, preview_run
 
     _refuse_no_scene(arguments)
-    settings = _fit_beds(arguments) if arguments.beds else []
+    settings, doubts = _fit_beds(arguments) if arguments.beds else ([], [])
     if arguments.scene is None:
         return 0
     path = place_run(arguments)
     file = load_scene(arguments.scene, [*settings, *arguments.overrides])
-    answer = preview_run(file) if arguments.dry_run else _run(file, path, arguments)
+    answer = preview_run(file) if arguments.dry_run else _run(file, path, arguments, doubts)
     sentence = "" if arguments.json else answer.pop("sentence", "")
     print_fields(answer, arguments.json)
     if sentence:
@@ -61,8 +61,8 @@ def _refuse_no_scene(arguments: argparse.Namespace) -> None:
         )  # fmt: skip
 
 
-def _fit_beds(arguments: argparse.Namespace) -> list[str]:
-    """Fit measured beds and say what they know; the keys of a scene that they give."""
+def _fit_beds(arguments: argparse.Namespace) -> tuple[list[str], list[str]]:
+    """Fit measured beds and say what they know; the keys of a scene that they give, and doubts."""
     from track_line.measured import (
         fit_beds,
         format_figures,
@@ -84,15 +84,18 @@ def _fit_beds(arguments: argparse.Namespace) -> list[str]:
             print(format_figures(figures), "", *keys, "", *doubts, sep="\n")
     else:
         print(*(f"note: {one}" for one in (*settings, *doubts)), sep="\n", file=sys.stderr)
-    return settings
+    return settings, doubts
 
 
-def _run(file: SceneFile, path: Path, arguments: argparse.Namespace) -> dict[str, Any]:
-    """The whole run with its report; its summary."""
+def _run(
+    file: SceneFile, path: Path, arguments: argparse.Namespace, doubts: list[str]
+) -> dict[str, Any]:  # fmt: skip
+    """The whole run with its report, which says the ``doubts`` about its beds; its summary."""
     from track_line.scene import PLAN, RunFolder, run_scene, summarise_run, write_report
     from trackbed.run_files import make_manifest, open_run, write_result
 
     folder, manifest = RunFolder(path), make_manifest(file.tables.model_dump(mode="json"))
+    manifest["beds"] = doubts
     given = {"resume": arguments.resume, "force": arguments.force}
     finished = folder.look_ahead(manifest, **given)
     if finished and finished.get("limit_m") == file.limit:

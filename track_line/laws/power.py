@@ -29,8 +29,8 @@ class Power(Law):
 
     formula = "s = a (F/F0)^m N^b"
     source = (
-        "form: Monismith et al. 1975; m: Hettler 1984, quoted from memory; a, b: an example, to be "
-        "replaced by a fit"
+        "form: Monismith et al. 1975; m: Hettler 1984, quoted from memory; a, b: an example where "
+        "a scene gives no fit"
     )
     validity = "the cycles and the ballast it was fitted to; no collapse, no threshold"
 

@@ -81,7 +81,9 @@ def write_report(
         make_paragraph(escape(summary["sentence"]), "claim"),
         make_picture(picture, CAPTION, escape(CAPTION)),
         make_section("Figures", make_table("", (), rows)),
-        make_section("Left out", make_list(escape(text) for text in LEFT_OUT)),
+        make_section(
+            "Left out", make_list(escape(text) for text in (*manifest["beds"], *LEFT_OUT))
+        ),
         make_section("Again", f"<pre>{escape(json.dumps(manifest['provenance'], indent=1))}</pre>"),
     ]
     path = folder.path / "report.html"
