@@ -112,3 +112,54 @@ STONES = (
     .replace("atom_modify map array", "atom_modify map array sort 0 0")
 )
 """`LIGGGHTS` with stones of two overlapping spheres."""
+YADE = """\
+# a bed of my own, from before trackbed
+from yade import plot, qt
+import helpers
+qt.View()
+readParamsFromTable(weight=30.0)
+from yade.params.table import *
+O.materials.append(FrictMat(young=5e6, poisson=0.3, density=2500, frictionAngle=0.5))
+O.bodies.append(geom.facetBox((0.03, 0.03, 0.1), (0.03, 0.03, 0.1), wallMask=31))
+for k in range(40):
+    x, y, z = 0.01 + k % 3 * 0.018, 0.01 + k // 3 % 3 * 0.018, 0.01 + k // 9 * 0.018
+    if k % 2:
+        O.bodies.append(sphere((x, y, z), 0.005 + 1e-4 * (k % 7)))
+    else:
+        O.bodies.appendClumped([sphere((x + s * 0.003, y, z), 0.005) for s in (0, 1)])
+O.engines = [
+    ForceResetter(),
+    InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Facet_Aabb(), Bo1_Wall_Aabb()]),
+    InteractionLoop(
+        [Ig2_Sphere_Sphere_ScGeom(), Ig2_Facet_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom()],
+        [Ip2_FrictMat_FrictMat_FrictPhys()], [Law2_ScGeom_FrictPhys_CundallStrack()],
+    ),
+    NewtonIntegrator(damping=0.3, gravity=(0, 0, -9.81), label="newton"),
+    PyRunner(command="count()", iterPeriod=100),
+]
+O.dt = 2e-5
+seen, plate = {"calls": 0, "cycles": 0}, None
+
+def count():
+    seen["calls"] += 1
+    plot.addData(i=O.iter)
+
+O.run(20000)
+O.wait()
+start = seen["calls"]
+top = max(b.state.pos[2] + b.shape.radius for b in O.bodies if isinstance(b.shape, Sphere))
+plate = O.bodies[O.bodies.append(wall(top, axis=2, sense=-1))]
+# trackbed: cycle
+newton.gravity = helpers.pull(weight)
+plate.state.vel = (0, 0, -0.02)
+O.run(400, True)
+newton.gravity = helpers.pull(9.81)
+plate.state.vel = (0, 0, 0.02)
+O.run(400, True)
+seen["cycles"] += 1
+assert seen["calls"] == len(plot.data["i"]) == start + 8 * seen["cycles"]
+# trackbed: end
+"""
+"""Spheres and clumps under a plate; functions, variables, a body, an engine and what is plotted
+are used in the cycle."""
+HELPERS = "def pull(g):\n    return 0, 0, -g\n"

@@ -193,12 +193,17 @@ SAVE_S = 600
 
 
 def save_scene():
-    """Write ``end.restart``; raises OSError or EOFError when it is not whole, as on a full disk.
+    """Write ``end.restart`` as `write_scene`, without what belongs to this script."""
+    O.engines = O.engines[:3]  # the commands of the others belong to this script
+    write_scene("end.restart")
+
+
+def write_scene(path):
+    """Write the scene; raises OSError or EOFError when it is not whole, as on a full disk.
 
     On a full disk YADE would try to write for ever: so the room is asked for before.  Should
     another process take it just then, an alarm ends this one.
     """
-    O.engines = O.engines[:3]  # the commands of the others belong to this script
     with open(SAVED, "wb") as stream:
         os.posix_fallocate(stream.fileno(), 0, ROOM + ROOM_OF_BODY * len(O.bodies))
     signal.alarm(SAVE_S)
@@ -207,13 +212,13 @@ def save_scene():
     with gzip.open(SAVED) as stream:
         while stream.read(1 << 20):
             pass
-    os.replace(SAVED, "end.restart")
+    os.replace(SAVED, path)
 
 
-def load_scene():
-    """Read ``start.restart``."""
+def load_scene(path="start.restart"):
+    """Read what `write_scene` wrote."""
     saved = "start.yade.gz"
-    os.symlink("start.restart", saved)
+    os.symlink(path, saved)
     try:
         O.load(saved)
     finally:

@@ -23,8 +23,9 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
         "go to a folder beside it",
     )  # fmt: skip
     parser.add_argument(
-        "--engine", required=True, choices=("liggghts", "lammps"), help="that it is written for"
-    )
+        "--engine", required=True, choices=("liggghts", "lammps", "yade"),
+        help="that it is written for",
+    )  # fmt: skip
     parser.add_argument(
         "--check", action="store_true",
         help="run two cycles in one process and in windows, and print the difference",
@@ -90,6 +91,7 @@ def check(adoption: Adoption) -> None:
             "windows of this deck compute another bed than one process does",
             where=str(adoption.deck.path),
             remedy="look for what the engine keeps in no restart file: phases of motions, "
-            "insertions, forces read where a run begins",
+            "insertions, forces read where a run begins; a bed that still falls or flows parts by "
+            "chaos alone, so mark a shorter cycle, of a bed at rest",
         )  # fmt: skip
     keep_check(adoption.scene, bed)

@@ -15,8 +15,9 @@ from adapters.decks.detect import (
     list_contents,
 )
 from adapters.decks.engine import list_inputs, list_output_folders
-from adapters.decks.parse import BEGIN, END, Deck, read_deck
-from adapters.decks.scene import is_deck_scene
+from adapters.decks.parse import BEGIN, END, Deck
+from adapters.decks.scene import is_deck_scene, read_marked
+from adapters.decks.scripts import add_script_marks
 from adapters.errors import UsageError
 from trackbed.run_files import refuse_writing, write_whole
 
@@ -26,7 +27,7 @@ SCENE = """\
 [deck]
 file = {file}
 engine = "{engine}"
-loaded_body = "{body}"  # ID of a mesh that stands for the sleeper; "": the mean grain alone
+loaded_body = "{body}"  # mesh, or body in a script's variable, of the sleeper; "": the mean grain
 
 [procedure]
 total_cycles = 200  # computed and jumped; trackbed new karrech FOLDER explains what else there is
@@ -58,16 +59,18 @@ def adopt(path: Path, engine: str) -> Adoption:
     path = path.absolute()
     if not path.name.isprintable():  # a scene could not name it
         raise UsageError("the deck's name is no text", where=ascii(path.name), remedy="rename it")
-    marked, found, copy = read_deck(path), list[Finding](), path
+    marked, found, copy = read_marked(path, engine), list[Finding](), path
     if not (is_deck_scene(path.parent / "scene.toml") and marked.marks):
         if marked.marks is None:
-            if not any(one.name == "run" and one.file == path.name for one in marked.before):
+            runs = any(one.name == "run" and one.file == path.name for one in marked.before)
+            if not (runs or marked.is_script):
                 raise UsageError(
                     "nothing is run in this deck, so there is no load cycle", where=str(path),
                     remedy=f"put '{BEGIN}' above the commands of one cycle, '{END}' below them",
                 )  # fmt: skip
-            lines, said = add_marks(marked)
-            marked, found = read_deck(path, lines), [said]
+            add = add_script_marks if marked.is_script else add_marks
+            lines, said = add(marked)
+            marked, found = read_marked(path, engine, lines), [said]
         found += [one for one in find_obstacles(marked, engine) if one.kind == "added"]
         name = path.name.removeprefix("in.").partition(".")[0] or "deck"
         folder = path.parent / name
@@ -78,11 +81,11 @@ def adopt(path: Path, engine: str) -> Adoption:
             write_new(folder / one, (path.parent / one).read_bytes())
         text, copy = "\n".join(add_lines(marked, found)) + "\n", folder / path.name
         write_new(copy, text.encode(errors="surrogateescape"))
-        body = list_contents(marked).loaded_body if engine == "liggghts" else ""
+        body = list_contents(marked).loaded_body if engine != "lammps" else ""
         file = json.dumps(path.name, ensure_ascii=False)
         text = SCENE.format(name=name, file=file, engine=engine, body=body)
         write_new(folder / "scene.toml", text.encode())
-    deck = read_deck(copy)
+    deck = read_marked(copy, engine)
     found += find_obstacles(deck, engine)
     return Adoption(copy.with_name("scene.toml"), deck, list_contents(deck), tuple(found))
 

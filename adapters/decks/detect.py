@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 
+from adapters.decks.findings import Contents, Finding, note, stop
 from adapters.decks.parse import BEGIN, END, Command, Deck, is_outside
+from adapters.decks.scripts import find_script_obstacles, list_script_contents
 from adapters.decks.split import BOX, KEYED, find_named, list_live
 
 INSERTION = re.compile(r"insert/.*|pour|deposit")
@@ -26,48 +27,10 @@ AVERAGES = ("print", "ave/time", "ave/chunk")
 """Commands, and styles of fixes, that write files."""
 
 
-@dataclass(frozen=True)
-class Finding:
-    """Something of a deck that its user should know."""
-
-    kind: str  # "stops": no window is right; "added": put into the marked copy; "note"
-    place: str  # file and line; empty for the deck as a whole
-    what: str
-    remedy: str = ""
-    above: str = ""  # above which mark the remedy is added: "cycle" or "end"
-
-    def __str__(self) -> str:
-        where = f"{self.place}: " if self.place else ""
-        return f"{where}{self.what}" + (f"\n    -> {self.remedy}" if self.remedy else "")
-
-
-def stop(one: Command, what: str, remedy: str) -> Finding:
-    """A finding with which no window is right."""
-    return Finding("stops", one.place, what, remedy)
-
-
-def note(one: Command, what: str, remedy: str = "") -> Finding:
-    """A finding to think of."""
-    return Finding("note", one.place, what, remedy)
-
-
-@dataclass(frozen=True)
-class Contents:
-    """What a deck has of what cycle jumps need."""
-
-    groups: tuple[str, ...]
-    clumps: tuple[str, ...]  # fixes that hold grains of several spheres together
-    meshes: dict[str, str]  # mesh -> style
-    moved: dict[str, str]  # mesh -> what moves it
-
-    @property
-    def loaded_body(self) -> str:
-        """The mesh that is driven, where there is one alone; else empty."""
-        return next(iter(self.moved)) if len(self.moved) == 1 else ""
-
-
 def list_contents(deck: Deck) -> Contents:
     """What is in a deck: groups, clumps, meshes and which of them move."""
+    if deck.is_script:
+        return list_script_contents(deck)
     fixes = find_named(deck.before, "fix")
     fixes |= {one.word(1): one for one in deck.cycle if one.name == "fix"}
     styles = {name: one.word(3) for name, one in fixes.items()}
@@ -87,6 +50,8 @@ def list_contents(deck: Deck) -> Contents:
 
 def find_obstacles(deck: Deck, engine: str) -> list[Finding]:
     """All findings of a marked deck, in the order of its lines where they have one."""
+    if engine == "yade":
+        return list(find_script_obstacles(deck))
     found = [one for rule in RULES for one in rule(deck, engine)]
     order = {one.place: n for n, one in reversed(list(enumerate(deck.commands)))}
     return sorted(found, key=lambda one: order.get(one.place, -1))

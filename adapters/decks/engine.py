@@ -12,18 +12,25 @@ from types import SimpleNamespace
 from typing import cast
 
 from adapters.decks.parse import VARIABLE, Deck, is_outside
-from adapters.engines import get_engine, run_process
+from adapters.decks.scripts import format_script
+from adapters.decks.split import format_prepare, format_whole, format_window
+from adapters.engines import copy_deck, get_engine, run_process
 from adapters.errors import EngineFailed
 from adapters.scene import Scene
 from trackbed.run_files import write_whole
 
 COMPLETE = re.compile(r"^COMPLETE step \d+", re.MULTILINE)
+FAILED = re.compile(r"ERROR.* .|\w+(Error|Exception): ")
+"""How a line begins that says why an engine, or a script in YADE, ends."""
 SILENT_S = 7200.0
 """Without a word in any file before an engine is ended [s], as of every engine here."""
 MEANT = {
     "Atom::grow() callback": "LAMMPS says so where a wall's region is missing: declare the region "
     "above the fix",
     "Lost atoms": "grains left the box: look at the last state, or take a shorter time step",
+    "NameError": "of what stands above the cycle, a window has imports, functions and classes not "
+    "inside of if or try, numbers, texts, vectors, arrays, bodies and lists of these: make other "
+    "things between the marks, and give an engine a label",
     "reuse of fix ID": "a fix is made in each cycle: undo it above '# trackbed: end'",
 }
 """What an engine says, and what that means in a deck."""
@@ -34,8 +41,8 @@ class Adopted:
     """A marked deck and what runs it."""
 
     deck: Deck
-    engine: str  # liggghts or lammps
-    loaded: tuple[str, str] | None = None  # name and style of the loaded body's mesh
+    engine: str  # liggghts, lammps or yade
+    loaded: tuple[str, str] | None = None  # name and style of the loaded body
     stones: str = ""  # fix that holds the spheres of each stone together; empty for spheres
     launcher: tuple[str, ...] = ()  # words before the engine's command line
 
@@ -62,12 +69,26 @@ def list_output_folders(deck: Deck) -> list[Path]:
     return sorted(found)
 
 
+def format_run(bed: Adopted, kind: str, cycles: int) -> str:
+    """The deck of a stage: prepare, window or whole by ``kind``, of ``cycles`` load cycles."""
+    if bed.engine == "yade":
+        return format_script(bed.deck, kind, cycles, bed.loaded[0] if bed.loaded else "")
+    if kind == "prepare":
+        return format_prepare(bed.deck, bed.engine)
+    return (format_window if kind == "window" else format_whole)(bed.deck, bed.engine, cycles)
+
+
 def run_deck(bed: Adopted, text: str, path: Path) -> float:
     """Write a deck to ``path``, run it in that folder, and return the CPU time [s].
 
     Raises `EngineMissing`, and `EngineFailed` where the deck did not come to its end.
     """
     folder, inputs = path.parent, list_inputs(bed.deck)
+    if bed.deck.is_script:
+        path, inputs = path.with_suffix(".py"), [*inputs, Path(bed.deck.path.name)]
+        ours = folder / "yade_scripts"
+        ours.mkdir(exist_ok=True)
+        copy_deck(ours, ("__init__.py", "adopted.py", "record.py"), ours.name)
     for inner in (*list_output_folders(bed.deck), *(name.parent for name in inputs)):
         (folder / inner).mkdir(parents=True, exist_ok=True)
     lent = {}
@@ -93,7 +114,7 @@ def run_deck(bed: Adopted, text: str, path: Path) -> float:
 def explain_failure(status: int, text: str, deck: Path) -> EngineFailed:
     """The error for a deck that ended early, with the engine's own words."""
     lines = [line.strip() for line in text.splitlines() if line.strip()]
-    said = [line for line in lines if line.startswith("ERROR")] or lines[-2:]
+    said = [line for line in lines if FAILED.match(line)] or lines[-2:]
     remedy = next((meaning for words, meaning in MEANT.items() if words in text), "")
     error = EngineFailed(
         f"the engine ended with status {status}: {' | '.join(said[-2:])}", where=str(deck),

@@ -76,6 +76,11 @@ class Deck:
     marks: tuple[int, int] | None  # lines of the two marks, from 1; None without
 
     @property
+    def is_script(self) -> bool:
+        """Whether it is one of Python, for YADE."""
+        return self.path.suffix == ".py"
+
+    @property
     def commands(self) -> tuple[Command, ...]:
         """All commands in order."""
         return self.before + self.cycle + self.after

@@ -22,11 +22,10 @@ import numpy as np
 from adapters.bed import State
 from adapters.decks.check import digest_deck, is_checked
 from adapters.decks.detect import find_obstacles
-from adapters.decks.engine import Adopted, run_deck
+from adapters.decks.engine import Adopted, format_run, run_deck
 from adapters.decks.jump import jump, keep_held
 from adapters.decks.restart import find_mesh, move_grains, move_stones
 from adapters.decks.scene import load_deck_scene
-from adapters.decks.split import format_prepare, format_window
 from adapters.decks.states import States, find_overlap, load_states, read_states, save_states
 from adapters.engines import allow_interrupts, get_engine
 from adapters.errors import EngineFailed, NotCredible, SceneError
@@ -129,8 +128,7 @@ def settle(run: DeckRun, jumps: bool) -> None:
     p, k = run.procedure, run.procedure.window_cycles
     if run.folder.outcome("preparation") is None:
         started, folder = time.process_time(), run.folder.begin("preparation")
-        text = format_prepare(run.bed.deck, run.bed.engine)
-        cost = run_deck(run.bed, text, folder / "prepare.in")
+        cost = run_deck(run.bed, format_run(run.bed, "prepare", 0), folder / "prepare.in")
         finish(run, folder, Place(0, ""), [], read_states(folder, 0, 0, run.bed), cost, started)
     place = compute(run, Place(0, "preparation"), p.k_i)
     place = compute(run, place, min(k, p.total_cycles - place.cycle))
@@ -156,7 +154,7 @@ def compute(run: DeckRun, place: Place, cycles: int, healing: int = 0) -> Place:
         )  # fmt: skip
         folder, before = run.folder.begin(name), start.energy.max()
         start = write_start(run, place, start, folder)
-        cost = run_deck(bed, format_window(bed.deck, bed.engine, cycles), folder / "window.in")
+        cost = run_deck(bed, format_run(bed, "window", cycles), folder / "window.in")
         states = read_states(folder, 1, cycles, bed).behind(start)
         after = states.energy[healing:].max()
         if place.jumped and after > CALM * before:
@@ -175,13 +173,16 @@ def write_start(run: DeckRun, place: Place, states: States, folder: Path) -> Sta
     if place.jumped:
         with np.load(run.folder.path / place.jumped / "moved.npz") as data:
             move, drop = data["move"], float(data["drop"])
-        if bed.stones:
+        if bed.deck.is_script:
+            np.savez(folder / "moved.npz", identifier=states.identifier, move=move, drop=drop)
+        elif bed.stones:
             move_stones(restart, bed.stones, states.identifier, move)
         else:
             last = states.last
             move_grains(restart, states.identifier, last[:, 1:4], last[:, 4:], move)
-        for height in find_mesh(restart, *bed.loaded) if bed.loaded else ():
-            height -= drop
+        if bed.loaded and not bed.deck.is_script:
+            for height in find_mesh(restart, *bed.loaded):
+                height -= drop
     (folder / "cycle_0.restart").write_bytes(restart)
     return replace(states, position=states.position + move, height=states.height - drop)
 

@@ -11,7 +11,9 @@ from pydantic import Field
 
 from adapters.decks.detect import list_contents
 from adapters.decks.engine import Adopted
-from adapters.decks.parse import read_deck
+from adapters.decks.parse import Deck, read_deck
+from adapters.decks.scripts import read_script
+from adapters.errors import UsageError
 from adapters.laws import get_law
 from adapters.moves import get_move
 from adapters.scene import Procedure, expand_schedule, fill_procedure
@@ -29,9 +31,10 @@ class DeckTable(Table):
     """A marked deck of the user's own."""
 
     file: Text  # from the scene's folder
-    engine: Literal["liggghts", "lammps"]
+    engine: Literal["liggghts", "lammps", "yade"]
     loaded_body: str = ""
-    """Mesh whose settlement is asked for, and which a jump lowers; none: that of the mean grain."""
+    """Mesh, or variable of a script that holds a body, whose settlement is asked for, and which a
+    jump lowers; none: that of the mean grain."""
     launcher: Annotated[tuple[Annotated[str, Field(min_length=1)], ...], Field(strict=False)] = ()
     """Words before the engine's command line, such as ("mpirun", "-np", "4")."""
 
@@ -41,6 +44,19 @@ class DeckScene(Table):
 
     deck: DeckTable
     procedure: Procedure
+
+
+def read_marked(path: Path, engine: str, lines: Sequence[str] | None = None) -> Deck:
+    """Read a deck of an engine, or a script; raises as `read_deck`."""
+    if why := explain_ending(path, engine):
+        raise UsageError(why, where=str(path), remedy="give the engine that it is written for")
+    return (read_script if engine == "yade" else read_deck)(path, lines)
+
+
+def explain_ending(path: Path, engine: str) -> str:
+    """Why a file of this name is no deck of an engine; empty where it may be."""
+    ends = path.suffix == ".py"
+    return "" if ends == (engine == "yade") else "scripts of YADE, and no other decks, end with .py"
 
 
 def is_deck_scene(path: Path) -> bool:
@@ -69,9 +85,12 @@ def load_deck_scene(path: Path, overrides: Sequence[str] = ()) -> tuple[DeckScen
         problems.append(Problem("procedure.total_cycles", what))
     if p.h is None or p.k is None:
         problems.append(Problem("procedure", "missing: give k and h, or leave both out"))
-    deck = read_deck(path.parent / scene.deck.file)
+    file = path.parent / scene.deck.file
+    if why := explain_ending(file, scene.deck.engine):
+        text.refuse([*problems, Problem("deck.engine", why)])
+    deck = read_marked(file, scene.deck.engine)
     contents = list_contents(deck)
-    meshes = contents.meshes if scene.deck.engine == "liggghts" else {}
+    meshes = contents.meshes if scene.deck.engine != "lammps" else {}
     if deck.marks is None:
         problems.append(Problem("deck.file", "no load cycle is marked there: trackbed adopt DECK"))
     if body and body not in meshes:
@@ -81,6 +100,7 @@ def load_deck_scene(path: Path, overrides: Sequence[str] = ()) -> tuple[DeckScen
     get_law(p.law)
     get_move(p.move)
     loaded = (body, meshes[body]) if body else None
-    stones = [one.partition(" ")[0] for one in contents.clumps if "(multisphere" in one]
+    clumps = contents.clumps if deck.is_script else ()
+    stones = clumps or [one.partition(" ")[0] for one in contents.clumps if "(multisphere" in one]
     bed = Adopted(deck, scene.deck.engine, loaded, "".join(stones[:1]), scene.deck.launcher)
     return scene, bed

@@ -18,6 +18,8 @@ from trackbed.run_files import replace_file
 
 CENTRE, VELOCITY = ("x", "y", "z"), ("vx", "vy", "vz")
 """Columns of a dump."""
+PER_CYCLE = ("position", "velocity", "height")
+"""What states have of each cycle."""
 
 
 @dataclass(frozen=True)
@@ -45,9 +47,8 @@ class States:
 
     def behind(self, start: States) -> States:
         """The last state of ``start``, and these behind it."""
-        names = ("position", "velocity", "height")
-        pairs = ((getattr(start, name)[-1:], getattr(self, name)) for name in names)
-        return replace(self, **dict(zip(names, map(np.concatenate, pairs), strict=True)))
+        pairs = ((getattr(start, name)[-1:], getattr(self, name)) for name in PER_CYCLE)
+        return replace(self, **dict(zip(PER_CYCLE, map(np.concatenate, pairs), strict=True)))
 
 
 def read_states(folder: Path, first: int, last: int, bed: Adopted) -> States:
@@ -55,33 +56,57 @@ def read_states(folder: Path, first: int, last: int, bed: Adopted) -> States:
 
     Raises `NotCredible` where grains came or went, and what `read_frames` raises.
     """
-    cycles = range(first, last + 1)
-    frames = [next(iter(read_frames(folder / f"cycle_{c}.dump"))) for c in cycles]
-    start, end = frames[0], frames[-1]
-    identifier, radius, mass = (start.column(name) for name in ("id", "radius", "mass"))
-    for number, one in zip(cycles, frames, strict=True):
-        if not np.array_equal(one.column("id"), identifier):
+    read = read_scene_end if bed.deck.is_script else read_end
+    ends = [read(folder, number, bed) for number in range(first, last + 1)]
+    start, end = ends[0], ends[-1]
+    for number, one in enumerate(ends, first):
+        if not np.array_equal(one.last[:, 0], start.last[:, 0]):
             raise NotCredible(
-                f"there are {len(one.values)} grains at the end of cycle {number} of this window, "
-                f"and {len(start.values)} before it: grains came or went",
+                f"there are {len(one.last)} grains at the end of cycle {number} of this window, "
+                f"and {len(start.last)} before it: grains came or went",
                 where=str(folder), remedy="thermo_modify lost error; no insertion in the cycle",
             )  # fmt: skip
-    height = np.full(len(frames), np.nan)
-    position = np.array([one.find_centres() for one in frames])
-    velocity = np.array([one.block(*VELOCITY) for one in frames])
+    position, velocity, height = (
+        np.concatenate([getattr(one, name) for one in ends]) for name in PER_CYCLE
+    )
+    radius = start.radius
+    if (stone := radius == 0).any():
+        nearest = cKDTree(position[0]).query(position[0], 2)[0][:, 1] / 2
+        radius = np.where(stone, nearest, radius)
+    return replace(
+        end, radius=radius, mass=start.mass, position=position, velocity=velocity, height=height
+    )
+
+
+def read_end(folder: Path, number: int, bed: Adopted) -> States:
+    """The end of a cycle as LIGGGHTS and LAMMPS leave it; radii of stones are 0."""
+    frame = next(iter(read_frames(folder / f"cycle_{number}.dump")))
+    identifier, radius, mass = (frame.column(name) for name in ("id", "radius", "mass"))
+    position, velocity, height = frame.find_centres(), frame.block(*VELOCITY), np.nan
     if bed.loaded or bed.stones:
-        found = [bytearray((folder / f"cycle_{c}.restart").read_bytes()) for c in cycles]
+        restart = bytearray((folder / f"cycle_{number}.restart").read_bytes())
         if bed.loaded:
-            height = np.array([kept.find_mesh(one, *bed.loaded)[0].mean() for one in found])
+            height = kept.find_mesh(restart, *bed.loaded)[0].mean()
         if bed.stones:
-            stones = np.array([kept.find_stones(one, bed.stones) for one in found])
-            order = stones[:, :, kept.STONE_ID].argsort(axis=1)[:, :, None]
-            stones = np.take_along_axis(stones, order, axis=1)
-            identifier, mass = stones[0, :, kept.STONE_ID], stones[0, :, kept.MASS]
-            position, velocity = stones[:, :, kept.CENTRE], stones[:, :, kept.VELOCITY]
-            radius = cKDTree(position[0]).query(position[0], 2)[0][:, 1] / 2
-    spheres = end.block("id", *CENTRE, *VELOCITY)
-    return States(identifier.astype(np.int64), radius, mass, position, velocity, height, spheres)
+            stones = kept.find_stones(restart, bed.stones)
+            stones = stones[stones[:, kept.STONE_ID].argsort()]
+            identifier, mass = stones[:, kept.STONE_ID], stones[:, kept.MASS]
+            position, velocity = stones[:, kept.CENTRE], stones[:, kept.VELOCITY]
+            radius = np.zeros(len(stones))
+    spheres = frame.block("id", *CENTRE, *VELOCITY)
+    return States(
+        identifier.astype(np.int64), radius, mass, position[None], velocity[None],
+        np.array([height]), spheres,
+    )  # fmt: skip
+
+
+def read_scene_end(folder: Path, number: int, bed: Adopted) -> States:
+    """The end of a cycle as a script of YADE leaves it; radii of clumps are 0."""
+    end = read_arrays(folder / f"cycle_{number}.npz")
+    spheres = np.column_stack([end["identifier"], end["position"], end["velocity"]])
+    for name in PER_CYCLE:
+        end[name] = end[name][None]
+    return States(**end, last=spheres)
 
 
 def find_overlap(position: FloatArray, radius: FloatArray) -> float:

@@ -54,8 +54,8 @@ class YadeEngine(ProcessEngine):
 
     def command(self, scene: Scene, deck: str) -> list[str]:
         """Command line that runs ``deck`` in its folder."""
-        yade = ["yade", "-n", "-x", "-j1", SCRIPTS.get(deck, deck), PARAMETERS]
-        return [*scene.engine.launcher, *yade]
+        words = [SCRIPTS[deck], PARAMETERS] if deck in SCRIPTS else [deck]
+        return [*scene.engine.launcher, "yade", "-n", "-x", "-j1", *words]
 
     def write_preparation(
         self, scene: Scene, position: FloatArray, radius: FloatArray, height: float, folder: Path

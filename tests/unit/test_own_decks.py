@@ -201,7 +201,7 @@ def test_the_loaded_body_is_the_mesh_that_moves(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("override", "said"), [
-    ("deck.engine=yade", "must be 'liggghts' or 'lammps'"),
+    ("deck.engine=yade", "no other decks, end with .py"),
     ("procedure.tolerance=0.02", "jumps that choose themselves"),
     ("procedure.k_i=300", "must exceed k_i"),
     ("procedure.members=3", "without members"),
@@ -327,7 +327,8 @@ def test_a_window_starts_with_its_grains_and_plate_where_the_jump_puts_them(tmp_
     last = np.column_stack([[1, 2, 3], place, velocity])
     states = States(np.array([1, 2, 3]), np.ones(3), np.ones(3), place[None], velocity[None],
                     np.array([5.0]), last)  # fmt: skip
-    bed = SimpleNamespace(stones="", loaded=("m", "mesh/surface"))
+    deck = SimpleNamespace(is_script=False)
+    bed = SimpleNamespace(stones="", loaded=("m", "mesh/surface"), deck=deck)
     run: Any = SimpleNamespace(folder=SimpleNamespace(path=tmp_path), bed=bed)
     at = Place(9, "window_000000", jumped="jump_000004_1")
     found = write_start(run, at, states, tmp_path / "next")

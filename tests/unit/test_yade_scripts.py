@@ -1,0 +1,99 @@
+"""Scripts of YADE: read, marked, cut, and looked at for what a window would miss."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from adapters.decks.adopt import adopt
+from adapters.decks.detect import find_obstacles, list_contents
+from adapters.decks.engine import list_inputs
+from adapters.decks.parse import BEGIN, END
+from adapters.decks.scripts import add_script_marks, read_script
+from adapters.errors import UsageError
+from tests import own_decks
+
+
+def write_script(folder: Path, text: str) -> Path:
+    """A script in a folder, with the module that it imports."""
+    (folder / "helpers.py").write_text(own_decks.HELPERS)
+    path = folder / "bed.py"
+    path.write_text(text)
+    return path
+
+
+def test_a_script_is_cut_at_its_marks(tmp_path: Path) -> None:
+    """Statements above and between; the module beside it goes along, and the plate is known."""
+    deck = read_script(write_script(tmp_path, own_decks.YADE))
+    assert [one.line for one in deck.cycle] == list(range(38, 46))
+    assert list_inputs(deck) == [Path("helpers.py")]
+    contents = list_contents(deck)
+    assert (contents.loaded_body, contents.clumps) == ("plate", ("clumps",))
+    assert find_obstacles(deck, "yade") == []
+
+
+def cut(cycle: str, before: str = "") -> str:
+    """A marked script."""
+    return f"from yade import pack\n{before}\n{BEGIN}\n{cycle}\n{END}\n"
+
+
+OBSTACLES = {
+    "no run": (cut("a = 3"), "stops", "nothing is run between the marks"),
+    "endless": (cut("O.run()"), "stops", "-> O.run(STEPS, True)"),
+    "another bed": (cut("O.run(5)\nO.reload()"), "stops", "'O.reload()' inside the cycle"),
+    "clock": (cut("O.run(5)", "O.engines += [PyRunner(command='f()', realPeriod=2)]"),
+              "stops", "-> line 2: iterPeriod=STEPS"),
+    "gravity": (cut("O.run(5)", "n = NewtonIntegrator(gravity=(0, -9.81, 0))"),
+                "stops", "gravity is not along -z"),
+    "permanent": (cut("O.run(5)", "O.forces.setPermF(3, (0, 0, -1))"),
+                  "stops", "in no saved scene"),
+    "forces": (cut("f = O.forces.f(3)\nO.run(5)"), "note", "forces are 0 where a window begins"),
+    "outside": (cut("O.run(5)", "f = open('/home/me/load.txt')"), "stops", "is not carried along"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", OBSTACLES)
+def test_what_a_window_would_miss_is_said(name: str, tmp_path: Path) -> None:
+    """Each of its kind, with the line to write instead."""
+    text, kind, said = OBSTACLES[name]
+    found = find_obstacles(read_script(write_script(tmp_path, text)), "yade")
+    assert [one.kind for one in found if said in str(one)] == [kind], found
+    assert len(found) == 1
+
+
+def test_what_is_right_is_not_said(tmp_path: Path) -> None:
+    """A run until something pauses it, a force put on in each cycle, gravity downwards."""
+    text = cut(
+        "O.forces.setPermF(3, (0, 0, -1))\nO.run()\nf = O.forces.f",
+        "def check():\n    O.pause()\nn = NewtonIntegrator(gravity=[0.0, -0.0, -9.81])\na = 1 / 2",
+    )
+    assert find_obstacles(read_script(write_script(tmp_path, text)), "yade") == []
+
+
+@pytest.mark.parametrize(("text", "marked"), [
+    ("a = 1", ["a = 1", BEGIN, "O.run(1000, True)", END]),
+    ("O.run(4)\nO.run(\n 5)\nb = 1", ["O.run(4)", BEGIN, "O.run(", " 5)", END, "b = 1"]),
+    ("def f():\n    O.run(5)", ["def f():", "    O.run(5)", BEGIN, "O.run(1000, True)", END]),
+])  # fmt: skip
+def test_a_script_without_marks_gets_them(text: str, marked: list[str], tmp_path: Path) -> None:
+    """Around its last run at the top level, or a run of 1,000 steps at its end."""
+    deck = read_script(write_script(tmp_path, text))
+    lines, said = add_script_marks(deck)
+    assert lines == marked
+    assert said.kind == "added"
+
+
+@pytest.mark.parametrize(("name", "text", "said"), [
+    ("bed.py", f"for i in range(3):\n{BEGIN}\n    O.run(5)\n{END}", "inside of a loop"),
+    ("bed.py", "O.run(5", "no script of YADE"),
+    ("in.bed", "O.run(5)", "end with .py"),
+])  # fmt: skip
+def test_scripts_that_can_not_be_cut_are_refused(
+    name: str, text: str, said: str, tmp_path: Path
+) -> None:
+    """With the place; nothing is written."""
+    (tmp_path / name).write_text(text)
+    with pytest.raises(UsageError, match=said):
+        adopt(tmp_path / name, "yade")
+    assert [one.name for one in tmp_path.iterdir()] == [name]
