@@ -6,15 +6,9 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
-from adapters.decks.detect import (
-    Contents,
-    Finding,
-    add_lines,
-    add_marks,
-    find_obstacles,
-    list_contents,
-)
+from adapters.decks.detect import add_lines, add_marks, find_obstacles, list_contents
 from adapters.decks.engine import list_inputs, list_output_folders
+from adapters.decks.findings import Contents, Finding
 from adapters.decks.parse import BEGIN, END, Deck
 from adapters.decks.scene import is_deck_scene, read_marked
 from adapters.decks.scripts import add_script_marks

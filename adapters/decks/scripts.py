@@ -148,9 +148,8 @@ def add_script_marks(deck: Deck) -> tuple[list[str], Finding]:
     runs = [one for one in runs if isinstance(one.node, ast.Expr)]
     remedy = "move them in the copy if your load cycle is another stretch of statements"
     if not runs:
-        run = f"O.run({STEPS}, True)"
         what = f"nothing is run at the top level: {STEPS} steps are put at the end as a cycle"
-        return [*lines, BEGIN, run, END], Finding("added", "", what, remedy)
+        return [*lines, BEGIN, f"O.run({STEPS}, True)", END], Finding("added", "", what, remedy)
     run = runs[-1]
     lines[run.line - 1 : run.last] = [BEGIN, *lines[run.line - 1 : run.last], END]
     what = f"no load cycle is marked: the marks are put around the last run, '{run.short}'"
