@@ -10,21 +10,58 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 
 from adapters.decks.findings import Contents, Finding, note, stop
-from adapters.decks.parse import BEGIN, END, Command, Deck, is_outside
+from adapters.decks.parse import BEGIN, END, METRE, VALUE, VARIABLE, Command, Deck, is_outside
 from adapters.decks.scripts import find_script_obstacles, list_script_contents
-from adapters.decks.split import BOX, KEYED, find_named, list_live
+from adapters.decks.split import KEYED, find_named, list_live
 
-INSERTION = re.compile(r"insert/.*|pour|deposit")
 RIGID = re.compile(r"rigid(/.*)?|poems")
 STATE = re.compile(
     r"(?<![\w.])(step|elapsed|elaplong|time|ke|pe|atoms|temp|press|[cf]_\w+)(?!\w)"
     r"|\b(xcm|vcm|bound|count|mass|ke|gyration|fcm|random|normal)(?=\()"
 )
 """Parts of a formula whose value is another when the window starts."""
-DECLARED = re.compile(r"\b(fix|unfix|compute|region|dump|pair_style|pair_coeff)\s")
+COUNTED = re.compile(
+    r"(?<![\w.])(elapsed|elaplong|ramp|stagger|logfreq\w*|vdisplace|[sc]wiggle)(?!\w)"
+)
+"""Parts of a formula that count steps from the start of each run."""
+DECLARED = r"\b(?:fix|unfix|compute|region|dump|pair_style|pair_coeff)\s"
 OUTPUTS = ("dump", "log", "write_dump", "write_restart")
 AVERAGES = ("print", "ave/time", "ave/chunk")
 """Commands, and styles of fixes, that write files."""
+PATTERNS = (
+    ("standing", r"fix (\S+) \S+ (?:insert/\S+|pour|deposit)(?!\S)", "added",
+     "fix {0} still inserts grains: each window would insert them again", "unfix {0}"),
+    ("standing", r"fix (\S+) \S+ (rigid(?:/\S*)?|poems)(?!\S)", "stops",
+     "fix {0} {1} holds grains together, and trackbed can not move its bodies",
+     "spheres, or in LIGGGHTS 'fix multisphere'"),
+    ("standing", r"fix (\S+) (?!all )\S+ (multisphere.*)", "stops",
+     "fix {0} {1} is not of all: spheres beside it vanish at the second run", "fix {0} all {1}"),
+    ("standing", r"fix (\S+) \S+ \S+/servo(?!\S)", "note",
+     "the controller of fix {0} starts again in each window",
+     "trackbed adopt --check says how far that goes"),
+    ("live", r"fix \S+ \S+ gravity .*\bvector (?![-+0.]+ [-+0.]+(?!\S))", "stops",
+     "gravity is not along -z, where settlement is", "turn the deck"),
+    ("live", r"fix (\S+) (\S+) (freeze|move|setforce)(?!\S)", "note",
+     "fix {0} {2} holds or moves grains of {1}",
+     "grains that do not move in a window are not moved by a jump"),
+    ("live", r"thermo_modify .*\b(?:ignore|warn)(?!\S)", "note",
+     "grains that leave the box vanish without stopping the engine", "thermo_modify lost error"),
+    ("before", r"group (\S+) .*\bdynamic(?!\S)", "note",
+     "group {0} keeps the grains it has at the mark", ""),
+    ("cycle", r"(?:create_box|read_data|read_restart|clear|create_atoms|reset_timestep)(?!\S)",
+     "stops", "'{all}' inside the cycle begins another bed", f"put it above '{BEGIN}'"),
+    ("cycle", r"if ", "note", "'{all}': every cycle must take the same branch", ""),
+    ("before", rf"if .*{DECLARED}", "stops",
+     "'{all}' declares something or not: a window can not know which",
+     "write the command that it comes to, without if"),
+    ("both", r"if .*\binclude\s", "stops",
+     "include inside of if: LIGGGHTS refuses it, and a window can not know what it does",
+     "the included lines instead"),
+    ("both", r"jump (?!SELF(?!\S))\S", "stops", "'{all}' goes on in another file",
+     "jump SELF LABEL, or include that file"),
+)  # fmt: skip
+"""Where a command stands (standing: above the cycle, and not undone; live: that or inside), how it
+begins, the kind of finding, what is said of it, and what to write instead."""
 
 
 def list_contents(deck: Deck) -> Contents:
@@ -82,9 +119,6 @@ def find_absolute_runs(deck: Deck, engine: str) -> Iterator[Finding]:
             steps = int(one.word(1)) - done if done and one.word(1).isdecimal() else "STEPS"
             what = f"'{one.short}' runs up to a step: only the first cycle has so far to run"
             yield stop(one, what, f"run {steps}")
-        if one.name in BOX | {"clear", "create_atoms", "reset_timestep"}:
-            what = f"'{one.short}' inside the cycle begins another bed"
-            yield stop(one, what, f"put it above '{BEGIN}'")
 
 
 def count_steps(commands: Sequence[Command]) -> int:
@@ -99,28 +133,27 @@ def count_steps(commands: Sequence[Command]) -> int:
 
 
 def find_frozen_values(deck: Deck, engine: str) -> Iterator[Finding]:
-    """``${v}`` of a formula of the bed's state in a declaration: a window has another value."""
+    """``${v}`` and ``$(...)`` of the bed's state in a declaration: a window has another value."""
     variables = find_named(deck.before, "variable")
     for one in list_live(deck.before):
-        for name in sorted(one.substituted()):
-            if part := find_state_in(name, variables):
-                what = (
-                    f"${{{name}}} in '{one.short}' comes of {part}, and is another number when a "
-                    "window starts"
-                )
-                yield stop(one, what, f"the number itself, as this prints it: print ${{{name}}}")
+        for text in dict.fromkeys(one[0] for one in VALUE.finditer(one.text)):
+            if part := find_state(text, variables):
+                what = f"{text} in '{one.short}' comes of {part}, and is another number when a "
+                what += "window starts"
+                yield stop(one, what, f"the number itself, as this prints it: print {text}")
 
 
-def find_state_in(name: str, variables: dict[str, Command], depth: int = 0) -> str:
-    """What of the bed's state a variable's formula depends on; empty for none."""
-    one = variables.get(name)
-    if one is None or one.word(2) not in ("equal", "atom") or depth > len(variables):
-        return ""
-    formula = " ".join(one.words[3:])
-    if part := STATE.search(formula):
+def find_state(formula: str, variables: dict[str, Command], depth: int = 0) -> str:
+    """What of the bed's state a formula depends on; empty for none."""
+    if part := STATE.search(VARIABLE.sub("", formula)):
         return part[0]
-    inner = one.substituted() | set(re.findall(r"\bv_(\w+)", formula))
-    return next(filter(None, (find_state_in(n, variables, depth + 1) for n in inner)), "")
+    names = {a or b or c for a, b, c in re.findall(rf"{VARIABLE.pattern}|\bv_(\w+)", formula)}
+    inner = [one for name in names if (one := variables.get(name)) and depth <= len(variables)]
+    found = (
+        find_state(" ".join(one.words[3:]), variables, depth + 1)
+        for one in inner if one.word(2) in ("equal", "atom")
+    )  # fmt: skip
+    return next(filter(None, found), "")
 
 
 def find_phases(deck: Deck, engine: str) -> Iterator[Finding]:
@@ -136,7 +169,7 @@ def find_phases(deck: Deck, engine: str) -> Iterator[Finding]:
             what = f"fix {name} goes on in its phase to round-off only (8e-7 m were seen)"
             yield note(one, what, "a cycle must be whole periods of it")
         formula = " ".join(one.words[3:]) if one.name == "variable" else ""
-        if part := re.search(r"(?<![\w.])(elapsed|elaplong)(?!\w)", formula):
+        if part := COUNTED.search(formula):
             what = f"variable {name} counts {part[0]} steps from the start of each run"
             yield note(one, what, "the motion must be whole in each run")
         if read := set(re.findall(r"\bf_(\w+)\[", formula)) & meshes.keys():
@@ -147,30 +180,24 @@ def find_phases(deck: Deck, engine: str) -> Iterator[Finding]:
             yield note(one, what, "read the force a step earlier")
 
 
-def find_unfit_fixes(deck: Deck, engine: str) -> Iterator[Finding]:
-    """Insertions that a window would begin again, clumps, and walls on a region that is gone.
-
-    LAMMPS names an atom's callback for the last, not the region.
-    """
-    regions = find_named(deck.before, "region")
-    for name, one in find_named(deck.before, "fix").items():
-        style = one.word(3)
-        if INSERTION.fullmatch(style):
-            what = f"fix {name} still inserts grains: each window would insert them again"
-            yield Finding("added", one.place, what, f"unfix {name}", "cycle")
-            continue
-        if RIGID.fullmatch(style):
-            what = f"fix {name} {style} holds grains together, and trackbed can not move its bodies"
-            yield stop(one, what, "spheres, or in LIGGGHTS 'fix multisphere'")
-        if style.startswith("multisphere") and one.word(2) != "all":
-            what = f"fix {name} {style} is not of all: spheres beside it vanish at the second run"
-            yield stop(one, what, " ".join(("fix", name, "all", *one.words[3:])))
-        if style.endswith("/servo"):
-            what = f"the controller of fix {name} starts again in each window"
-            yield note(one, what, "trackbed adopt --check says how far that goes")
-        for before, region in zip(one.words[3:], one.words[4:], strict=False):
-            if before == "region" and region not in regions and "$" not in region:
-                what = f"fix {name} needs the region {region}, gone where the cycle begins"
+def find_patterns(deck: Deck, engine: str) -> Iterator[Finding]:
+    """What `PATTERNS` have, and walls on a region that is gone, of which LAMMPS says something
+    about an atom's callback."""
+    standing, regions = list_live(deck.before), find_named(deck.before, "region")
+    places = {
+        "standing": standing, "live": [*standing, *deck.cycle], "before": deck.before,
+        "cycle": deck.cycle, "both": deck.before + deck.cycle,
+    }  # fmt: skip
+    for where, pattern, kind, what, remedy in PATTERNS:
+        for one in places[where]:
+            if found := re.match(pattern, " ".join(one.words)):
+                said, line = (t.format(*found.groups(), all=one.short) for t in (what, remedy))
+                yield Finding(kind, one.place, said, line, "cycle" if kind == "added" else "")
+    for one in standing:
+        for word, region in zip(one.words[3:], one.words[4:], strict=False):
+            gone = region not in regions and "$" not in region
+            if (one.name, word) == ("fix", "region") and gone:
+                what = f"fix {one.word(1)} needs the region {region}, gone where the cycle begins"
                 yield stop(one, what, f"declare it above '{BEGIN}': region {region} ...")
 
 
@@ -181,20 +208,23 @@ def find_branches(deck: Deck, engine: str) -> Iterator[Finding]:
         if one.name == "jump" and one.word(2) not in labels:
             what = f"'{one.short}' leaves the cycle"
             yield stop(one, what, f"put '{END}' above this loop's next and jump")
-    for one in deck.before + deck.cycle:
-        if one.name == "if" and engine == "liggghts" and "include" in one.text:
-            yield stop(one, "LIGGGHTS refuses include inside of if", "the included lines instead")
-        elif one.name == "if" and one in deck.before and DECLARED.search(one.text):
-            what = f"'{one.short}' declares something or not: a window can not know which"
-            yield stop(one, what, "write the command that it comes to, without if")
-        if one.name == "jump" and one.word(1) != "SELF":
-            what = f"'{one.short}' goes on in another file"
-            yield stop(one, what, "jump SELF LABEL, or include that file")
-    around = {one.word(1) for one in deck.before if one.name == "label"}
+    around = {one.word(1): n for n, one in enumerate(deck.before) if one.name == "label"}
+    turned = {name for one in deck.after if one.name == "next" for name in one.words[1:]}
     for one in deck.after:
         if one.name == "jump" and one.word(2) in around:
             what = f"the loop {one.word(2)} around the cycle is left out: trackbed counts cycles"
             yield note(one, what)
+    for one in (*list_live(deck.before), *deck.cycle):
+        for name in sorted(turned & one.substituted()):
+            what = f"${{{name}}} in '{one.short}' keeps its first value: its loop is left out"
+            yield stop(one, what, "a cycle that is the same in each turn")
+    for number, one in enumerate(deck.before):
+        for label in re.findall(r"\bjump SELF (\w+)", one.text):
+            first, last = sorted((number, around.get(label, number)))
+            for inner in list_live(deck.before):
+                if inner in deck.before[first:last] and re.match(DECLARED, inner.text):
+                    what = f"'{inner.short}' is made in a loop, or jumped over, by '{one.short}'"
+                    yield stop(inner, what, "make it once, above or below")
 
 
 def find_losses(deck: Deck, engine: str) -> Iterator[Finding]:
@@ -204,34 +234,17 @@ def find_losses(deck: Deck, engine: str) -> Iterator[Finding]:
         if path and (one.name in OUTPUTS or one.word(3) in AVERAGES):
             what = f"{path} is written by each window over the last one's"
             yield note(one, what, "a relative name: each window has a folder of its own")
-        if one.name == "units" and one.word(1) != "si":
+        if one.name == "units" and one.word(1) not in METRE:
             yield note(one, f"lengths are in units {one.word(1)}, no metres")
-        if one.name == "fix" and one.word(3) == "gravity" and "vector" in one.words:
-            at = one.words.index("vector")
-            if any(word.strip("-+0.") for word in one.words[at + 1 : at + 3]):
-                yield stop(one, "gravity is not along -z, where settlement is", "turn the deck")
-        if one.name == "fix" and one.word(3) in ("freeze", "move", "setforce"):
-            what = f"fix {one.word(1)} {one.word(3)} holds or moves grains of {one.word(2)}"
-            yield note(one, what, "grains that do not move in a window are not moved by a jump")
-        if one.name == "thermo_modify" and {"ignore", "warn"} & {*one.words}:
-            what = "grains that leave the box vanish without stopping the engine"
-            yield note(one, what, "thermo_modify lost error")
     for one in deck.commands:
         for word in one.words[1:]:
             if is_outside(word) and "/" in word and one.name not in OUTPUTS:
                 what = f"{word} lies outside of the folder of the deck, and is not carried along"
                 yield stop(one, what, "put it beside the deck, and name it so")
-    sides = [one.words[1:4] for one in deck.before if one.name == "boundary"]
-    if not sides or any("p" in side for side in sides[-1]):
-        what = "the box is periodic: a jump that moves a grain over its side fails, and is computed"
-        yield Finding("note", "", what, "boundary f f f where walls hold the grains")
-    for one in deck.before:
-        if one.name == "group" and "dynamic" in one.words:
-            yield note(one, f"group {one.word(1)} keeps the grains it has at the mark")
 
 
 RULES: Sequence[Callable[[Deck, str], Iterator[Finding]]] = (
-    find_unfinished, find_absolute_runs, find_frozen_values, find_phases, find_unfit_fixes,
+    find_unfinished, find_absolute_runs, find_frozen_values, find_phases, find_patterns,
     find_branches, find_losses,
 )  # fmt: skip
 """What is looked for."""

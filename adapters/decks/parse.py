@@ -22,6 +22,10 @@ WORD = re.compile(r"\"[^\"]*\"|'[^']*'|[^\s\"']+")
 COMMENT = re.compile(r"^((?:\"[^\"]*\"|'[^']*'|[^#\"'])*)#.*$", re.DOTALL)
 VARIABLE = re.compile(r"\$(?:\{(\w+)\}|(\w))")
 """``${name}`` or ``$n``: the engine puts the variable's value in its place."""
+VALUE = re.compile(rf"{VARIABLE.pattern}|\$(\((?:[^()]|\([^()]*\))*\))")
+"""That, or ``$(formula)``, whose value it puts there too."""
+METRE = {"si": (1.0, 1.0), "cgs": (1e-2, 1e-3)}
+"""Units with seconds in them: lengths [m] and masses [kg]."""
 NESTED = 10
 """Decks that include one another further than this include themselves."""
 
@@ -61,7 +65,9 @@ class Command:
 
     def substituted(self) -> set[str]:
         """Names of the variables whose values the engine puts into it."""
-        return {a or b for a, b in VARIABLE.findall(self.text)}
+        found = VALUE.findall(self.text)
+        inner = re.findall(r"\bv_(\w+)", " ".join(formula for _, _, formula in found))
+        return {*inner, *(a or b for a, b, formula in found if not formula)}
 
 
 @dataclass(frozen=True)
@@ -79,6 +85,12 @@ class Deck:
     def is_script(self) -> bool:
         """Whether it is one of Python, for YADE."""
         return self.path.suffix == ".py"
+
+    @property
+    def units(self) -> tuple[float, float]:
+        """Its unit of length [m] and of mass [kg]; 1 where neither is known."""
+        names = [one.word(1) for one in self.before if one.name == "units"]
+        return METRE.get(names[-1] if names else "si", (1.0, 1.0))
 
     @property
     def commands(self) -> tuple[Command, ...]:

@@ -21,6 +21,10 @@ MOMENTUM, SPIN = slice(11, 14), slice(14, 17)
 velocity [m/s], angular momentum, angular velocity [rad/s]."""
 
 
+IMAGE, TURN = 6, np.array([1, 1 << 10, 1 << 20])
+"""Where a sphere's periods are counted, and what one of each axis adds there."""
+
+
 def find_record(restart: bytearray, fix: str, style: str) -> FloatArray:
     """The doubles that a fix left in a restart file, a view that writes through, shape (d,).
 
@@ -71,14 +75,18 @@ def move_stones(restart: bytearray, fix: str, identifier: IntArray, shift: Float
 
 def move_grains(
     restart: bytearray, identifier: IntArray, place: FloatArray, velocity: FloatArray,
-    shift: FloatArray,
+    shift: FloatArray, period: FloatArray,
 ) -> None:  # fmt: skip
-    """Move spheres by ``shift`` (n, 3) [m] and bring them to rest; their spins go on.
+    """Move spheres by ``shift`` (n, 3) and bring them to rest; their spins go on.
 
-    ``identifier`` (n,), ascending, ``place`` (n, 3) [m] as folded into the box and ``velocity``
-    (n, 3) [m/s] are those of the file, to the last bit.  Raises `EngineFailed` unless each sphere
-    is found there, once.
+    ``identifier`` (n,), ascending, ``place`` (n, 3) as folded into the box and ``velocity`` (n, 3)
+    are those of the file in its units, to the last bit.  ``period``: low and high side of the box
+    (3, 2), nan where it has no period; who leaves at one side comes in at the other, and the file
+    counts it.  Raises `EngineFailed` unless each sphere is found there, once.
     """
+    low, edge = period[:, 0], period[:, 1] - period[:, 0]
+    turns = np.nan_to_num(np.floor((place + shift - low) / edge)).astype(int)
+    shift = shift - turns * np.nan_to_num(edge)
     found = np.zeros(len(identifier), int)
     for offset in range(8):  # the engines align nothing
         doubles = np.frombuffer(restart, "<f8", (len(restart) - offset) // 8, offset)
@@ -91,6 +99,7 @@ def move_grains(
             for k in range(3):
                 doubles[at[same] + k] += shift[row[same], k]
                 doubles[at[same] + 7 + k] = 0.0
+            tags[at[same] + IMAGE] += turns[row[same]] @ TURN
             found += np.bincount(row[same], minlength=len(found))
     if (found != 1).any():
         raise EngineFailed("the restart file keeps grains in a way that trackbed does not know")

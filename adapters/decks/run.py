@@ -169,20 +169,20 @@ def compute(run: DeckRun, place: Place, cycles: int, healing: int = 0) -> Place:
 def write_start(run: DeckRun, place: Place, states: States, folder: Path) -> States:
     """Write the restart file of the last of ``states``, moved where a jump was made; that state."""
     restart, bed = bytearray((run.folder.path / place.window / "end.restart").read_bytes()), run.bed
-    move, drop = np.zeros(3), 0.0
+    (metre, _), move, drop = bed.deck.units, np.zeros(3), 0.0
     if place.jumped:
         with np.load(run.folder.path / place.jumped / "moved.npz") as data:
             move, drop = data["move"], float(data["drop"])
         if bed.deck.is_script:
             np.savez(folder / "moved.npz", identifier=states.identifier, move=move, drop=drop)
         elif bed.stones:
-            move_stones(restart, bed.stones, states.identifier, move)
+            move_stones(restart, bed.stones, states.identifier, move / metre)
         else:
-            last = states.last
-            move_grains(restart, states.identifier, last[:, 1:4], last[:, 4:], move)
+            number, x, v = states.identifier, states.last[:, 1:4], states.last[:, 4:]
+            move_grains(restart, number, x, v, move / metre, states.period)
         if bed.loaded and not bed.deck.is_script:
             for height in find_mesh(restart, *bed.loaded):
-                height -= drop
+                height -= drop / metre
     (folder / "cycle_0.restart").write_bytes(restart)
     return replace(states, position=states.position + move, height=states.height - drop)
 

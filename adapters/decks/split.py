@@ -49,6 +49,8 @@ def list_live(commands: Sequence[Command]) -> list[Command]:
     """
     live: dict[tuple[str, ...], Command | None] = {}
     for number, one in enumerate(commands):
+        if one.name == "clear":
+            live = {key: kept for key, kept in live.items() if key[0] == "variable"}
         kind, name = UNDONE.get(one.name, one.name), one.word(1)
         key = (kind, name)
         if one.name == "region" and one.word(2) == "delete":
@@ -78,7 +80,8 @@ def format_prepare(deck: Deck, engine: str) -> str:
 
 def format_window(deck: Deck, engine: str, cycles: int) -> str:
     """``window.in``: ``cycles`` load cycles from ``cycle_0.restart``, each with its state."""
-    box = next((n for n, one in enumerate(deck.before) if one.name in BOX), 0)
+    start = max((n for n, one in enumerate(deck.before) if one.name == "clear"), default=0)
+    box = next((n for n, one in enumerate(deck.before) if n >= start and one.name in BOX), 0)
     early = {one for one in deck.before[:box] if one.name in HEADER}
     live = list_live(deck.before)
     header = [one for one in live if one in early]

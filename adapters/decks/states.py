@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -37,8 +37,10 @@ class States:
     velocity: FloatArray  # [m/s], shape (c, n, 3)
     height: FloatArray  # of the loaded body [m], shape (c,); nan without
     last: FloatArray
-    """Spheres of the last state: identifier, place as folded into the box [m], velocity [m/s];
-    shape (spheres, 7)."""
+    """Spheres of the last state, in the deck's units: identifier, place as folded into the box,
+    velocity; shape (spheres, 7)."""
+    period: FloatArray = field(default_factory=lambda: np.full((3, 2), np.nan))
+    """Low and high side of the box in the deck's units, nan where it is not periodic, (3, 2)."""
 
     @property
     def energy(self) -> FloatArray:
@@ -83,6 +85,9 @@ def read_end(folder: Path, number: int, bed: Adopted) -> States:
     frame = next(iter(read_frames(folder / f"cycle_{number}.dump")))
     identifier, radius, mass = (frame.column(name) for name in ("id", "radius", "mass"))
     position, velocity, height = frame.find_centres(), frame.block(*VELOCITY), np.nan
+    periodic = [["p" in side] for side in frame.boundary.split()[-3:]]
+    upright = frame.bounds.shape == (3, 2)  # a grain that leaves a tilted box fails the jump
+    period = np.where(periodic, frame.bounds if upright else np.nan, np.full((3, 2), np.nan))
     if bed.loaded or bed.stones:
         restart = bytearray((folder / f"cycle_{number}.restart").read_bytes())
         if bed.loaded:
@@ -93,10 +98,10 @@ def read_end(folder: Path, number: int, bed: Adopted) -> States:
             identifier, mass = stones[:, kept.STONE_ID], stones[:, kept.MASS]
             position, velocity = stones[:, kept.CENTRE], stones[:, kept.VELOCITY]
             radius = np.zeros(len(stones))
-    spheres = frame.block("id", *CENTRE, *VELOCITY)
+    spheres, (metre, kilogram) = frame.block("id", *CENTRE, *VELOCITY), bed.deck.units
     return States(
-        identifier.astype(np.int64), radius, mass, position[None], velocity[None],
-        np.array([height]), spheres,
+        identifier.astype(np.int64), radius * metre, mass * kilogram, metre * position[None],
+        metre * velocity[None], metre * np.array([height]), spheres, period,
     )  # fmt: skip
 
 

@@ -27,18 +27,19 @@ SHIFT = np.array([2e-6, -1e-6, 1e-5])
 """Of all grains together [m]: no overlap changes but those with walls."""
 
 
-def step_moved(bed: Adopted, folder: Path) -> tuple[States, States]:
-    """States before a step of time, and behind it from grains and loaded body moved by `SHIFT`."""
+def step_moved(bed: Adopted, folder: Path, shift: np.ndarray = SHIFT) -> tuple[States, States]:
+    """States before a step of time, and behind it from grains and plate moved by ``shift``."""
     run_deck(bed, format_prepare(bed.deck, bed.engine), folder / "prepare.in")
     before = read_states(folder, 0, 0, bed)
     restart = bytearray((folder / "cycle_0.restart").read_bytes())
-    move = np.broadcast_to(SHIFT, before.position[0].shape)
+    move = np.broadcast_to(shift, before.position[0].shape)
     if bed.stones:
         move_stones(restart, bed.stones, before.identifier, move)
     else:
-        move_grains(restart, before.identifier, before.last[:, 1:4], before.last[:, 4:], move)
+        place, velocity = before.last[:, 1:4], before.last[:, 4:]
+        move_grains(restart, before.identifier, place, velocity, move, before.period)
     for height in find_mesh(restart, *bed.loaded) if bed.loaded else ():
-        height += SHIFT[2]
+        height += shift[2]
     (folder / "cycle_0.restart").write_bytes(restart)
     run_deck(bed, format_window(bed.deck, bed.engine, 1), folder / "window.in")
     return before, read_states(folder, 1, 1, bed)
@@ -68,6 +69,32 @@ def test_the_engine_goes_on_from_where_grains_were_put(
     assert np.abs(last - first - SHIFT).max() < 1000 * 9.81 * 2e-5**2
     if bed.loaded:
         assert after.height[0] - before.height[0] == pytest.approx(SHIFT[2], abs=1e-12)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("engine", "text"), [
+    pytest.param("liggghts", HEAD + STEP, marks=pytest.mark.engine("liggghts")),
+    pytest.param("lammps", own_decks.LAMMPS.partition(BEGIN)[0] + STEP,
+                 marks=pytest.mark.engine("lammps")),
+])  # fmt: skip
+def test_a_periodic_bed_is_the_same_wherever_it_is_put(
+    engine: str, text: str, tmp_path: Path
+) -> None:
+    """Moved by half a period, and over the side, all grains go on as from where they were: from
+    rest, a step carries none further than a thousand weights do, and no period is lost."""
+    text = text.replace("boundary f f f", "boundary p p f").replace(
+        "block -0.001 0.061 -0.001 0.061", "block 0 0.06 0 0.06", 1
+    )
+    text = text.replace("include walls.in\n", own_decks.WALLS.splitlines()[-1] + "\n").replace(
+        "region bed block 0 0.06 0 0.06 0 0.2", "region bed block -1 1 -1 1 0 0.2"
+    )
+    bed = load_deck_scene(adopt(write_deck(tmp_path, text), engine).scene)[1]
+    shift = np.array([0.03, -0.03, 0.0])
+    before, after = step_moved(bed, tmp_path, shift)
+    assert before.period[:2].tolist() == [[0, 0.06]] * 2
+    assert np.ptp(before.last[:, 1]) > 0.05
+    far = after.position[0] - before.position[0] - shift
+    assert np.abs(far).max() < 1000 * 9.81 * 2e-5**2
 
 
 KEYS = {"total_cycles": 30, "k_i": 6, "k": 4, "h": 5, "healing_cycles": 2, "settlement": '"law"'}

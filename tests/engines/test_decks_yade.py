@@ -17,6 +17,7 @@ from adapters.decks.scene import load_deck_scene
 from adapters.decks.states import read_states
 from adapters.files import RunFolder
 from tests import own_decks
+from tests.unit.test_yade_scripts import write_script
 from trackbed import command
 
 pytestmark = [pytest.mark.long, pytest.mark.engine("yade")]
@@ -25,14 +26,6 @@ SHIFT = np.array([2e-6, -1e-6, 1e-5])
 """Of all grains together [m]."""
 DIGIT = 2.0**-52 * 0.1
 """Last digit of a place in `own_decks.YADE` [m]."""
-
-
-def write_script(folder: Path, text: str = own_decks.YADE) -> Path:
-    """A script in a folder, with the module that it imports."""
-    (folder / "helpers.py").write_text(own_decks.HELPERS)
-    path = folder / "bed.py"
-    path.write_text(text)
-    return path
 
 
 def test_windows_go_on_to_the_last_digits(tmp_path: Path) -> None:

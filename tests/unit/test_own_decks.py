@@ -21,8 +21,9 @@ from adapters.decks.restart import find_mesh, find_record, move_grains, move_sto
 from adapters.decks.run import Place, write_start
 from adapters.decks.scene import load_deck_scene
 from adapters.decks.split import format_window, list_live
-from adapters.decks.states import States, find_overlap
+from adapters.decks.states import States, find_overlap, read_states
 from adapters.errors import EngineFailed, SceneError, UsageError
+from adapters.files import Frame, write_dump
 from tests import own_decks
 from trackbed import command
 
@@ -73,6 +74,36 @@ def test_a_window_repeats_what_the_restart_file_does_not_hold(tmp_path: Path) ->
     assert ("units si" in lines[:read], "region reg" in live) == (True, True)
     assert all(f"fix {name} " in live for name in ("m1", "x1", "z1", "integr", "grav"))
     assert not any(word in live for word in ("create_box", "insert/pack", "run 9000"))
+
+
+def test_nothing_from_above_clear_is_repeated(tmp_path: Path) -> None:
+    """But variables; the box is the second one, and its header stands above the restart file."""
+    deck = read_text(
+        tmp_path,
+        cut(
+            "fix g all gravity 1\nvariable n index 5\nclear\nunits cgs\n"
+            "region r block 0 1 0 1 0 1\ncreate_box 1 r\nfix i all nve"
+        ),
+    )
+    lines = format_window(deck, "lammps", 1).splitlines()[1:]
+    assert lines[:5] == ["variable n index 5", "units cgs", "atom_modify map array",
+                         "read_restart cycle_0.restart", "region r block 0 1 0 1 0 1"]  # fmt: skip
+    assert lines[5] == "fix i all nve"
+    assert deck.units == (0.01, 1e-3)
+
+
+@pytest.mark.parametrize("tag", [np.float64, np.int64])
+def test_grains_come_in_where_they_leave_a_period(tag: type) -> None:
+    """One over the low side of x, one thrice over the high side of y, one over z, a wall."""
+    place = np.array([[0.1, 0.2, 0.3], [0.5, 0.9, 0.4], [0.4, 0.5, 0.9]])
+    shift = np.array([[-0.2, 0, 0], [0, 2.2, 0], [0, 0, 0.2]])
+    period = np.array([[0.0, 1.0], [0.0, 1.0], [np.nan, np.nan]])
+    restart = pack_spheres(place, 0 * place, tag, 3)
+    move_grains(restart, np.array([1, 2, 3]), place, 0 * place, shift, period)
+    inside = place + shift - [[-1, 0, 0], [0, 3, 0], [0, 0, 0]]
+    doubles = np.frombuffer(restart[3:-16], float).reshape(3, 12)
+    assert np.allclose(doubles[:, :3], inside, rtol=0, atol=1e-15)
+    assert doubles.view(tag)[:, 6].tolist() == [512 - 1, 512 + 3 * 1024, 512]
 
 
 def test_a_redefinition_stands_where_others_refer_to_it(tmp_path: Path) -> None:
@@ -130,6 +161,18 @@ OBSTACLES = {
     "absolute": ("lammps", cut("dump d all custom 10 /tmp/d.txt id"), "note", "/tmp/d.txt"),
     "lost": ("lammps", cut("thermo_modify lost ignore"), "note", "vanish"),
     "units": ("lammps", cut("").replace("units si", "units lj"), "note", "units lj, no metres"),
+    "immediate": ("lammps", cut("variable a equal step*2\nfix m all gravity $(v_a*(2))"),
+                  "stops", "$(v_a*(2)) in 'fix m"),
+    "immediate step": ("lammps", cut("fix m all gravity $(step)"), "stops", "comes of step"),
+    "ramp": ("lammps", cut("variable t equal vdisplace(0,1)"), "note", "start of each run"),
+    "branch": ("lammps", cut("", 'if "1 > 0" then "run 5"\nrun 5'), "note", "the same branch"),
+    "loop variable": ("lammps", cut("variable c loop 9\nlabel out", "fix g all gravity ${c}\n"
+                                    "run 5\nunfix g", "next c\njump SELF out"),
+                      "stops", "${c} in 'fix g all gravity ${c}' keeps its first value"),
+    "made in a loop": ("lammps", cut("variable c loop 9\nlabel up\nfix g all gravity 1\nnext c\n"
+                                     "jump SELF up"), "stops", "is made in a loop"),
+    "jumped over": ("lammps", cut('if "1 > 0" then "jump SELF on"\nfix g all gravity 1\n'
+                                  "label on"), "stops", "or jumped over, by 'if"),
     "dynamic": ("lammps", cut("group g dynamic all var v"), "note", "group g keeps"),
 }  # fmt: skip
 
@@ -311,9 +354,12 @@ def test_meshes_and_stones_are_moved_in_their_records() -> None:
     assert np.array_equal(found[:, 17:], stones[:, 17:])
 
 
-def test_a_window_starts_with_its_grains_and_plate_where_the_jump_puts_them(tmp_path: Path) -> None:
-    """In the restart file and in the state that the window's rows go on from: each grain by its
-    move and at rest, the plate down by its drop."""
+@pytest.mark.parametrize("metre", [1.0, 0.5])
+def test_a_window_starts_with_its_grains_and_plate_where_the_jump_puts_them(
+    metre: float, tmp_path: Path
+) -> None:
+    """In the restart file, in its units, and in the state that the window's rows go on from: each
+    grain by its move and at rest, the plate down by its drop."""
     place, velocity = np.random.default_rng(3).normal(size=(2, 3, 3))
     corners = [13.0, 0, 0, 5.0, 0, 0, 5.0, 0, 0, 5.0, 0.5, 0.5, 0.5]
     restart = pack("m", "mesh/surface", [1, 0, 0, *corners, *([5.0] * 22)])
@@ -325,20 +371,40 @@ def test_a_window_starts_with_its_grains_and_plate_where_the_jump_puts_them(tmp_
     move = np.arange(9.0).reshape(3, 3) * 1e-3
     np.savez(tmp_path / "jump_000004_1" / "moved.npz", move=move, drop=0.25)
     last = np.column_stack([[1, 2, 3], place, velocity])
-    states = States(np.array([1, 2, 3]), np.ones(3), np.ones(3), place[None], velocity[None],
-                    np.array([5.0]), last)  # fmt: skip
-    deck = SimpleNamespace(is_script=False)
+    states = States(np.array([1, 2, 3]), np.ones(3), np.ones(3), metre * place[None],
+                    metre * velocity[None], np.array([5.0 * metre]), last)  # fmt: skip
+    deck = SimpleNamespace(is_script=False, units=(metre, 1.0))
     bed = SimpleNamespace(stones="", loaded=("m", "mesh/surface"), deck=deck)
     run: Any = SimpleNamespace(folder=SimpleNamespace(path=tmp_path), bed=bed)
     at = Place(9, "window_000000", jumped="jump_000004_1")
     found = write_start(run, at, states, tmp_path / "next")
-    assert np.array_equal(found.position[0], place + move)
-    assert found.height.tolist() == [4.75]
+    assert np.array_equal(found.position[0], metre * place + move)
+    assert found.height.tolist() == [5.0 * metre - 0.25]
+    put = 5.0 - 0.25 / metre
     written = bytearray((tmp_path / "next" / "cycle_0.restart").read_bytes())
-    assert all((height == 4.75).all() for height in find_mesh(written, "m", "mesh/surface")[:1])
+    assert all((height == put).all() for height in find_mesh(written, "m", "mesh/surface")[:1])
     grains = np.frombuffer(written[-240:], float).reshape(3, 10)
-    assert np.array_equal(grains[:, :3], place + move)
+    assert np.array_equal(grains[:, :3], place + move / metre)
     assert not grains[:, 7:].any()
+
+
+@pytest.mark.parametrize(("units", "metre", "gram"), [("cgs", 0.01, 1e-3), ("lj", 1.0, 1.0)])
+def test_states_are_in_metres_and_kilograms(
+    units: str, metre: float, gram: float, tmp_path: Path
+) -> None:
+    """Of a deck in centimetres and grams as of one in metres; but what matches the restart file
+    stays as it stands there."""
+    deck = read_text(tmp_path, cut("").replace("units si", f"units {units}"))
+    columns = ("id", "x", "y", "z", "vx", "vy", "vz", "radius", "mass")
+    box = np.array([[0, 2.0], [0, 2], [0, 2]])
+    frame = Frame(0, columns, np.arange(1.0, 10)[None], box, boundary="pp ff ff")
+    write_dump(tmp_path / "cycle_0.dump", [frame])
+    states = read_states(tmp_path, 0, 0, Adopted(deck, "lammps"))
+    assert np.allclose(states.position[0], metre * np.array([[2, 3, 4]]), rtol=1e-15)
+    assert np.allclose(states.velocity[0], metre * np.array([[5, 6, 7]]), rtol=1e-15)
+    assert np.allclose([*states.radius, *states.mass], [8 * metre, 9 * gram], rtol=1e-15)
+    assert states.last.tolist() == [[1, 2, 3, 4, 5, 6, 7]]
+    assert np.array_equal(states.period, [[0, 2], [np.nan] * 2, [np.nan] * 2], equal_nan=True)
 
 
 @pytest.mark.parametrize("restart", [
@@ -354,9 +420,9 @@ def pack_spheres(place: np.ndarray, velocity: np.ndarray, tag: type, offset: int
     """A restart file of spheres 1, 2, ... as an engine writes them, identifiers as ``tag``."""
     rows = b""
     for number, (x, v) in enumerate(zip(place, velocity, strict=True), 1):
-        inside = (
-            np.array([number], tag).tobytes() + np.array([1.0, 1, 512, *v, 0.01, 5e-3]).tobytes()
-        )
+        image = np.array([512], tag).tobytes()
+        inside = np.array([number], tag).tobytes() + np.ones(2).tobytes() + image
+        inside += np.array([*v, 0.01, 5e-3]).tobytes()
         rows += x.tobytes() + inside
     return bytearray(b"x" * offset + rows + bytes(16))
 
@@ -369,10 +435,11 @@ def test_spheres_are_moved_in_the_restart_file(offset: int, tag: type) -> None:
     velocity = np.array([[1.0, 2, 3], [4, 5, 6], [7, 8, 9]])
     shift = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1]])
     restart = pack_spheres(place, velocity, tag, offset)
-    move_grains(restart, np.array([1, 2, 3]), place, velocity, shift)
+    walled = np.full((3, 2), np.nan)
+    move_grains(restart, np.array([1, 2, 3]), place, velocity, shift, walled)
     assert restart == pack_spheres(place + shift, 0 * velocity, tag, offset)
     with pytest.raises(EngineFailed, match="keeps grains in a way"):
-        move_grains(restart, np.array([1, 2, 3]), place, velocity, shift)
+        move_grains(restart, np.array([1, 2, 3]), place, velocity, shift, walled)
 
 
 # --- what a referee found ---------------------------------------------------------------------

@@ -15,7 +15,7 @@ from adapters.errors import UsageError
 from tests import own_decks
 
 
-def write_script(folder: Path, text: str) -> Path:
+def write_script(folder: Path, text: str = own_decks.YADE) -> Path:
     """A script in a folder, with the module that it imports."""
     (folder / "helpers.py").write_text(own_decks.HELPERS)
     path = folder / "bed.py"
@@ -25,7 +25,7 @@ def write_script(folder: Path, text: str) -> Path:
 
 def test_a_script_is_cut_at_its_marks(tmp_path: Path) -> None:
     """Statements above and between; the module beside it goes along, and the plate is known."""
-    deck = read_script(write_script(tmp_path, own_decks.YADE))
+    deck = read_script(write_script(tmp_path))
     assert [one.line for one in deck.cycle] == list(range(38, 46))
     assert list_inputs(deck) == [Path("helpers.py")]
     contents = list_contents(deck)
