@@ -32,16 +32,10 @@ class Kind:
     """Pattern of its saved states; empty for a kind whose story has the verbs itself."""
     files: str = ""  # what its folder holds for other programs, as a sentence
 
-    @property
-    def title(self) -> str:
-        """What such a run is called."""
-        return self.table if self.verb == "run" else self.verb
-
 
 KINDS = (
     Kind("sample", "run"),
-    Kind("deck", "run", "window_*/states.npz", "settlement.csv opens in a spreadsheet, "
-         "window_*/states.npz in NumPy"),
+    Kind("deck", "run"),
     Kind("simulation", "qdem", "checkpoint.npz", "fields.pvd opens in ParaView, probes.csv and "
          "energy.csv in a spreadsheet"),
     Kind("run", "rigid", "frame_*.npz", "history.csv opens in a spreadsheet, movie.gif in a "
@@ -103,15 +97,15 @@ def describe_run(path: Path, kind: Kind) -> dict[str, Any]:
     written = any(run_files.is_written(path, name) for name in (".lock", "lock"))
     state = "running" if written else "finished" if summary else "stopped"
     said = {
-        "run_folder": str(path), "kind": kind.title, "title": manifest["scene"].get("title", ""),
+        "run_folder": str(path), "kind": kind.verb, "title": manifest["scene"].get("title", ""),
         "state": state, "saved_states": states,
         "damaged": ", ".join(run_files.list_changed_tables(path, summary)),
     }  # fmt: skip
     said |= {key: summary[key] for key in ("time", "steps", "result") if key in summary}
     next_step = {
         "running": f"trackbed status {shlex.quote(str(path))}",
-        "finished": str(path / "report.html") if kind.verb != "run" else kind.files,
-        "stopped": _format_resume(manifest, kind),
+        "finished": str(path / "report.html"),
+        "stopped": _format_resume(manifest),
     }
     return said | {"next": next_step[state]}
 
@@ -145,8 +139,7 @@ def _show_report(arguments: argparse.Namespace, kind: Kind) -> int:
     path: Path = arguments.run_folder / "report.html"
     if said["state"] != "finished" or not path.is_file():
         raise UsageError(
-            f"this {kind.title} run is {said['state']}, and "
-            + ("has no report yet" if kind.verb == "run" else "its report is written at its end"),
+            f"this {kind.verb} run is {said['state']}, and its report is written at its end",
             where=str(arguments.run_folder), remedy=f"first: {said['next']}",
         )  # fmt: skip
     if said["damaged"]:
@@ -157,26 +150,26 @@ def _show_report(arguments: argparse.Namespace, kind: Kind) -> int:
 
 def _refuse_export(arguments: argparse.Namespace, kind: Kind) -> int:
     raise UsageError(
-        f"only settlement runs are exported, and this is a {kind.title} run",
+        f"only settlement runs are exported, and this is a {kind.verb} run",
         where=str(arguments.run_folder), remedy=f"its files are open already: {kind.files}",
     )  # fmt: skip
 
 
 def _refuse_resume(arguments: argparse.Namespace, kind: Kind) -> int:
     said = describe_run(arguments.run_folder, kind)
-    what = f"a {kind.title} run goes on with the command that started it"
+    what = f"a {kind.verb} run goes on with the command that started it"
     raise UsageError(
         f"this run is {said['state']}; {what}" if said["state"] != "stopped" else what,
         where=str(arguments.run_folder), remedy=said["next"],
     )  # fmt: skip
 
 
-def _format_resume(manifest: dict[str, Any], kind: Kind) -> str:
+def _format_resume(manifest: dict[str, Any]) -> str:
     """The command that goes on with a run that stopped, from where it was started."""
     origin = manifest.get("provenance", manifest)
     words = shlex.split(str(origin.get("command", "trackbed")))
     kept = [word for word in words if word not in ("--force", "--resume")]
-    return shlex.join(kept if kind.verb == "run" else [*kept, "--resume"])
+    return shlex.join([*kept, "--resume"])
 
 
 DOES = {

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from adapters.cli.arguments import add_json, add_run_argument, add_scene_arguments, list_overrides
 from adapters.errors import UsageError
 from trackbed.run_verbs import print_fields, show_page
+
+if TYPE_CHECKING:
+    from adapters.procedure import Record
 
 JUMP_KEYS = ("procedure.k", "procedure.h")
 """Keys that ``--tolerance`` stands for."""
@@ -111,7 +115,7 @@ def list_jump_overrides(arguments: argparse.Namespace) -> list[str]:
 
 def run_command(arguments: argparse.Namespace) -> int:
     """Run a scene from its start."""
-    from adapters.decks import describe_deck_run, is_deck_scene, run_deck_scene
+    from adapters.decks import is_deck_scene, run_deck_scene
     from adapters.procedure import run as procedure
 
     named = [f"procedure.name={arguments.procedure}"] if arguments.procedure else []
@@ -124,7 +128,7 @@ def run_command(arguments: argparse.Namespace) -> int:
                 remedy="trackbed adopt DECK --check runs two of its cycles",
             )  # fmt: skip
         run_deck_scene(arguments.scene, folder, control=arguments.control, overrides=overrides)
-        print(*describe_deck_run(folder), sep="\n")
+        print_result(folder)
         return 0
     procedure.run_scene(
         arguments.scene,
@@ -139,21 +143,35 @@ def run_command(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def read_record(run_folder: Path) -> Record:
+    """Read the run of a scene or of a deck."""
+    from adapters.decks import is_deck_scene, read_deck_record
+    from adapters.procedure import read_run_record
+
+    deck = is_deck_scene(run_folder / "scene.toml")
+    return (read_deck_record if deck else read_run_record)(run_folder)
+
+
 def print_result(run_folder: Path) -> None:
     """Print the sentence that an engineer asks for; nothing of a run without load cycles."""
-    from adapters.procedure import describe_result, read_run_record
+    from adapters.procedure import describe_result
 
-    for sentence in describe_result(read_run_record(run_folder))[-1:]:
+    for sentence in describe_result(read_record(run_folder))[-1:]:
         print(sentence)
 
 
 def run_resume(arguments: argparse.Namespace) -> int:
     """Go on with a run from its last window that passes the checks."""
+    from adapters.decks import is_deck_scene, resume_deck
     from adapters.procedure import run as procedure
 
-    procedure.resume(
-        arguments.run_folder, cycles=arguments.cycles, cycle_by_cycle=arguments.cycle_by_cycle
-    )
+    given = {"cycles": arguments.cycles, "cycle_by_cycle": arguments.cycle_by_cycle}
+    if not is_deck_scene(arguments.run_folder / "scene.toml"):
+        procedure.resume(arguments.run_folder, **given)
+    elif any(given.values()):
+        raise UsageError("the run of a deck is as long as its scene says", remedy="resume alone")
+    else:
+        resume_deck(arguments.run_folder)
     print_result(arguments.run_folder)
     return 0
 
@@ -162,9 +180,9 @@ def run_status(arguments: argparse.Namespace) -> int:
     """Print how far a run is, and in sentences what came out."""
     from dataclasses import asdict
 
-    from adapters.procedure import describe_result, judge_progress, make_plain, read_run_record
+    from adapters.procedure import describe_result, judge_progress, make_plain
 
-    record = read_run_record(arguments.run_folder)
+    record = read_record(arguments.run_folder)
     content = make_plain(asdict(judge_progress(record)))
     if not arguments.json:
         del content["result"]  # the sentences say it
@@ -176,8 +194,12 @@ def run_status(arguments: argparse.Namespace) -> int:
 
 def run_report(arguments: argparse.Namespace) -> int:
     """Write report.html and the figures; print the path and the result."""
-    from adapters.report import write_report
+    from adapters.decks import is_deck_scene
+    from adapters.report import write_brief_report, write_report
 
-    show_page(write_report(arguments.run_folder), arguments.open)
+    folder = arguments.run_folder
+    brief = is_deck_scene(folder / "scene.toml")
+    page = write_brief_report(read_record(folder)) if brief else write_report(folder)
+    show_page(page, arguments.open)
     print_result(arguments.run_folder)
     return 0

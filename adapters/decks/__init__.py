@@ -3,10 +3,10 @@
 from adapters.decks.adopt import Adoption, adopt
 from adapters.decks.check import check_cut, keep_check
 from adapters.decks.jump import jump
-from adapters.decks.run import describe_deck_run, run_deck_scene
+from adapters.decks.run import read_deck_record, resume_deck, run_deck_scene
 from adapters.decks.scene import is_deck_scene, load_deck_scene
 
 __all__ = [
-    "Adoption", "adopt", "check_cut", "describe_deck_run", "is_deck_scene", "jump",
-    "keep_check",    "load_deck_scene", "run_deck_scene",
+    "Adoption", "adopt", "check_cut", "is_deck_scene", "jump", "keep_check",
+    "load_deck_scene", "read_deck_record", "resume_deck", "run_deck_scene",
 ]  # fmt: skip

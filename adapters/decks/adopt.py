@@ -10,8 +10,8 @@ from adapters.decks.detect import add_lines, add_marks, find_obstacles, list_con
 from adapters.decks.engine import list_inputs, list_output_folders
 from adapters.decks.findings import Contents, Finding
 from adapters.decks.parse import BEGIN, END, Deck
-from adapters.decks.scene import is_deck_scene, read_marked
-from adapters.decks.scripts import add_script_marks
+from adapters.decks.scene import is_deck_scene
+from adapters.decks.scripts import ENDING, add_script_marks, read_marked
 from adapters.errors import UsageError
 from trackbed.run_files import refuse_writing, write_whole
 
@@ -53,7 +53,9 @@ def adopt(path: Path, engine: str) -> Adoption:
     path = path.absolute()
     if not path.name.isprintable():  # a scene could not name it
         raise UsageError("the deck's name is no text", where=ascii(path.name), remedy="rename it")
-    marked, found, copy = read_marked(path, engine), list[Finding](), path
+    if (path.suffix == ".py") != (engine == "yade"):
+        raise UsageError(ENDING, where=str(path), remedy="name the engine that it is written for")
+    marked, found, copy = read_marked(path), list[Finding](), path
     if not (is_deck_scene(path.parent / "scene.toml") and marked.marks):
         if marked.marks is None:
             runs = any(one.name == "run" and one.file == path.name for one in marked.before)
@@ -64,7 +66,7 @@ def adopt(path: Path, engine: str) -> Adoption:
                 )  # fmt: skip
             add = add_script_marks if marked.is_script else add_marks
             lines, said = add(marked)
-            marked, found = read_marked(path, engine, lines), [said]
+            marked, found = read_marked(path, lines), [said]
         found += [one for one in find_obstacles(marked, engine) if one.kind == "added"]
         name = path.name.removeprefix("in.").partition(".")[0] or "deck"
         folder = path.parent / name
@@ -79,7 +81,7 @@ def adopt(path: Path, engine: str) -> Adoption:
         file = json.dumps(path.name, ensure_ascii=False)
         text = SCENE.format(name=name, file=file, engine=engine, body=body)
         write_new(folder / "scene.toml", text.encode())
-    deck = read_marked(copy, engine)
+    deck = read_marked(copy)
     found += find_obstacles(deck, engine)
     return Adoption(copy.with_name("scene.toml"), deck, list_contents(deck), tuple(found))
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Sequence
 
-from adapters.decks.findings import Contents, Finding, note, stop
+from adapters.decks.findings import Contents, Finding, match_patterns, note, stop
 from adapters.decks.parse import BEGIN, END, METRE, VALUE, VARIABLE, Command, Deck, is_outside
 from adapters.decks.scripts import find_script_obstacles, list_script_contents
 from adapters.decks.split import KEYED, find_named, list_live
@@ -188,11 +188,7 @@ def find_patterns(deck: Deck, engine: str) -> Iterator[Finding]:
         "standing": standing, "live": [*standing, *deck.cycle], "before": deck.before,
         "cycle": deck.cycle, "both": deck.before + deck.cycle,
     }  # fmt: skip
-    for where, pattern, kind, what, remedy in PATTERNS:
-        for one in places[where]:
-            if found := re.match(pattern, " ".join(one.words)):
-                said, line = (t.format(*found.groups(), all=one.short) for t in (what, remedy))
-                yield Finding(kind, one.place, said, line, "cycle" if kind == "added" else "")
+    yield from match_patterns(PATTERNS, places)
     for one in standing:
         for word, region in zip(one.words[3:], one.words[4:], strict=False):
             gone = region not in regions and "$" not in region

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from adapters.decks.parse import Command
@@ -45,3 +47,14 @@ class Contents:
     def loaded_body(self) -> str:
         """The mesh that is driven, where there is one alone; else empty."""
         return next(iter(self.moved)) if len(self.moved) == 1 else ""
+
+
+def match_patterns(
+    patterns: Sequence[tuple[str, str, str, str, str]], places: Mapping[str, Sequence[Command]]
+) -> Iterator[Finding]:
+    """Findings of commands in the lists ``places`` that begin as one of ``patterns``."""
+    for where, pattern, kind, what, remedy in patterns:
+        for one in places[where]:
+            if found := re.match(pattern, one.plain):
+                said, line = (t.format(*found.groups(), all=one.short) for t in (what, remedy))
+                yield Finding(kind, one.place, said, line, "cycle" if kind == "added" else "")

@@ -45,6 +45,11 @@ class Command:
         return tuple(word.strip("\"'") for word in WORD.findall(self.text))
 
     @property
+    def plain(self) -> str:
+        """Its words with one space between them."""
+        return " ".join(self.words)
+
+    @property
     def name(self) -> str:
         """The first word."""
         return self.words[0]

@@ -34,16 +34,17 @@ from adapters.jumps import SLOPES
 from adapters.procedure import (
     CONTROL,
     Progress,
+    Record,
     estimate_gain,
     estimate_sinking,
+    read_track,
     refuse_differences,
     settle_by,
-    sum_cost,
 )
 from adapters.procedure import run as procedure
 from adapters.scene import Procedure
 from trackbed.memory import refuse_more_memory
-from trackbed.run_files import record_provenance, write_result, write_whole
+from trackbed.run_files import record_provenance, write_whole
 
 TRIES = 3
 """Jumps tried at a place, each half as long; then cycles are computed."""
@@ -104,6 +105,7 @@ def run_deck_scene(
         shutil.copyfile(path, run_path / "scene.toml")
         manifest = {
             "scene": record, "overrides": [*overrides], "control": control,
+            "origin": str(path.absolute()),
             "provenance": record_provenance(sys.argv),
         }  # fmt: skip
         write_whole(run_path / "manifest.json", json.dumps(manifest, indent=1) + "\n")
@@ -120,7 +122,6 @@ def run_deck_scene(
                 beside = folder.enter(CONTROL)
                 beside.share_start(folder, p.k_i + p.window_cycles)
                 settle(replace(run, folder=beside), jumps=False)
-            write_result(run_path, {"result": "; ".join(describe_deck_run(run_path))})
 
 
 def settle(run: DeckRun, jumps: bool) -> None:
@@ -276,21 +277,19 @@ def describe_row(row: dict[str, Any]) -> str:
     return said + ("" if body is None else f", of the loaded body {1e6 * body:.2f} um")
 
 
-def describe_deck_run(path: Path) -> list[str]:
-    """What came out of a run, and what the full run beside it says, in sentences."""
-    runs = RunFolder(path).outcomes(), RunFolder(path / CONTROL).outcomes()
-    rows, full = ({row["cycle"]: row for one in run for row in one.rows} for run in runs)
-    last, computed = max(rows), sum(row["kind"] != "jumped" for row in rows.values())
-    said = [f"{describe_row(rows[last])}; {computed} cycles computed"]
-    first = next((one.first_cycle for one in runs[0] if one.stage == "jump"), None)
-    if first is None or last not in full:
-        return said
-    for name, key in (("mean grain", "settlement"), ("loaded body", "loaded_body")):
-        if full[last][key] is not None:
-            gained, error = full[last][key] - rows[first][key], rows[last][key] - full[last][key]
-            said.append(
-                f"full run, {name}: {1e6 * full[last][key]:.2f} um, of these {1e6 * gained:.2f} "
-                f"since the first jump, by which the run errs by {1e6 * error:+.2f} um"
-            )
-    spent = [sum(sum_cost(one.cost) for one in run if one.stage != "preparation") for run in runs]
-    return [*said, f"CPU time {spent[0]:.3g} s, of the full run {spent[1]:.3g} s"]
+def read_deck_record(path: Path) -> Record:
+    """Read the run folder of a deck as `read_run_record` reads those of scenes."""
+    folder, beside = RunFolder(path), read_track(RunFolder(path / CONTROL))
+    manifest = folder.manifest()
+    scene: Any = SimpleNamespace(  # what is asked of a scene of how far a run is
+        procedure=Procedure.model_validate(manifest["scene"]["procedure"]), loading=manifest
+    )
+    control = beside if len(beside.history.cycle) else None
+    return Record(path, manifest, scene, read_track(folder), control, (), 1)
+
+
+def resume_deck(path: Path) -> None:
+    """Go on with the run of a deck from the scene that it was started with."""
+    manifest = RunFolder(path).manifest()
+    scene = Path(manifest.get("origin", path / "scene.toml"))
+    run_deck_scene(scene, path, overrides=manifest["overrides"])

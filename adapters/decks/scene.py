@@ -11,9 +11,7 @@ from pydantic import Field
 
 from adapters.decks.detect import list_contents
 from adapters.decks.engine import Adopted
-from adapters.decks.parse import Deck, read_deck
-from adapters.decks.scripts import read_script
-from adapters.errors import UsageError
+from adapters.decks.scripts import ENDING, read_marked
 from adapters.laws import get_law
 from adapters.moves import get_move
 from adapters.scene import Procedure, expand_schedule, fill_procedure
@@ -46,19 +44,6 @@ class DeckScene(Table):
     procedure: Procedure
 
 
-def read_marked(path: Path, engine: str, lines: Sequence[str] | None = None) -> Deck:
-    """Read a deck of an engine, or a script; raises as `read_deck`."""
-    if why := explain_ending(path, engine):
-        raise UsageError(why, where=str(path), remedy="give the engine that it is written for")
-    return (read_script if engine == "yade" else read_deck)(path, lines)
-
-
-def explain_ending(path: Path, engine: str) -> str:
-    """Why a file of this name is no deck of an engine; empty where it may be."""
-    ends = path.suffix == ".py"
-    return "" if ends == (engine == "yade") else "scripts of YADE, and no other decks, end with .py"
-
-
 def is_deck_scene(path: Path) -> bool:
     """Whether a scene file has the table ``[deck]``; False where it can not be read."""
     try:
@@ -85,10 +70,9 @@ def load_deck_scene(path: Path, overrides: Sequence[str] = ()) -> tuple[DeckScen
         problems.append(Problem("procedure.total_cycles", what))
     if p.h is None or p.k is None:
         problems.append(Problem("procedure", "missing: give k and h, or leave both out"))
-    file = path.parent / scene.deck.file
-    if why := explain_ending(file, scene.deck.engine):
-        text.refuse([*problems, Problem("deck.engine", why)])
-    deck = read_marked(file, scene.deck.engine)
+    deck = read_marked(path.parent / scene.deck.file)
+    if deck.is_script != (scene.deck.engine == "yade"):
+        problems.append(Problem("deck.engine", ENDING))
     contents = list_contents(deck)
     meshes = contents.meshes if scene.deck.engine != "lammps" else {}
     if deck.marks is None:

@@ -8,17 +8,20 @@ the marks.  So a script needs no more marks than a deck of another engine.
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from adapters.decks.findings import Contents, Finding, note, stop
-from adapters.decks.parse import BEGIN, END, Command, Deck, find_marks, is_outside, read_lines
+from adapters.decks import parse
+from adapters.decks.findings import Contents, Finding, match_patterns, stop
+from adapters.decks.parse import BEGIN, END, Command, Deck
 from adapters.errors import UsageError
 
 STEPS = 1000
 """Time steps of the cycle that is put at the end of a script that runs none: a guess, and said."""
+ENDING = "scripts of YADE, and no other decks, end with .py"
 
 
 @dataclass(frozen=True)
@@ -34,16 +37,20 @@ class Statement(Command):
         for one in ast.walk(self.node):
             if isinstance(one, ast.Constant) and isinstance(one.value, str):
                 found.append(one.value)
-            elif isinstance(one, ast.Import):
-                found += [f"{name.name}.py" for name in one.names]
-            elif isinstance(one, ast.ImportFrom):
-                found.append(f"{one.module}.py")
+            elif isinstance(one, ast.Import | ast.ImportFrom):
+                names = (getattr(one, "module", None), *(name.name for name in one.names))
+                found += [f"{name}.py" for name in names if name]
         return tuple(found)
 
-    def calls(self, *names: str) -> list[ast.Call]:
-        """Calls in it of functions or methods of these names, such as ``O.run``."""
-        calls = (one for one in ast.walk(self.node) if isinstance(one, ast.Call))
-        return [one for one in calls if ast.unparse(one.func) in names]
+    @cached_property
+    def plain(self) -> str:
+        """Its text on as few lines as can be."""
+        return ast.unparse(self.node)
+
+
+def read_marked(path: Path, lines: Sequence[str] | None = None) -> Deck:
+    """Read a script or, by its name, a deck; raises as `read_deck` and `read_script`."""
+    return (read_script if path.suffix == ".py" else parse.read_deck)(path, lines)
 
 
 def read_script(path: Path, lines: Sequence[str] | None = None) -> Deck:
@@ -52,8 +59,8 @@ def read_script(path: Path, lines: Sequence[str] | None = None) -> Deck:
     Raises `UsageError` for a file that can not be read, that is no Python, and for marks that are
     not one pair at the top level.
     """
-    lines = read_lines(path) if lines is None else lines
-    marks = find_marks(path, lines)
+    lines = parse.read_lines(path) if lines is None else lines
+    marks = parse.find_marks(path, lines)
     first, last = marks or (len(lines) + 1, len(lines) + 1)
     before, cycle, after = list[Command](), list[Command](), list[Command]()
     try:
@@ -84,15 +91,10 @@ def format_script(deck: Deck, kind: str, cycles: int, loaded: str) -> str:
     )
 
 
-def list_statements(commands: Sequence[Command]) -> list[Statement]:
-    """Commands of a script as what they are."""
-    return [one for one in commands if isinstance(one, Statement)]
-
-
 def list_script_contents(deck: Deck) -> Contents:
     """Clumps, variables that may hold a body, and of these what is given a velocity."""
     bodies, moved = dict[str, str](), dict[str, str]()
-    nodes = [n for one in list_statements(deck.commands) for n in ast.walk(one.node)]
+    nodes = [*ast.walk(ast.parse("\n".join(deck.lines)))]
     for one in nodes:
         if isinstance(one, ast.Assign) and "bodies" in ast.unparse(one.value):
             bodies |= {target.id: "body" for target in one.targets if isinstance(target, ast.Name)}
@@ -104,36 +106,35 @@ def list_script_contents(deck: Deck) -> Contents:
     return Contents((), ("clumps",) if clumped else (), bodies, moved)
 
 
+PATTERNS = (
+    ("cycle", r"(?s).*\bO\.(?:reset|load|reload|loadTmp|bodies\.clear)\(", "stops",
+     "'{all}' inside the cycle begins another bed", f"put it above '{BEGIN}'"),
+    ("cycle", r"(?s).*\bO\.forces\.[ft]\(", "note", "forces are 0 where a window begins",
+     "read them behind an O.run"),
+    ("before", r"(?s).*\bO\.forces\.setPerm[FT]\(", "stops",
+     "permanent forces are in no saved scene", f"put it below '{BEGIN}'"),
+    ("both", r"(?s).*\b(realPeriod=[^,)]+)", "stops",
+     "{0} waits for seconds of the clock, which are in no two runs alike", "iterPeriod=STEPS"),
+    ("both", r"(?s).*\bgravity=[\[(](?=[-\d.])(?![-0.]+, [-0.]+,)", "stops",
+     "gravity is not along -z, where settlement is", "turn the script"),
+)  # fmt: skip
+"""As `adapters.decks.detect.PATTERNS`."""
+
+
 def find_script_obstacles(deck: Deck) -> Iterator[Finding]:
     """What stands in the way of cutting a script, each as a sentence with the line to add."""
-    statements, cycle = list_statements(deck.commands), list_statements(deck.cycle)
-    pauses = any(one.calls("O.pause") for one in statements)
-    if not any(one.calls("O.run", "O.step") for one in cycle):
+    yield from match_patterns(PATTERNS, {
+        "before": deck.before, "cycle": deck.cycle, "both": deck.before + deck.cycle,
+    })  # fmt: skip
+    if not any(re.search(r"\bO\.(run|step)\(", one.plain) for one in deck.cycle):
         yield Finding("stops", "", "nothing is run between the marks", "O.run(STEPS, True)")
-    for one in cycle:
-        for call in one.calls("O.run"):
-            if not (call.args or call.keywords) and not pauses:
-                yield stop(one, f"'{one.short}' never ends", "O.run(STEPS, True)")
-        for call in one.calls("O.reset", "O.load", "O.reload", "O.loadTmp", "O.bodies.clear"):
-            what = f"'{ast.unparse(call)}' inside the cycle begins another bed"
-            yield stop(one, what, f"put it above '{BEGIN}'")
-        if "O.forces.f(" in one.text or "O.forces.t(" in one.text:
-            yield note(one, "forces are 0 where a window begins", "read them behind an O.run")
-    for one in statements:
-        if one not in cycle and one.calls("O.forces.setPermF", "O.forces.setPermT"):
-            yield stop(one, "permanent forces are in no saved scene", f"put it below '{BEGIN}'")
-        for call in (n for n in ast.walk(one.node) if isinstance(n, ast.Call)):
-            keys = {key.arg: key.value for key in call.keywords}
-            if "realPeriod" in keys:
-                what = f"'{ast.unparse(call)}' waits for seconds of the clock, in no two runs alike"
-                yield stop(one, what, f"line {call.lineno}: iterPeriod=STEPS")
-            pull = keys.get("gravity")
-            if isinstance(pull, (ast.Tuple, ast.List)) and any(
-                ast.unparse(x).strip("-0.") for x in pull.elts[:2]
-            ):
-                yield stop(one, "gravity is not along -z, where settlement is", "turn the script")
+    paused = any("O.pause(" in one.plain for one in deck.commands)
+    for one in deck.cycle if not paused else ():
+        if "O.run()" in one.plain:
+            yield stop(one, f"'{one.short}' never ends", "O.run(STEPS, True)")
+    for one in deck.commands:
         for word in one.words[1:]:
-            if is_outside(word) and len(Path(word).parts) > 2:
+            if parse.is_outside(word) and len(Path(word).parts) > 2:
                 what = f"{word} lies outside of the folder of the script, and is not carried along"
                 yield stop(one, what, "put it beside the script, and name it so")
 
@@ -144,8 +145,7 @@ def add_script_marks(deck: Deck) -> tuple[list[str], Finding]:
     A script that runs nothing, as one for YADE's window, gets a run of `STEPS` at its end.
     """
     lines = list(deck.lines)
-    runs = [one for one in list_statements(deck.before) if one.calls("O.run")]
-    runs = [one for one in runs if isinstance(one.node, ast.Expr)]
+    runs = [one for one in deck.before if one.plain.startswith("O.run(")]
     remedy = "move them in the copy if your load cycle is another stretch of statements"
     if not runs:
         what = f"nothing is run at the top level: {STEPS} steps are put at the end as a cycle"

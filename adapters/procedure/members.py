@@ -129,8 +129,8 @@ def sum_members_cost(record: Record) -> float:
 
 
 def describe_result(record: Record) -> list[str]:
-    """What came out so far: a sentence on the mean grain, then the one that an engineer asks for;
-    none before a cycle."""
+    """What came out so far: a sentence on the mean grain, then the one that an engineer asks for,
+    where there is a loaded body; none before a cycle."""
     settled = judge_members(record)
     if settled is None:
         return []
@@ -138,7 +138,8 @@ def describe_result(record: Record) -> list[str]:
     how = "all" if computed == settled.cycle else f"{computed:,}"
     said = f"mean grain settles {format_length(settled.mean_grain)}"
     said += f"; {how} of {settled.cycle:,} cycles computed"
-    return [said + format_error(settled.mean_grain_error), describe_sleeper(settled)]
+    sleeper = [describe_sleeper(settled)] if isfinite(settled.loaded_body.value) else []
+    return [said + format_error(settled.mean_grain_error), *sleeper]
 
 
 def describe_sleeper(settled: Settled) -> str:

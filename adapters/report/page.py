@@ -47,20 +47,36 @@ def write_report(run_folder: Path) -> Path:
     record = procedure.read_run_record(run_folder)
     numbers = gather_numbers(record)
     with explain_full_disk(run_folder):
-        figure = write_figure(record, numbers) if numbers.cycle else None
+        figure = write_figure(record, numbers.settled) if numbers.cycle else None
         write_whole(run_folder / "report.json", numbers.to_json())
         html = make_page(f"Settlement of {numbers.scene}", list_sections(record, numbers, figure))
         write_whole(run_folder / "report.html", html)
     return run_folder / "report.html"
 
 
-def write_figure(record: procedure.Record, numbers: Numbers) -> Path:
+def write_brief_report(record: procedure.Record) -> Path:
+    """Write the report of a bed that trackbed did not make: its settlement, and failed jumps."""
+    settled = procedure.judge_members(record)
+    with explain_full_disk(record.path):
+        figure = write_figure(record, settled) if settled else None
+        body = [
+            "<h1>Settlement under cyclic load</h1>",
+            *(make_paragraph(escape(one)) for one in procedure.describe_result(record)),
+            make_picture(figure, "Settlement curve", "Grey spans were jumped."),
+            make_section("Failed jumps", make_list(escape(j.why) for j in record.run.failed_jumps)),
+            make_section("Damaged", make_list(map(escape, record.run.damaged))),
+        ]
+        write_whole(record.path / "report.html", make_page("Settlement of a deck", body))
+    return record.path / "report.html"
+
+
+def write_figure(record: procedure.Record, found: procedure.Settled | None) -> Path:
     """Draw the settlement; the picture's path."""
     folder = record.path / "figures"
     folder.mkdir(exist_ok=True)
     full = None if record.control is None else record.control.history
     spans = procedure.list_jumped_spans(record.run.outcomes)
-    found, title = numbers.settled, ""
+    title = ""
     if found is not None and found.pairs:
         title = f"error {100 * found.error.value:+.1f} % at a speed-up of {found.speed_up:.2f}"
     return save_figure(

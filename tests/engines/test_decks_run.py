@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -125,10 +126,14 @@ def test_a_deck_is_run_with_jumps_and_a_full_run_beside_it(
     states = load_states(control.path / control.stage_names()[-1] / "states.npz")
     assert np.array_equal(states.position[-1], last)
     assert command.main(["status", str(run.path)]) == 0
-    assert "since the first jump, by which the run errs by" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "; error " in said.splitlines()[-1]
+    assert re.search(r"control cycle +30\n", said)
+    assert command.main(["report", str(run.path)]) == 0
+    assert "mean grain settles" in (run.path / "report.html").read_text()
     # once more: nothing is left to compute, and a longer run is another run
     events = len(run.events())
-    assert command.main(["run", str(scene), "--control", *words]) == 0
+    assert command.main(["resume", str(run.path)]) == 0
     assert [one["event"] for one in run.events()[events:]] == ["engine"]
     with pytest.raises(SceneError, match="differs from the one this run was started with"):
         run_deck_scene(scene, run.path, overrides=["procedure.total_cycles=50"])

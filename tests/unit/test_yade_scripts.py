@@ -43,7 +43,7 @@ OBSTACLES = {
     "endless": (cut("O.run()"), "stops", "-> O.run(STEPS, True)"),
     "another bed": (cut("O.run(5)\nO.reload()"), "stops", "'O.reload()' inside the cycle"),
     "clock": (cut("O.run(5)", "O.engines += [PyRunner(command='f()', realPeriod=2)]"),
-              "stops", "-> line 2: iterPeriod=STEPS"),
+              "stops", "-> iterPeriod=STEPS"),
     "gravity": (cut("O.run(5)", "n = NewtonIntegrator(gravity=(0, -9.81, 0))"),
                 "stops", "gravity is not along -z"),
     "permanent": (cut("O.run(5)", "O.forces.setPermF(3, (0, 0, -1))"),
