@@ -3,7 +3,8 @@
 from adapters.decks.adopt import Adoption, adopt
 from adapters.decks.check import check_cut, keep_check
 from adapters.decks.jump import jump
-from adapters.decks.run import read_deck_record, resume_deck, run_deck_scene
+from adapters.decks.record import read_deck_record
+from adapters.decks.run import resume_deck, run_deck_scene
 from adapters.decks.scene import is_deck_scene, load_deck_scene
 
 __all__ = [

@@ -11,7 +11,7 @@ from adapters.decks.engine import list_inputs, list_output_folders
 from adapters.decks.findings import Contents, Finding
 from adapters.decks.parse import BEGIN, END, Deck
 from adapters.decks.scene import is_deck_scene
-from adapters.decks.scripts import ENDING, add_script_marks, read_marked
+from adapters.decks.scripts import ENDING, read_marked
 from adapters.errors import UsageError
 from trackbed.run_files import refuse_writing, write_whole
 
@@ -64,8 +64,7 @@ def adopt(path: Path, engine: str) -> Adoption:
                     "nothing is run in this deck, so there is no load cycle", where=str(path),
                     remedy=f"put '{BEGIN}' above the commands of one cycle, '{END}' below them",
                 )  # fmt: skip
-            add = add_script_marks if marked.is_script else add_marks
-            lines, said = add(marked)
+            lines, said = add_marks(marked)
             marked, found = read_marked(path, lines), [said]
         found += [one for one in find_obstacles(marked, engine) if one.kind == "added"]
         name = path.name.removeprefix("in.").partition(".")[0] or "deck"

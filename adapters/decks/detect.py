@@ -9,8 +9,8 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Sequence
 
-from adapters.decks.findings import Contents, Finding, match_patterns, note, stop
-from adapters.decks.parse import BEGIN, END, METRE, VALUE, VARIABLE, Command, Deck, is_outside
+from adapters.decks.findings import Contents, Finding, find_outside, match_patterns, note, stop
+from adapters.decks.parse import BEGIN, END, METRE, VALUE, VARIABLE, Command, Deck
 from adapters.decks.scripts import find_script_obstacles, list_script_contents
 from adapters.decks.split import KEYED, find_named, list_live
 
@@ -20,10 +20,8 @@ STATE = re.compile(
     r"|\b(xcm|vcm|bound|count|mass|ke|gyration|fcm|random|normal)(?=\()"
 )
 """Parts of a formula whose value is another when the window starts."""
-COUNTED = re.compile(
-    r"(?<![\w.])(elapsed|elaplong|ramp|stagger|logfreq\w*|vdisplace|[sc]wiggle)(?!\w)"
-)
-"""Parts of a formula that count steps from the start of each run."""
+STEPS = 1000
+"""Time steps of the cycle that is put at the end of a script that runs none: a guess, and said."""
 DECLARED = r"\b(?:fix|unfix|compute|region|dump|pair_style|pair_coeff)\s"
 OUTPUTS = ("dump", "log", "write_dump", "write_restart")
 AVERAGES = ("print", "ave/time", "ave/chunk")
@@ -44,6 +42,17 @@ PATTERNS = (
     ("live", r"fix (\S+) (\S+) (freeze|move|setforce)(?!\S)", "note",
      "fix {0} {2} holds or moves grains of {1}",
      "grains that do not move in a window are not moved by a jump"),
+    ("standing", r"fix (\S+) \S+ wall/gran\S* .*\bwiggle(?!\S)", "stops",
+     "the motion of wall {0} starts again from its first phase in each window",
+     f"'{{all}}' below '{BEGIN}', 'unfix {{0}}' above '{END}', whole periods"),
+    ("live", r"fix (\S+) \S+ move/mesh .*\bwiggle(?!\S)", "note",
+     "fix {0} goes on in its phase to round-off only (8e-7 m were seen)",
+     "a cycle must be whole periods of it"),
+    ("live", r"variable (\S+) .*?(?<![\w.])(elapsed|elaplong|ramp|stagger|logfreq|vdisplace|"
+     r"[sc]wiggle)(?!\w)", "note", "variable {0} counts {1} steps from the start of each run",
+     "the motion must be whole in each run"),
+    ("live", rf"units (?!(?:{'|'.join(METRE)})(?!\S))(\S+)", "note",
+     "lengths are in units {0}, no metres", ""),
     ("live", r"thermo_modify .*\b(?:ignore|warn)(?!\S)", "note",
      "grains that leave the box vanish without stopping the engine", "thermo_modify lost error"),
     ("before", r"group (\S+) .*\bdynamic(?!\S)", "note",
@@ -156,22 +165,11 @@ def find_state(formula: str, variables: dict[str, Command], depth: int = 0) -> s
     return next(filter(None, found), "")
 
 
-def find_phases(deck: Deck, engine: str) -> Iterator[Finding]:
-    """Motions whose phase counts from the start of a run, and forces read where a run begins."""
+def find_lying_forces(deck: Deck, engine: str) -> Iterator[Finding]:
+    """Forces of meshes that LIGGGHTS does not have where a run begins."""
     meshes = list_contents(deck).meshes if engine == "liggghts" else {}
     for one in (*list_live(deck.before), *deck.cycle):
-        name, waves = one.word(1), one.name == "fix" and "wiggle" in one.words
-        if waves and engine == "lammps" and "wall/gran" in one.text and one not in deck.cycle:
-            what = f"the motion of wall {name} starts again from its first phase in each window"
-            remedy = f"'{one.short}' below '{BEGIN}', 'unfix {name}' above '{END}', whole periods"
-            yield stop(one, what, remedy)
-        elif waves and one.word(3) == "move/mesh":
-            what = f"fix {name} goes on in its phase to round-off only (8e-7 m were seen)"
-            yield note(one, what, "a cycle must be whole periods of it")
         formula = " ".join(one.words[3:]) if one.name == "variable" else ""
-        if part := COUNTED.search(formula):
-            what = f"variable {name} counts {part[0]} steps from the start of each run"
-            yield note(one, what, "the motion must be whole in each run")
         if read := set(re.findall(r"\bf_(\w+)\[", formula)) & meshes.keys():
             what = (
                 f"f_{min(read)}[...] is 0 where a window begins and doubled where a further run "
@@ -230,17 +228,11 @@ def find_losses(deck: Deck, engine: str) -> Iterator[Finding]:
         if path and (one.name in OUTPUTS or one.word(3) in AVERAGES):
             what = f"{path} is written by each window over the last one's"
             yield note(one, what, "a relative name: each window has a folder of its own")
-        if one.name == "units" and one.word(1) not in METRE:
-            yield note(one, f"lengths are in units {one.word(1)}, no metres")
-    for one in deck.commands:
-        for word in one.words[1:]:
-            if is_outside(word) and "/" in word and one.name not in OUTPUTS:
-                what = f"{word} lies outside of the folder of the deck, and is not carried along"
-                yield stop(one, what, "put it beside the deck, and name it so")
+    yield from find_outside(one for one in deck.commands if one.name not in OUTPUTS)
 
 
 RULES: Sequence[Callable[[Deck, str], Iterator[Finding]]] = (
-    find_unfinished, find_absolute_runs, find_frozen_values, find_phases, find_patterns,
+    find_unfinished, find_absolute_runs, find_frozen_values, find_lying_forces, find_patterns,
     find_branches, find_losses,
 )  # fmt: skip
 """What is looked for."""
@@ -257,9 +249,18 @@ def add_lines(deck: Deck, findings: Sequence[Finding]) -> list[str]:
 
 
 def add_marks(deck: Deck) -> tuple[list[str], Finding]:
-    """Lines of a deck with marks around its last run, and what is to be said of that."""
-    lines, run = list(deck.lines), next(one for one in reversed(deck.before) if one.name == "run")
+    """Lines of a deck with marks around its last run, and what is to be said of that.
+
+    A script that runs nothing, as one for YADE's window, gets a run of `STEPS` at its end.
+    """
+    lines, runs = list(deck.lines), [one for one in deck.before if one.file == deck.path.name]
+    runs = [one for one in runs if re.match(r"run |O\.run\(", one.plain)]
+    remedy = "move them in the copy if your load cycle is another stretch of commands"
+    if not runs:
+        what = f"nothing is run at the top level: {STEPS} steps are put at the end as a cycle"
+        added = [BEGIN, f"O.run({STEPS}, True)", END]
+        return lines + added, Finding("added", "", what, remedy)
+    run = runs[-1]
     lines[run.line - 1 : run.last] = [BEGIN, *lines[run.line - 1 : run.last], END]
     what = f"no load cycle is marked: the marks are put around the last run, '{run.short}'"
-    remedy = "move them in the copy if your load cycle is another stretch of commands"
     return lines, Finding("added", run.place, what, remedy)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
-from adapters.decks.parse import Command
+from adapters.decks.parse import Command, is_outside
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,15 @@ class Contents:
     def loaded_body(self) -> str:
         """The mesh that is driven, where there is one alone; else empty."""
         return next(iter(self.moved)) if len(self.moved) == 1 else ""
+
+
+def find_outside(commands: Iterable[Command]) -> Iterator[Finding]:
+    """Files that no run carries along."""
+    for one in commands:
+        for word in one.words[1:]:
+            if is_outside(word) and len(Path(word).parts) > 1:
+                what = f"{word} lies outside of the folder of the deck, and is not carried along"
+                yield stop(one, what, "put it beside the deck, and name it so")
 
 
 def match_patterns(

@@ -19,11 +19,11 @@ from typing import Any
 
 import numpy as np
 
-from adapters.bed import State
 from adapters.decks.check import digest_deck, is_checked
 from adapters.decks.detect import find_obstacles
 from adapters.decks.engine import Adopted, format_run, run_deck
 from adapters.decks.jump import jump, keep_held
+from adapters.decks.record import make_state
 from adapters.decks.restart import find_mesh, move_grains, move_stones
 from adapters.decks.scene import load_deck_scene
 from adapters.decks.states import States, find_overlap, load_states, read_states, save_states
@@ -34,10 +34,8 @@ from adapters.jumps import SLOPES
 from adapters.procedure import (
     CONTROL,
     Progress,
-    Record,
     estimate_gain,
     estimate_sinking,
-    read_track,
     refuse_differences,
     settle_by,
 )
@@ -216,8 +214,7 @@ def jump_bed(run: DeckRun, place: Place, h: int, name: str) -> Place:
         seen = states.position[place.healing :]
         first = place.cycle + 1 - len(seen)
         target = jump(seen, h, states.radius, law=p.law, move=p.move, first_cycle=first)
-        still = np.zeros_like(target)
-        before = State(states.identifier, seen[-1], states.radius, states.mass, still, still)
+        before = make_state(states, -1, place.cycle)
         like: Any = SimpleNamespace(procedure=p, folder=run.folder)  # what forecasts ask of a run
         at: Any = place
         if p.settlement == "history":
@@ -275,17 +272,6 @@ def describe_row(row: dict[str, Any]) -> str:
     body = row["loaded_body"]
     said = f"cycle {row['cycle']}, settlement of the mean grain {1e6 * row['settlement']:.2f} um"
     return said + ("" if body is None else f", of the loaded body {1e6 * body:.2f} um")
-
-
-def read_deck_record(path: Path) -> Record:
-    """Read the run folder of a deck as `read_run_record` reads those of scenes."""
-    folder, beside = RunFolder(path), read_track(RunFolder(path / CONTROL))
-    manifest = folder.manifest()
-    scene: Any = SimpleNamespace(  # what is asked of a scene of how far a run is
-        procedure=Procedure.model_validate(manifest["scene"]["procedure"]), loading=manifest
-    )
-    control = beside if len(beside.history.cycle) else None
-    return Record(path, manifest, scene, read_track(folder), control, (), 1)
 
 
 def resume_deck(path: Path) -> None:

@@ -15,12 +15,10 @@ from functools import cached_property
 from pathlib import Path
 
 from adapters.decks import parse
-from adapters.decks.findings import Contents, Finding, match_patterns, stop
-from adapters.decks.parse import BEGIN, END, Command, Deck
+from adapters.decks.findings import Contents, Finding, find_outside, match_patterns, stop
+from adapters.decks.parse import BEGIN, Command, Deck
 from adapters.errors import UsageError
 
-STEPS = 1000
-"""Time steps of the cycle that is put at the end of a script that runs none: a guess, and said."""
 ENDING = "scripts of YADE, and no other decks, end with .py"
 
 
@@ -132,25 +130,4 @@ def find_script_obstacles(deck: Deck) -> Iterator[Finding]:
     for one in deck.cycle if not paused else ():
         if "O.run()" in one.plain:
             yield stop(one, f"'{one.short}' never ends", "O.run(STEPS, True)")
-    for one in deck.commands:
-        for word in one.words[1:]:
-            if parse.is_outside(word) and len(Path(word).parts) > 2:
-                what = f"{word} lies outside of the folder of the script, and is not carried along"
-                yield stop(one, what, "put it beside the script, and name it so")
-
-
-def add_script_marks(deck: Deck) -> tuple[list[str], Finding]:
-    """Lines of a script with marks around its last run, and what is to be said of that.
-
-    A script that runs nothing, as one for YADE's window, gets a run of `STEPS` at its end.
-    """
-    lines = list(deck.lines)
-    runs = [one for one in deck.before if one.plain.startswith("O.run(")]
-    remedy = "move them in the copy if your load cycle is another stretch of statements"
-    if not runs:
-        what = f"nothing is run at the top level: {STEPS} steps are put at the end as a cycle"
-        return [*lines, BEGIN, f"O.run({STEPS}, True)", END], Finding("added", "", what, remedy)
-    run = runs[-1]
-    lines[run.line - 1 : run.last] = [BEGIN, *lines[run.line - 1 : run.last], END]
-    what = f"no load cycle is marked: the marks are put around the last run, '{run.short}'"
-    return lines, Finding("added", run.place, what, remedy)
+    yield from find_outside(deck.commands)

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from adapters.decks.adopt import adopt
-from adapters.decks.detect import find_obstacles, list_contents
+from adapters.decks.detect import add_marks, find_obstacles, list_contents
 from adapters.decks.engine import list_inputs
 from adapters.decks.parse import BEGIN, END
-from adapters.decks.scripts import add_script_marks, read_script
+from adapters.decks.scripts import read_script
 from adapters.errors import UsageError
 from tests import own_decks
 
@@ -79,7 +79,7 @@ def test_what_is_right_is_not_said(tmp_path: Path) -> None:
 def test_a_script_without_marks_gets_them(text: str, marked: list[str], tmp_path: Path) -> None:
     """Around its last run at the top level, or a run of 1,000 steps at its end."""
     deck = read_script(write_script(tmp_path, text))
-    lines, said = add_script_marks(deck)
+    lines, said = add_marks(deck)
     assert lines == marked
     assert said.kind == "added"
 
