@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from adapters.cli.arguments import add_json, add_run_argument, print_json
+from adapters.cli.run import read_record
 
 OPENED_BY = {
     "vtu": "ParaView; colour grains by displacement, glyph: sphere, scale: radius, factor 2",
@@ -39,7 +40,7 @@ def run_export(arguments: argparse.Namespace) -> int:
     from adapters.report.export import export_run, read_exported_run
 
     into = arguments.into or arguments.run_folder / arguments.variant / "export"
-    run = read_exported_run(arguments.run_folder, arguments.variant)
+    run = read_exported_run(arguments.run_folder, arguments.variant, read_record)
     files = export_run(run, arguments.to, into, arguments.every)
     if arguments.json:
         size = sum(path.stat().st_size for path in files)

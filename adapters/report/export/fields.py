@@ -23,7 +23,8 @@ def gather_grains(run: ExportedRun, instant: Instant) -> dict[str, Array]:
     fields: dict[str, Array] = {"id": state.identifier, "radius": state.radius}
     if run.loaded:
         fields["displacement"] = instant.displacement
-    return fields | {"velocity": state.velocity, "coordination": instant.coordination}
+    fields["velocity"] = state.velocity
+    return fields | ({"coordination": instant.coordination} if run.own else {})
 
 
 def gather_placed_grains(run: ExportedRun, instant: Instant) -> dict[str, Array]:

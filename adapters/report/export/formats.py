@@ -40,18 +40,19 @@ def export_vtu(run: ExportedRun, into: Path, every: int) -> list[Path]:
     grains, contacts = [], []
     for instant in run.instants(every):
         grains.append((instant.cycle, f"vtu/grains_{instant.cycle:06d}.vtu"))
-        contacts.append((instant.cycle, f"vtu/contacts_{instant.cycle:06d}.vtu"))
         centres = instant.state.position
         points = np.arange(len(centres))[:, None]
         of_grains = gather_grains(run, instant)
         write_mesh(into / grains[-1][1], centres, "vertex", points, point_data=of_grains)
-        of_contacts = gather_contacts(run, instant)
-        lines = list_contacts(instant)
-        write_mesh(into / contacts[-1][1], centres, "line", lines, cell_data=of_contacts)
-    write_pvd(into / "grains.pvd", grains)
-    write_pvd(into / "contacts.pvd", contacts)
-    files = [into / name for _, name in (*grains, *contacts)]
-    return [into / "grains.pvd", into / "contacts.pvd", *files]
+        if run.own:
+            contacts.append((instant.cycle, f"vtu/contacts_{instant.cycle:06d}.vtu"))
+            of_contacts, lines = gather_contacts(run, instant), list_contacts(instant)
+            write_mesh(into / contacts[-1][1], centres, "line", lines, cell_data=of_contacts)
+    series = {"grains": grains} | ({"contacts": contacts} if run.own else {})
+    for name, files in series.items():
+        write_pvd(into / f"{name}.pvd", files)
+    written = [into / name for _, name in (*grains, *contacts)]
+    return [*(into / f"{name}.pvd" for name in series), *written]
 
 
 def write_mesh(
@@ -87,6 +88,8 @@ def export_ovito(run: ExportedRun, into: Path, every: int) -> list[Path]:
             yield _make_frame(instant, _gather_contact_columns(run, instant), box, "entries")
 
     write_dump(into / "grains.dump", make_grain_frames())
+    if not run.own:
+        return [into / "grains.dump"]
     write_dump(into / "contacts.dump", make_contact_frames())
     return [into / "grains.dump", into / "contacts.dump"]
 
@@ -107,8 +110,13 @@ def _make_frame(
 
 
 def _find_box(run: ExportedRun) -> FloatArray:
-    """Low and high of the container, up to the settled bed's top [m], shape (3, 2)."""
+    """Low and high of the container, up to the settled bed's top [m], shape (3, 2); of a deck those
+    of the grains."""
     start = run.track.start()
+    if not run.own:
+        reach = start.radius[:, None]
+        low, high = (start.position - reach).min(axis=0), (start.position + reach).max(axis=0)
+        return np.column_stack([low, high])
     low, high = bound_section(run.scene.container)
     top = float((start.position[:, 2] + start.radius).max())
     return np.array([*zip(low, high, strict=True), (0.0, top)])
@@ -132,8 +140,10 @@ def export_csv(run: ExportedRun, into: Path, every: int) -> list[Path]:
             fields = split_columns(gather_contacts(run, instant), "_")
             yield _add_cycle(instant, {"id1": first, "id2": second, **dict(fields)})
 
-    tables = {"grains": list_grain_columns(), "contacts": list_contact_columns()}
-    if run.loaded:
+    tables = {"grains": list_grain_columns()}
+    if run.own:
+        tables["contacts"] = list_contact_columns()
+    if run.own and run.loaded:
         tables["piston"] = run.piston_samples()
     for name, parts in tables.items():
         write_csv_rows(into / f"{name}.csv", parts)

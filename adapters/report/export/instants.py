@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from adapters.bed import FloatArray, IntArray, State, find_pairs
 from adapters.errors import UsageError
-from adapters.procedure import CONTROL, Track, read_run_record
+from adapters.procedure import CONTROL, Record, Track, read_run_record
 from adapters.scene import Scene
 
 
@@ -37,6 +37,11 @@ class ExportedRun:
     track: Track
 
     @property
+    def own(self) -> bool:
+        """Whether trackbed made the bed: of a deck neither contacts nor piston are known."""
+        return isinstance(self.scene, Scene)
+
+    @property
     def loaded(self) -> bool:
         """Whether load cycles were computed: without them nothing moves and there is no piston."""
         return bool(self.track.windows)
@@ -44,7 +49,7 @@ class ExportedRun:
     @property
     def frictional(self) -> bool:
         """Whether contacts between grains have a tangential force."""
-        return self.scene.material.grain.friction > 0
+        return self.own and self.scene.material.grain.friction > 0
 
     def _states(self, every: int) -> Iterator[State]:
         yield self.track.start()
@@ -63,11 +68,12 @@ class ExportedRun:
         engine's own.  A jump that no window follows yet is left out.
         """
         start = self.track.start().position
-        walls = self.scene.container.walls()  # only pairs of grains are counted
         for state in self._states(every):
-            touching = find_pairs(state.position, state.radius, walls)
-            grains = touching.second >= 0
-            both = np.concatenate([touching.first[grains], touching.second[grains]])
+            both = np.empty(0, np.int64)
+            if self.own:  # only pairs of grains are counted
+                touching = find_pairs(state.position, state.radius, self.scene.container.walls())
+                grains = touching.second >= 0
+                both = np.concatenate([touching.first[grains], touching.second[grains]])
             coordination = np.bincount(both, minlength=len(state.radius))
             yield Instant(state, state.position - start, coordination)
 
@@ -89,12 +95,14 @@ class ExportedRun:
             }
 
 
-def read_exported_run(run_folder: Path, variant: str = "") -> ExportedRun:
-    """A run of the folder: the procedure, or the ``control`` beside it.
+def read_exported_run(
+    run_folder: Path, variant: str = "", read: Callable[[Path], Record] = read_run_record
+) -> ExportedRun:
+    """A run of the folder: the procedure, or the ``control`` beside it; ``read`` knows its kind.
 
     Raises `UsageError` for a folder or variant that is not there, or not yet prepared.
     """
-    record = read_run_record(run_folder)
+    record = read(run_folder)
     track = {"": record.run, CONTROL: record.control}.get(variant)
     if track is None:
         known = "none" if record.control is None else CONTROL
