@@ -38,7 +38,7 @@ def run(kind, script, marks, cycles, loaded, names):
     ``moved.npz`` says).  ``marks``: lines of the two marks.  ``loaded``: name of the variable that
     holds the loaded body, its number, or several; may be empty.
     """
-    given = {*names}  # by YADE, in each process
+    given = dict(names)  # by YADE, in each process
     sys.modules["yade.qt"] = yade.qt = MagicMock()  # no window is opened, whatever is asked of it
     first, last = marks
     with tokenize.open(script) as stream:
@@ -181,9 +181,10 @@ def write_state(number, loaded, names, given):
         height=np.mean([one.state.pos[2] for one in bodies]) if bodies else np.nan,
     )
     values = {PLOTTED: pack({**plot.data})}
-    for name in names.keys() - given:
-        with suppress(TypeError):  # what a cycle misses then, ends it
-            values[name] = pack(names[name])
+    for name, value in names.items():
+        if name not in given or value is not given[name]:
+            with suppress(TypeError):  # what a cycle misses then, ends it
+                values[name] = pack(value)
     O.tags[TAG] = json.dumps(values).encode().hex()
     write_scene(f"cycle_{number}.restart")
     O.tags[TAG] = ""

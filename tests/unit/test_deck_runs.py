@@ -38,6 +38,7 @@ class Bed:
     """An engine that knows a law: grains sink by rate ln N, and go on from where they are put."""
 
     rate: np.ndarray = field(default_factory=RATE.copy)
+    radius: float = RADIUS  # [m]; 0 of clumps
     bend: float = 0.0  # of the law: ln N + bend (ln N)^2
     thrown: float = np.inf  # greatest move that a bed takes calmly [m]
     speed: float = 1.0  # of grains thrown by a greater one, over those at rest
@@ -71,7 +72,7 @@ class Bed:
             place = np.column_stack([PLACES[:, :2], start[1:-1] - self.rate * grown])
             height, count = start[-1] - 3 * self.rate[0] * grown, np.arange(4)
             moving = np.full((4, 3), speed * (healed if number == 1 else 1.0))
-            np.savez(folder / f"cycle_{number}.npz", identifier=count, radius=np.full(4, RADIUS),
+            np.savez(folder / f"cycle_{number}.npz", identifier=count, radius=np.full(4, self.radius),
                      mass=np.ones(4), position=place, height=height, velocity=moving)  # fmt: skip
             with (folder / f"cycle_{number}.restart").open("wb") as stream:
                 np.save(stream, [cycle, *place[:, 2], height])
@@ -87,11 +88,14 @@ def bed(monkeypatch: pytest.MonkeyPatch) -> Bed:
     return there
 
 
-def settle(folder: Path, body: str = "plate", control: bool = False, **keys: object) -> RunFolder:
-    """A run of a script on the bed."""
+def settle(
+    folder: Path, body: str = "plate", control: bool = False, made: str = "append", **keys: object
+) -> RunFolder:
+    """A run of a script on the bed, whose bodies are ``made`` by a method of YADE's."""
     path = folder / "bed" / "scene.toml"
     if not path.exists():
-        path = adopt(write_script(folder, cut("O.run(5)", "plate = O.bodies[3]")), "yade").scene
+        text = cut("O.run(5)", f"plate = O.bodies[3]\nO.bodies.{made}(sphere)")
+        path = adopt(write_script(folder, text), "yade").scene
     words = [f"procedure.{key}={value}" for key, value in (KEYS | keys).items()]
     words.append(f'deck.loaded_body="{body}"')
     decks.run_deck_scene(path, folder / "run", control=control, overrides=words)
@@ -161,13 +165,14 @@ def test_history_knows_more_than_the_last_window(bed: Bed, tmp_path: Path) -> No
     assert abs(jumped[1] - moved) > 1e-7
 
 
-@pytest.mark.parametrize(("total", "jumps"), [(24, 0), (25, 1)])
+@pytest.mark.parametrize(("total", "jumps"), [(7, 0), (24, 0), (25, 1)])
 def test_a_jump_needs_room_behind_it(total: int, jumps: int, bed: Bed, tmp_path: Path) -> None:
     """For itself, its healing and a window: 9 + 10 + 2 + 4 cycles.  States go on from stage to
     stage, and each has its own cost."""
     run = settle(tmp_path, total_cycles=total)
     outcomes = run.outcomes()
     assert sum(one.stage == "jump" for one in outcomes) == jumps
+    assert outcomes[-1].last_cycle == total
     first, second = (load_states(run.path / f"window_{n:06d}/states.npz") for n in (0, 5))
     assert second.height[0] == first.height[-1]
     assert np.array_equal(second.position[0], first.position[-1])
@@ -201,27 +206,34 @@ def test_calm_is_ten_times_the_energy_before(
     assert (("j", 9, 19) in list_spans(settle(tmp_path, total_cycles=30))) is calm
 
 
-@pytest.mark.parametrize(("share", "allowed"), [(0.95, True), (1.05, False)])
+@pytest.mark.parametrize(("share", "made", "allowed"), [
+    (0.95, "append", True), (1.05, "append", False), (1.05, "appendClumped", True),
+])  # fmt: skip
 def test_a_jump_that_presses_grains_is_tried_half_as_long(
-    share: float, allowed: bool, bed: Bed, tmp_path: Path
+    share: float, made: str, allowed: bool, bed: Bed, tmp_path: Path
 ) -> None:
-    """A tenth of a radius nearer is allowed: two grains that touch come D ln(19/9) nearer."""
+    """A tenth of a radius nearer is allowed: two grains that touch come D ln(19/9) nearer.  Of
+    clumps no surface is known."""
+    bed.radius *= made == "append"
     bed.rate[1] = bed.rate[0] + share * 0.1 * RADIUS / np.log(19 / 9)
-    run = settle(tmp_path, total_cycles=30)
+    run = settle(tmp_path, total_cycles=30, made=made)
     assert (("j", 9, 19) in list_spans(run)) is allowed
     assert bool(run.failure("jump_000009_1")) is not allowed
 
 
 def test_what_ends_the_engine_from_outside_ends_the_run(bed: Bed, tmp_path: Path) -> None:
-    """No jump is to blame for it, and the run goes on where it was."""
-    bed.stopped = 4  # in the window behind the first jump
+    """No jump is to blame for it; the run goes on where it was, and tries no jump again."""
+    bed.stopped, bed.thrown, bed.speed = 5, 0.6 * RATE.max(), 4.0  # behind the second try
     with pytest.raises(EngineFailed, match="SIGTERM"):
         settle(tmp_path)
     run = RunFolder(tmp_path / "run")
-    assert list_spans(run) == SPANS[:4]
-    assert not run.failure("jump_000009_1")
+    spans = list_spans(run)
+    assert spans == [*SPANS[:3], ("j", 9, 14)]
+    assert [bool(run.failure(f"jump_000009_{n}")) for n in (1, 2)] == [True, False]
     decks.resume_deck(run.path)
-    assert list_spans(run) == SPANS
+    assert list_spans(run)[:4] == spans
+    assert list_spans(run)[-1][2] == 60
+    assert bed.texts.count("window_000019") == 1
 
 
 def test_a_bed_without_a_loaded_body_has_its_mean_grain(bed: Bed, tmp_path: Path) -> None:
