@@ -202,7 +202,7 @@ def jump_and_heal(run: DeckRun, place: Place, h: int) -> Place:
                 run.progress.print_line(f"the jump of {h} cycles failed: {error}")
         h = max(h // 2, 1)
     run.progress.print_line("no jump from here: computing on")
-    return compute(run, place, min(p.window_cycles, p.total_cycles - place.cycle))
+    return compute(run, place, p.window_cycles)
 
 
 def jump_bed(run: DeckRun, place: Place, h: int, name: str) -> Place:
