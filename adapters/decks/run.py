@@ -172,13 +172,14 @@ def write_start(run: DeckRun, place: Place, states: States, folder: Path) -> Sta
     if place.jumped:
         with np.load(run.folder.path / place.jumped / "moved.npz") as data:
             move, drop = data["move"], float(data["drop"])
+        number, shift = states.identifier, move / metre
         if bed.deck.is_script:
-            np.savez(folder / "moved.npz", identifier=states.identifier, move=move, drop=drop)
+            np.savez(folder / "moved.npz", identifier=number, move=move, drop=drop)
         elif bed.stones:
-            move_stones(restart, bed.stones, states.identifier, move / metre)
+            move_stones(restart, bed.stones, number, shift)
         else:
-            number, x, v = states.identifier, states.last[:, 1:4], states.last[:, 4:]
-            move_grains(restart, number, x, v, move / metre, states.period)
+            x, v = states.last[:, 1:4], states.last[:, 4:]
+            move_grains(restart, number, x, v, shift, states.period)
         if bed.loaded and not bed.deck.is_script:
             for height in find_mesh(restart, *bed.loaded):
                 height -= drop / metre
