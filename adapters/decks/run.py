@@ -133,7 +133,7 @@ def settle(run: DeckRun, jumps: bool) -> None:
     place = compute(run, place, min(k, p.total_cycles - place.cycle))
     for number in range(p.total_cycles if jumps else 0):
         longest = p.total_cycles - place.cycle - p.healing_cycles - k
-        if longest < max(min(p.h or (1,)), 1):
+        if longest < min(p.h or (1,)):
             break
         place = jump_and_heal(run, place, min(p.jump_cycles(number), longest))
     while place.cycle < p.total_cycles:

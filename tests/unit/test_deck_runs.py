@@ -23,6 +23,7 @@ from adapters.decks.states import load_states
 from adapters.errors import EngineFailed, SceneError
 from adapters.files import RunFolder
 from adapters.procedure import describe_result
+from adapters.procedure.run import STATE_BYTES
 from tests.unit.test_yade_scripts import cut, write_script
 from trackbed import command
 
@@ -49,6 +50,7 @@ class Bed:
     def run(self, bed: Any, text: str, path: Path) -> float:
         """Do what `run_deck` does with a deck; returns a CPU time."""
         folder, window = path.parent, re.search(r"'window', .*\), (\d+), ", text)
+        assert window or re.search(r"'prepare', .*\), 0, ", text)
         self.texts.append(folder.name)
         self.stopped -= 1
         if self.stopped == 0:
@@ -125,6 +127,7 @@ def test_a_bed_that_follows_the_law_is_jumped_without_error(
     rows, all_rows = ([row for one in each.outcomes() for row in one.rows] for each in (run, full))
     healing = [row["cycle"] for row in rows if row["kind"] == "healing"]
     assert healing == [20, 21, 36, 37, 52, 53]
+    assert bed.texts.count("window_000005") == 1  # the full run begins with the same windows
     truth = {row["cycle"]: row for row in all_rows}
     for row in rows:
         at = truth[row["cycle"]]
@@ -166,12 +169,19 @@ def test_history_knows_more_than_the_last_window(bed: Bed, tmp_path: Path) -> No
     assert abs(jumped[1] - moved) > 1e-7
 
 
-@pytest.mark.parametrize(("total", "jumps"), [(7, 0), (24, 0), (25, 1)])
-def test_a_jump_needs_room_behind_it(total: int, jumps: int, bed: Bed, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("total", "h", "jumps"), [
+    (7, 10, 0), (24, 10, 0), (25, 10, 1), (22, [4, 10], 1),
+])  # fmt: skip
+def test_a_jump_needs_room_behind_it(
+    total: int, h: object, jumps: int, bed: Bed, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """For itself, its healing and a window: 9 + 10 + 2 + 4 cycles.  States go on from stage to
-    stage, and each has its own cost."""
+    stage, and each has its own cost and its room in memory."""
+    needed: list[float] = []
+    monkeypatch.setattr(decks, "refuse_more_memory", lambda size, *_: needed.append(size))
     began = time.process_time()
-    run = settle(tmp_path, total_cycles=total)
+    run = settle(tmp_path, total_cycles=total, h=h)
+    assert needed[0] == STATE_BYTES * 4 * 6  # four grains at the ends of five cycles, and before
     spent, outcomes = time.process_time() - began, run.outcomes()
     assert sum(one.stage == "jump" for one in outcomes) == jumps
     assert outcomes[-1].last_cycle == total
@@ -243,6 +253,7 @@ def test_what_ends_the_engine_from_outside_ends_the_run(bed: Bed, tmp_path: Path
     decks.resume_deck(run.path)
     assert list_spans(run)[:4] == spans
     assert list_spans(run)[-1][2] == 60
+    assert not (run.path / "control").exists()
     assert bed.texts.count("window_000019") == 1
 
 
