@@ -146,7 +146,7 @@ def count():
 
 O.run(20000)
 O.wait()
-box = seen["calls"]  # a function of YADE has this name
+unbalancedForce = seen["calls"]  # a function of YADE has this name
 top = max(b.state.pos[2] + b.shape.radius for b in O.bodies if isinstance(b.shape, Sphere))
 plate = O.bodies[O.bodies.append(wall(top, axis=2, sense=-1))]
 # trackbed: cycle
@@ -157,7 +157,7 @@ newton.gravity = helpers.pull(9.81)
 plate.state.vel = (0, 0, 0.02)
 O.run(400, True)
 seen["cycles"] += 1
-assert seen["calls"] == len(plot.data["i"]) == box + 8 * seen["cycles"]
+assert seen["calls"] == len(plot.data["i"]) == unbalancedForce + 8 * seen["cycles"]
 # trackbed: end
 """
 """Spheres and clumps under a plate; functions, variables, a body, an engine and what is plotted
