@@ -50,16 +50,14 @@ def piston_forces(
     shape (looks, n, 3), and whether any grain went over to another face before a look, (looks,).
     """
     engine, count = YadeEngine(), len(places[0])
-    radius = np.full(count, scene.sample.grain_radius.mean)
+    radius = np.full(count, scene.sample.radii.mean)
     with TemporaryDirectory() as temporary:
         folder = Path(temporary)
         digests = engine.write_preparation(scene, places[0], radius, 2 * height, folder)
         content = json.loads((folder / PARAMETERS).read_text())
         content["grain_count"] = count
         content["piston"] = {"mass": 1.0, "height": height}
-        content["piston"] |= cover_piston(
-            scene.container, scene.piston_reach, scene.sample.grain_radius.law
-        )
+        content["piston"] |= cover_piston(scene.container, scene.piston_reach, scene.sample.radii)
         content["few"] = [each.tolist() for each in places]
         (folder / PARAMETERS).write_text(json.dumps(content))
         (folder / "few.py").write_text(SCRIPT)

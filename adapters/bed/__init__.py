@@ -27,7 +27,14 @@ from adapters.bed.overlaps import (
     measure_bed,
     measure_rows,
 )
-from adapters.bed.radii import RadiusDistribution, draw_radii, expect_grains, find_radius_that_fits
+from adapters.bed.radii import (
+    GradedRadii,
+    Radii,
+    RadiusDistribution,
+    draw_radii,
+    expect_grains,
+    find_radius_that_fits,
+)
 from adapters.bed.sample import (
     GRAVITY,
     SURFACE_SHARE,
@@ -50,10 +57,10 @@ from adapters.bed.state import (
 
 __all__ = [
     "CHAIN_FACTOR", "DAMPING_FACTOR", "GOLDEN_ANGLE", "GRAVITY", "OVERLAP_BOUND", "SURFACE_SHARE",
-    "Bed", "BoolArray", "Contacts", "Container", "FloatArray", "HertzStiffness", "IntArray",
-    "Neighbours", "RadiusDistribution", "State", "Walls", "check_bed", "combine_moduli",
-    "contact_law", "count_sides", "draw_radii", "draw_sample_start", "expect_grains",
-    "find_behind_discs", "find_literal_restitution", "find_normal_force",
+    "Bed", "BoolArray", "Contacts", "Container", "FloatArray", "GradedRadii", "HertzStiffness",
+    "IntArray", "Neighbours", "Radii", "RadiusDistribution", "State", "Walls", "check_bed",
+    "combine_moduli", "contact_law", "count_sides", "draw_radii", "draw_sample_start",
+    "expect_grains", "find_behind_discs", "find_literal_restitution", "find_normal_force",
     "find_overlap_under_force", "find_pairs", "find_radius_that_fits", "find_rayleigh_time",
     "find_rebound_damping", "find_sample_mass", "judge_state", "list_wall_names",
     "list_wall_rows", "load_state", "make_no_contacts", "measure_bed", "measure_bed_height",

@@ -1,4 +1,4 @@
-"""Radii of the grains: three distributions, their bounds and moments, seeded samples."""
+"""Radii of the grains: three distributions or a grading, bounds and moments, seeded samples."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from adapters.bed.container import Container
 from adapters.bed.state import FloatArray
+from trackbed.scene_files import Grading, draw_sizes, refuse_outside_limits
 
 PAPER_DENSITY = 0.5615
 """Relative density of a rained bed below its free surface: Karrech et al. (2007), Table 1."""
@@ -66,12 +67,47 @@ class RadiusDistribution:
         return 4 / 3 * pi * (self.mean**3 + 3 * self.mean * self.variance)
 
 
-def draw_radii(distribution: RadiusDistribution, count: int, seed: int) -> FloatArray:
+@dataclass(frozen=True)
+class GradedRadii:
+    """Radii of spheres whose masses follow a grading: half the side of the hole that they pass."""
+
+    grading: Grading
+
+    @property
+    def smallest(self) -> float:
+        """Lower bound of the radii [m]."""
+        return self.grading.bounds[0] / 2
+
+    @property
+    def greatest(self) -> float:
+        """Upper bound of the radii [m]."""
+        return self.grading.bounds[1] / 2
+
+    @property
+    def mean(self) -> float:
+        """Mean radius of the grains, each counted once [m]."""
+        return self.grading.mean_power(1) / 2
+
+    @property
+    def volume_mean(self) -> float:
+        """Expected volume of a grain [m^3]."""
+        return pi / 6 * self.grading.mean_power(3)
+
+
+Radii = RadiusDistribution | GradedRadii
+
+
+def draw_radii(distribution: Radii, count: int, seed: int) -> FloatArray:
     """``count`` independent radii [m], shape (count,); the same for the same seed.
 
-    They depend on nothing but the arguments: another container keeps the grains.
+    They depend on nothing but the arguments: another container keeps the grains.  Those of a
+    grading are drawn by mass; raises `SceneError` where they leave a standard's limits.
     """
     generator = np.random.default_rng([seed, 0])
+    if isinstance(distribution, GradedRadii):
+        sizes = draw_sizes(distribution.grading, count, generator)
+        refuse_outside_limits(distribution.grading, sizes)
+        return sizes / 2
     if distribution.name == "constant":
         return np.full(count, distribution.mean)
     if distribution.name == "uniform":
@@ -89,7 +125,7 @@ def find_radius_that_fits(container: Container) -> float:
     return container.radius / (1, 2, 1 + sqrt(2))[len(container.symmetry)]
 
 
-def expect_grains(distribution: RadiusDistribution, container: Container, height: float) -> int:
+def expect_grains(distribution: Radii, container: Container, height: float) -> int:
     """Number of grains that fill ``container`` to ``height`` [m] after the rain.
 
     At `PAPER_DENSITY`, that of a bed of friction 0.5 without load; a frictionless bed

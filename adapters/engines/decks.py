@@ -109,7 +109,7 @@ class DeckEngine(ProcessEngine):
         shared: Parameters = {
             "time_step": scene.time_step,
             "gravity": GRAVITY,
-            "skin": 0.3 * scene.sample.grain_radius.mean,
+            "skin": 0.3 * scene.sample.radii.mean,
         }
         parameters = shared | parameters | self.name_parts(scene)
         texts = {"parameters.in": format_parameters(parameters), **self.format_scene(scene, piston)}

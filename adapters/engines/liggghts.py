@@ -50,7 +50,7 @@ class LiggghtsEngine(DeckEngine):
 
     def write_start(self, scene: Scene, start: EngineStart, folder: Path) -> Parameters:
         """The piston's mesh, and the moved grains."""
-        margin = PISTON_MARGIN * scene.sample.grain_radius.law.greatest
+        margin = PISTON_MARGIN * scene.sample.radii.greatest
         liggghts_decks.write_piston_stl(
             folder / "piston.stl", scene.container, scene.piston_reach, margin
         )

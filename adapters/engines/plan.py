@@ -78,7 +78,7 @@ def plan_seating(scene: Scene) -> SeatPlan:
     steps = scene.steps_per_cycle
     peak = float(scene.stress_at(np.linspace(0, 1, 1001)).max()) * scene.loaded_area
     followed = PLAN.seat_drag_share * scene.loading.piston_mass * PLAN.seat_speed / scene.time_step
-    press_s = 2 * scene.sample.grain_radius.law.greatest / PLAN.seat_speed
+    press_s = 2 * scene.sample.radii.greatest / PLAN.seat_speed
     cycles = ceil(press_s / (steps * scene.time_step))
     return SeatPlan(
         min(PLAN.seat_share * peak, followed), PLAN.seat_speed, cycles * steps,

@@ -16,7 +16,7 @@ from adapters.bed import (
     GRAVITY,
     Container,
     FloatArray,
-    RadiusDistribution,
+    Radii,
     find_rebound_damping,
 )
 from adapters.engines.contract import EngineStart
@@ -78,7 +78,7 @@ class YadeEngine(ProcessEngine):
         content["piston"] = {
             "mass": scene.loading.piston_mass,
             "height": start.piston_height,
-            **cover_piston(scene.container, scene.piston_reach, scene.sample.grain_radius.law),
+            **cover_piston(scene.container, scene.piston_reach, scene.sample.radii),
         }
         content["window"] = {
             "start": start.kind, "cycles": cycles, "steps_per_cycle": steps,
@@ -161,12 +161,12 @@ def gather_shared_parameters(scene: Scene, height: float) -> dict[str, Any]:
     if container.symmetry:
         materials["mirror"] = (MIRROR_YOUNG, material.grain.poisson, NO_WEIGHT)
     names = ("young", "poisson", "density")
-    radius = np.array([scene.sample.grain_radius.law.greatest])
+    radius = np.array([scene.sample.radii.greatest])
     return {
         "grain_count": scene.grain_count,
         "time_step": scene.time_step,
         "gravity": GRAVITY,
-        "verlet_distance": YADE.verlet_share * scene.sample.grain_radius.mean,
+        "verlet_distance": YADE.verlet_share * scene.sample.radii.mean,
         "frictional": has_friction(scene),
         "materials": {m: dict(zip(names, values, strict=True)) for m, values in materials.items()},
         "pairs": _list_pairs(scene),
@@ -228,7 +228,7 @@ def cover_side(container: Container, angle: float, height: float) -> FloatArray:
     return np.column_stack([plane, corners[:, 1]])
 
 
-def cover_piston(container: Container, reach: float, grain: RadiusDistribution) -> dict[str, Any]:
+def cover_piston(container: Container, reach: float, grain: Radii) -> dict[str, Any]:
     """The piston's face: ``triangles``, horizontal corners [m], shape (t, 3, 2), normal down.
 
     A whole piston (``reach`` infinite) is one triangle over the section and somewhat more.  A

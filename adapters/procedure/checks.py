@@ -151,7 +151,7 @@ def check_bounds(scene: Scene, figures: WindowFigures) -> None:
 def advise_heavier_piston(scene: Scene) -> str:
     """What to do with a piston that does not follow its load; a light one bounces."""
     assert scene.loading is not None  # it would have no piston
-    radius = np.array([scene.sample.grain_radius.mean])
+    radius = np.array([scene.sample.radii.mean])
     grains = scene.loading.piston_mass / find_sample_mass(radius, scene.material.grain.density)[0]
     return (
         f"the piston, as heavy as {grains:.2g} mean grains, does not follow its load: a heavier "
@@ -168,7 +168,7 @@ def check_rise(scene: Scene, height: FloatArray, rise: FloatArray) -> None:
     """
     moved = float(np.ptp(np.median(height - height[0], axis=1)))
     lift = float(np.median(rise))
-    if lift > max(moved, BOUNDS.rise_floor * scene.sample.grain_radius.mean):
+    if lift > max(moved, BOUNDS.rise_floor * scene.sample.radii.mean):
         raise NotCredible(
             f"the law lifts the bed by {lift * 1e6:.4g} um in the jump, where it moved by"
             f" {moved * 1e6:.4g} um in all of the {len(height) - 1} cycles fitted",

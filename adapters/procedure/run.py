@@ -331,7 +331,7 @@ def _write_dry_run(scene: Scene, run_path: Path) -> None:
     folder = run_path / "dry_run"
     with refuse_writing(run_path):
         folder.mkdir(parents=True, exist_ok=True)
-    radius = draw_radii(scene.sample.grain_radius.law, scene.grain_count, scene.sample.seed)
+    radius = draw_radii(scene.sample.radii, scene.grain_count, scene.sample.seed)
     position, height = draw_sample_start(
         radius, scene.container, scene.sample.relative_density_start, scene.sample.seed
     )

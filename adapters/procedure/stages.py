@@ -136,7 +136,7 @@ def prepare(run: Run) -> Bed:
     if run.folder.outcome(name) is None:
         sample = scene.sample
         run.progress.print_line(f"rain of {scene.grain_count} grains")
-        radius = draw_radii(sample.grain_radius.law, scene.grain_count, sample.seed)
+        radius = draw_radii(sample.radii, scene.grain_count, sample.seed)
         position, height = draw_sample_start(
             radius, scene.container, sample.relative_density_start, sample.seed
         )

@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from adapters.bed import RadiusDistribution
 from adapters.errors import SceneError
 from adapters.files import read_load_series
 from adapters.scene import mechanics
@@ -23,6 +24,7 @@ ALTERNATIVES = (
     ("sample.count", "sample.fill_height"),
     ("material.grain.viscous_alpha", "material.grain.restitution"),
     ("engine.rayleigh_share", "engine.time_step"),
+    ("sample.grain_radius", "sample.grading"),
 )
 """Pairs of keys of which a scene gives exactly one."""
 JUMP_KEYS, TOLERANCE_KEY = ("procedure.k", "procedure.h"), "procedure.tolerance"
@@ -83,6 +85,8 @@ def _check_symmetry(scene: Values) -> Iterator[Problem]:
 
 def _check_grain_radius(scene: Values) -> Iterator[Problem]:
     radii = find_radii(scene)
+    if not isinstance(radii, RadiusDistribution):
+        return
     key = "sample.grain_radius.standard_deviation"
     if radii.name == "constant" and radii.standard_deviation > 0:
         yield Problem(key, "constant radii have no standard deviation")
@@ -90,6 +94,11 @@ def _check_grain_radius(scene: Values) -> Iterator[Problem]:
         yield Problem(key, f"a {radii.name} distribution needs one above zero")
     elif radii.smallest <= 0:
         yield Problem(key, f"too wide: the smallest radius would be {radii.smallest:g} m")
+
+
+def _check_grading_scale(scene: Values) -> Iterator[Problem]:
+    if scene.has("sample.grading_scale") and not scene.has("sample.grading"):
+        yield Problem("sample.grading_scale", "there is no sample.grading to scale")
 
 
 def _check_series(scene: Values) -> Iterator[Problem]:
@@ -191,9 +200,9 @@ def _check_relaxation(scene: Values) -> Iterator[Problem]:
 
 CHECKS: tuple[Check, ...] = (
     _check_alternatives, *(partial(_check_owned_keys, *row) for row in OWNED), _check_symmetry,
-    _check_grain_radius, _check_series, _check_partial_piston, _check_procedure, _check_jumps,
-    _check_settlement, _check_seating, _check_launcher, _check_engine, _check_law, _check_move,
-    _check_relaxation, *mechanics.CHECKS,
+    _check_grain_radius, _check_grading_scale, _check_series, _check_partial_piston,
+    _check_procedure, _check_jumps, _check_settlement, _check_seating, _check_launcher,
+    _check_engine, _check_law, _check_move, _check_relaxation, *mechanics.CHECKS,
 )  # fmt: skip
 
 

@@ -11,7 +11,14 @@ from pathlib import Path
 from adapters import bed
 from adapters.errors import SceneError
 from adapters.files import read_load_series
-from adapters.scene.values import Check, NotValid, Values, find_geometry, find_radii
+from adapters.scene.values import (
+    Check,
+    NotValid,
+    Values,
+    find_geometry,
+    find_radii,
+    name_radii,
+)
 from trackbed.plausible import Quantity, describe_implausible
 from trackbed.scene_files import Problem
 
@@ -39,7 +46,7 @@ def _check_room(scene: Values) -> Iterator[Problem]:
     room = bed.find_radius_that_fits(find_geometry(scene))
     if largest_grain > room:
         yield Problem(
-            "sample.grain_radius.mean",
+            name_radii(scene),
             f"radii up to {largest_grain:g} m do not fit: "
             f"the container takes radii up to {room:g} m",
         )
@@ -141,10 +148,10 @@ def _warn_of_narrow_bed(scene: Values) -> Iterator[Problem]:
     container = find_geometry(scene)
     is_box = container.shape == "box"
     width = min(container.size_x, container.size_y) if is_box else 2 * container.radius
-    ratio = width / (2 * scene.need("sample.grain_radius.mean"))
+    ratio = width / (2 * find_radii(scene).mean)
     if ratio < DOUBTFUL.width:
         yield Problem(
-            "sample.grain_radius.mean",
+            name_radii(scene),
             f"the container is {ratio:.2g} mean grain diameters wide: walls rule the result",
         )
 
@@ -169,7 +176,7 @@ def _warn_of_size_ratio(scene: Values) -> Iterator[Problem]:
     ratio, limit = radii.greatest / radii.smallest, find_wedge_ratio(friction)
     if ratio > limit:
         yield Problem(
-            "sample.grain_radius",
+            name_radii(scene).removesuffix(".mean"),
             f"radii differ by a factor of {ratio:.3g}; with friction {friction:g} small grains may "
             f"stick between large ones above {limit:.3g}, by an error of the engines' integration "
             "(docs/size-ratio.md): leave the smallest out to see whether it matters",
@@ -222,7 +229,16 @@ def _warn_of_implausible_size(
         yield Problem(key, said.removeprefix(f"{key}: "))
 
 
-IMPLAUSIBLE = tuple(partial(_warn_of_implausible_size, *row) for row in SIZES)
+def _warn_of_sieves_in_metres(scene: Values) -> Iterator[Problem]:
+    if scene.has("sample.grading") and (size := 2 * find_radii(scene).greatest) < 1e-3:
+        yield Problem(
+            "sample.grading", f"the greatest grain is {1e3 * size:g} mm: sieves are given in mm"
+        )
+
+
+IMPLAUSIBLE = (
+    *(partial(_warn_of_implausible_size, *row) for row in SIZES), _warn_of_sieves_in_metres,
+)  # fmt: skip
 DOUBTS: tuple[Check, ...] = (
     *IMPLAUSIBLE,
     _warn_of_long_step, _warn_of_narrow_bed, _warn_of_few_steps, _warn_of_size_ratio,

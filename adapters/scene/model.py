@@ -29,7 +29,11 @@ def _list_grains(scene: Scene) -> Iterator[str]:
     yield "Stones: grains are spheres, without edges that interlock."
     yield "Breakage, abrasion and wear of grains."
     law = scene.sample.grain_radius
-    if law.distribution == "normal" and law.standard_deviation:
+    if law is None:
+        radii = scene.sample.radii
+        low, high = 2e3 * radii.smallest, 2e3 * radii.greatest
+        yield f"Grains below {low:.4g} mm and above {high:.4g} mm; fines and water."
+    elif law.distribution == "normal" and law.standard_deviation:
         yield (f"Radii beyond {law.truncation:g} standard deviations of the mean; fines and water.")
     else:
         yield "Fines and water."

@@ -23,6 +23,7 @@ from pydantic_core import PydanticCustomError
 from adapters.bed import (
     Container,
     FloatArray,
+    Radii,
     RadiusDistribution,
     contact_law,
     count_sides,
@@ -31,6 +32,7 @@ from adapters.bed import (
 from adapters.files import LoadSeries, read_load_series
 from adapters.laws.fit import FIRST_WINDOW
 from adapters.moves import DEFAULT as MOVE_DEFAULT
+from adapters.scene.ballast import GradingKey, GradingScale, make_radii
 from adapters.scene.checks import find_problems, find_warnings
 from adapters.scene.mechanics import COUNT_GREATEST
 from trackbed.scene_files import NonNegative, Positive, Table
@@ -81,7 +83,18 @@ class Sample(Table):
     relative_density_start: Annotated[float, Field(ge=1e-3, le=0.15, allow_inf_nan=False)] = 0.05
     """Relative density of the random start, before the rain."""
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 1  # seed of radii and start positions
-    grain_radius: GrainRadius
+    grain_radius: GrainRadius | None = None
+    grading: GradingKey | None = None
+    """Grading by a standard's name, or sieves [mm] with the mass that passes [%], instead."""
+    grading_scale: GradingScale | None = None  # factor on all sieves of ``grading`` [-]; 1
+
+    @property
+    def radii(self) -> Radii:
+        """Radii of the grains, with their bounds and moments."""
+        if self.grading is not None:
+            return make_radii(self.grading, self.grading_scale)
+        assert self.grain_radius is not None
+        return self.grain_radius.law
 
 
 class GrainMaterial(Table):
@@ -253,7 +266,7 @@ class Scene(Table):
         sample = self.sample
         sides = 0
         if sample.radius is not None and self.engine.name in FLAT_WALLED:
-            sides = count_sides(sample.radius, sample.grain_radius.mean)
+            sides = count_sides(sample.radius, sample.radii.mean)
         given = (sample.radius, sample.size_x, sample.size_y)
         radius, size_x, size_y = (nan if size is None else size for size in given)
         return Container(sample.container, sample.symmetry, radius, size_x, size_y, sides)
@@ -292,7 +305,7 @@ class Scene(Table):
         """Rayleigh time [s] of the smallest grain the radius distribution allows."""
         grain = self.material.grain
         return contact_law.find_rayleigh_time(
-            self.sample.grain_radius.law.smallest, grain.density, grain.young, grain.poisson
+            self.sample.radii.smallest, grain.density, grain.young, grain.poisson
         )
 
     @property
@@ -330,7 +343,7 @@ class Scene(Table):
         if self.sample.count is not None:
             return self.sample.count
         assert self.sample.fill_height is not None
-        return expect_grains(self.sample.grain_radius.law, self.container, self.sample.fill_height)
+        return expect_grains(self.sample.radii, self.container, self.sample.fill_height)
 
     def stress_at(self, phase: float | FloatArray) -> FloatArray:
         """Stress [Pa] on the loaded area at a ``phase`` in cycles; 0 without loading."""

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
-from adapters.bed import Container, RadiusDistribution
+from adapters.bed import Container, Radii, RadiusDistribution
+from adapters.scene.ballast import make_radii
 from trackbed.scene_files import Problem
 
 
@@ -35,7 +36,7 @@ class Values:
     def has(self, key: str) -> bool:
         """Whether a key is given, valid or not; a table that is not valid is another problem."""
         try:
-            return self.get(key) is not None
+            return self.get(key) is not None or self.has_table(key)
         except NotValid:
             self.get(key.rpartition(".")[0])
             return True
@@ -50,8 +51,15 @@ Check = Callable[[Values], Iterator[Problem]]
 """What a check yields of a scene: nothing where all is well."""
 
 
-def find_radii(scene: Values) -> RadiusDistribution:
-    """The distribution of grain radii, whether it makes sense or not."""
+def name_radii(scene: Values) -> str:
+    """The key that says how large grains are."""
+    return "sample.grading" if scene.has("sample.grading") else "sample.grain_radius.mean"
+
+
+def find_radii(scene: Values) -> Radii:
+    """The radii of the grains, whether they make sense or not."""
+    if scene.has("sample.grading"):
+        return make_radii(scene.need("sample.grading"), scene.get("sample.grading_scale"))
     table = "sample.grain_radius."
     return RadiusDistribution(
         scene.need(table + "distribution"),

@@ -63,7 +63,8 @@ def make_grain_file(arguments: argparse.Namespace) -> int:
     import numpy as np
 
     from qdem_fem.files import UsageError
-    from qdem_fem.grains import BALLAST, Grading, GrainRecipe, make_grains, save_grains
+    from qdem_fem.grains import BALLAST, GrainRecipe, make_grains, save_grains
+    from trackbed.scene_files import Grading
 
     _refuse_name(arguments.out, ".npz")
     recipe = GrainRecipe(**_select_given(arguments, "sphericity", "roundness"))

@@ -3,9 +3,9 @@
 from qdem_fem.grains.hulls import GrainRecipe
 from qdem_fem.grains.measures import find_edge_angles, find_surface_edges
 from qdem_fem.grains.sets import GrainSet, make_grains, save_grains
-from qdem_fem.grains.sizes import BALLAST, Grading
+from qdem_fem.grains.sizes import BALLAST
 
 __all__ = [
-    "BALLAST", "Grading", "GrainRecipe", "GrainSet", "find_edge_angles", "find_surface_edges",
+    "BALLAST", "GrainRecipe", "GrainSet", "find_edge_angles", "find_surface_edges",
     "make_grains", "save_grains",
 ]  # fmt: skip

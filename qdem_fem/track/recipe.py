@@ -17,10 +17,11 @@ from qdem_fem.contact.search import PeriodicWidth
 from qdem_fem.contact.spheres import ContactPlane, SphereContact
 from qdem_fem.element import Material
 from qdem_fem.files import Floats
-from qdem_fem.grains import Grading, GrainSet, make_grains
+from qdem_fem.grains import GrainSet, make_grains
 from qdem_fem.track.bodies import TrackBox
 from qdem_fem.track.layout import Part, TrackLayout
 from qdem_fem.track.sleeper_mesh import SleeperShape
+from trackbed.scene_files import Grading
 
 SLEEPER = "sleeper"
 """Name of the body."""

@@ -89,7 +89,7 @@ def computed(engine_name: str, launcher: tuple[str, ...], folder: Path) -> Windo
     words = ", ".join(f'"{word}"' for word in launcher)
     overrides = (*SMALL, f'engine.name="{engine_name}"', f"engine.launcher=[{words}]")
     scene = load_scene(find_scene_file("cluster"), overrides)
-    radius = draw_radii(scene.sample.grain_radius.law, scene.grain_count, scene.sample.seed)
+    radius = draw_radii(scene.sample.radii, scene.grain_count, scene.sample.seed)
     position, _ = draw_sample_start(radius, scene.container, 0.15, scene.sample.seed)
     start = start_at_rest(scene, position, radius, folder / "rain")
     engine, window = get_engine(engine_name), folder / "window"
@@ -146,7 +146,7 @@ def test_yade_has_no_use_for_srun() -> None:
 def test_what_the_scene_says_of_itself() -> None:
     """A million grains fill a third of a metre; piston mass and load an area are the paper's."""
     cluster, paper = (load_scene(find_scene_file(name)) for name in ("cluster", "karrech"))
-    law = cluster.sample.grain_radius.law
+    law = cluster.sample.radii
     assert expect_grains(law, cluster.container, 1 / 3) == pytest.approx(1e6, rel=0.02)
 
     def mass_an_area(scene: Scene) -> float:

@@ -113,7 +113,7 @@ def test_polygon_stands_for_the_cylinder() -> None:
     """Sides are tangent, corners stand out by at most 1 % of a mean radius, mirrors cut corners."""
     for name in ("karrech", "karrech-coarse"):
         scene = scene_load_text(read_template(name), 'engine.name="yade"')
-        container, mean = scene.container, scene.sample.grain_radius.mean
+        container, mean = scene.container, scene.sample.radii.mean
         assert container.sides % 4 == 0
         corner = container.radius / np.cos(np.pi / container.sides)
         assert 0 < corner - container.radius < 0.01 * mean
@@ -150,7 +150,7 @@ class Bed:
         from adapters.bed.sample import draw_sample_start
 
         scene = self.scene
-        radius = draw_radii(scene.sample.grain_radius.law, 40, 1)
+        radius = draw_radii(scene.sample.radii, 40, 1)
         position, height = draw_sample_start(radius, scene.container, 0.05, 1)
         prepared = folder / "preparation"
         prepared.mkdir()

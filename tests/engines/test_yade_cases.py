@@ -72,7 +72,7 @@ def test_a_partial_piston_pushes_once() -> None:
     such a line and near the rim is pushed by both triangles.
     """
     scene = scene_partial()
-    radius, reach = scene.sample.grain_radius.mean, scene.piston_reach
+    radius, reach = scene.sample.radii.mean, scene.piston_reach
     height, overlap = 0.05, 1e-7
     near, beyond = reach - 0.1 * radius, reach + 2 * np.sqrt(2 * radius * overlap)
 

@@ -42,7 +42,7 @@ def example_write(name: str, folder: Path) -> None:
     """The generated files of the rain and of the first window, in one folder."""
     scene = load_scene(find_scene_file("karrech-coarse"), (f'engine.name="{name}"', *BED))
     engine = get_engine(name)
-    radius = draw_radii(scene.sample.grain_radius.law, scene.grain_count, scene.sample.seed)
+    radius = draw_radii(scene.sample.radii, scene.grain_count, scene.sample.seed)
     position, height = draw_sample_start(
         radius, scene.container, scene.sample.relative_density_start, scene.sample.seed
     )

@@ -24,7 +24,7 @@ FAKE = Way("fake", "fake")
 def start_of(way: Way) -> tuple[FloatArray, FloatArray]:
     """Grains that do not touch, and their radii."""
     scene = way.scene(1)
-    radius = draw_radii(scene.sample.grain_radius.law, scene.grain_count, 1)
+    radius = draw_radii(scene.sample.radii, scene.grain_count, 1)
     return draw_sample_start(radius, scene.container, 0.15, 1)[0], radius
 
 

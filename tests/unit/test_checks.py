@@ -278,7 +278,7 @@ def test_settled_bed(fault: str) -> None:
 def test_a_rise_is_judged_by_what_the_window_moved() -> None:
     """The greater of the window's own travel and a thousandth of the mean radius may be risen; one
     grain that is thrown up is no bed that rises."""
-    radius = SCENE.sample.grain_radius.mean
+    radius = SCENE.sample.radii.mean
     grain = np.linspace(0.01, 0.05, 9)
     moving = grain - np.array([0.0, 2e-3, 1e-3])[:, None] * radius
     still = np.tile(grain, (3, 1))

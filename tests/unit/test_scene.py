@@ -108,7 +108,7 @@ def test_shipped_scenes_are_what_they_say(tmp_path: Path) -> None:
     grain = scene.material.grain
     assert (grain.young, grain.poisson, grain.density) == (46.9e9, 0.25, 2710)
     assert (grain.friction, grain.viscous_alpha) == (0.5, 0.44)
-    assert (scene.sample.radius, scene.sample.grain_radius.mean) == (0.075, 3.2e-3)
+    assert (scene.sample.radius, scene.sample.radii.mean) == (0.075, 3.2e-3)
     assert scene.container.area == pytest.approx(pi * 0.075**2 / 4, rel=1e-15)
     assert scene.piston_reach == inf
     assert float(scene.stress_at(0.5) - scene.stress_at(0)) == pytest.approx(14150, rel=1e-14)
@@ -204,7 +204,7 @@ def test_fill_height_gives_the_count(tmp_path: Path) -> None:
     """``fill_height`` alone fixes the count, through relative density 0.5615 and mean volume."""
     scene = load_scene(write(tmp_path, KARRECH), ["sample.fill_height=0.06"])
     assert scene.sample.count is None
-    grains = scene.grain_count * scene.sample.grain_radius.law.volume_mean
+    grains = scene.grain_count * scene.sample.radii.volume_mean
     assert grains / (scene.container.area * 0.06) == pytest.approx(0.5615, rel=1e-3)
 
 

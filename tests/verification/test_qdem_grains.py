@@ -33,10 +33,12 @@ from qdem_fem.grains.measures import (
 )
 from qdem_fem.grains.meshing import find_radius_ratios, make_grain_tetrahedra
 from qdem_fem.grains.sets import GrainSet, load_grains, make_grains, save_grains
-from qdem_fem.grains.sizes import BALLAST, Grading, draw_sizes, find_sieve_size
+from qdem_fem.grains.sizes import BALLAST, find_sieve_size
 from qdem_fem.mesh.surface import find_surface_faces
 from qdem_fem.mesh.tetrahedra import find_gradients
 from trackbed.command import main
+from trackbed.errors import SceneError
+from trackbed.scene_files.grading import Grading, draw_sizes
 
 CUBE = np.array([[i, j, k] for i in (0.0, 1.0) for j in (0.0, 1.0) for k in (0.0, 1.0)]) - 0.5
 TETRAHEDRON = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
@@ -194,7 +196,7 @@ def test_drawn_sizes_meet_the_curve(seed: int, count: int) -> None:
      ([0.01, 0.02, 0.03], [0, 1]), ([0.0, 0.02], [0, 1]), ([0.01, np.nan], [0, 1])],
 )  # fmt: skip
 def test_a_curve_that_is_none_is_refused(sieves: list[float], passing: list[float]) -> None:
-    with pytest.raises(MeshError, match="no grading curve"):
+    with pytest.raises(SceneError, match="no grading curve"):
         Grading(np.array(sieves), np.array(passing))
 
 

@@ -144,7 +144,7 @@ def measure(window: Window, start: FloatArray, scene: Scene) -> Figures:
 def pour_bed(seed: int, folder: Path) -> tuple[FloatArray, FloatArray]:
     """Positions (n, 3) and radii (n,) [m] of the settled bed of a seed, by LIGGGHTS' rain."""
     scene = load_bed(seed, 'engine.name="liggghts"')
-    radius = draw_radii(scene.sample.grain_radius.law, scene.grain_count, seed)
+    radius = draw_radii(scene.sample.radii, scene.grain_count, seed)
     position, height = draw_sample_start(
         radius, scene.container, scene.sample.relative_density_start, seed
     )

@@ -79,7 +79,7 @@ def relax_cell() -> Row:
     paper's method holds the eight, its frontier.
     """
     scene = load_scene(find_scene_file("karrech"))
-    radius, walls = np.full(9, scene.sample.grain_radius.mean), scene.container.walls()
+    radius, walls = np.full(9, scene.sample.radii.mean), scene.container.walls()
     corners = np.array(list(product((-1, 1), repeat=3))) / np.sqrt(3)
     middle = np.array([[0.03, 0.03, 0.03]])
     position = np.concatenate([middle, middle + 2 * radius[0] * corners])

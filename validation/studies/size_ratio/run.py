@@ -71,7 +71,7 @@ def measure(engine: str, ratio: float, friction: float, share: float) -> Row:
     )  # fmt: skip
     small = LARGE / ratio
     height = sqrt((LARGE + small) ** 2 - LARGE**2)
-    step = scene.time_step * small / scene.sample.grain_radius.law.smallest  # goes as the radius
+    step = scene.time_step * small / scene.sample.radii.smallest  # goes as the radius
     time = np.linspace(0, 3, 3001)
     reached = float(np.interp(JUDGED, roll(ratio, time), time))
     end = 2 * reached + 2 * sqrt(2 * PLACE[2] / GRAVITY)

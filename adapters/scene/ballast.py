@@ -1,0 +1,48 @@
+"""What scenes for ballast name: a grading of the grains."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field, PlainValidator
+
+from adapters.bed import GradedRadii
+from adapters.errors import SceneError
+from trackbed.scene_files import GRADINGS, Grading, Positive, suggest_word
+
+Sieves = tuple[tuple[float, float], ...]
+"""Side of each sieve's hole [mm], and mass that passes it [%]."""
+
+
+def make_grading(key: str | Sieves) -> Grading:
+    """The curve of a standard's name or of a table; raises ValueError for neither, SceneError."""
+    if isinstance(key, str):
+        if key not in GRADINGS:
+            raise ValueError(f"unknown grading {key!r}{suggest_word(key, GRADINGS)}")
+        return GRADINGS[key]
+    sieves, percent = np.array(key, float).reshape(-1, 2).T
+    return Grading(sieves / 1e3, percent / 100)
+
+
+def read_grading(key: Any) -> str | Sieves:
+    """The key, tables as tuples; raises ValueError with a sentence where it is no grading."""
+    try:
+        if not isinstance(key, str):
+            key = tuple((float(sieve), float(percent)) for sieve, percent in key)
+        make_grading(key)
+    except (TypeError, SceneError) as error:
+        raise ValueError(
+            "must be a standard's name or [[sieve in mm, passing in %], ...] with sieves that grow"
+            f" and percentages that grow from 0 to 100, not {key!r:.60}"
+        ) from error
+    return key
+
+
+GradingKey = Annotated[str | Sieves, PlainValidator(read_grading)]
+GradingScale = Annotated[Positive, Field(le=10)]
+
+
+def make_radii(key: str | Sieves, scale: float | None) -> GradedRadii:
+    """Radii of a grading whose sieves are ``scale`` times as wide."""
+    return GradedRadii(make_grading(key).scale(scale or 1.0))

@@ -1,0 +1,84 @@
+"""Scenes for ballast: what their keys mean, and what is said where they make no sense."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from adapters.bed.radii import GradedRadii, draw_radii
+from adapters.errors import SceneError
+from adapters.scene.file import load_scene
+from adapters.scene.tables import Scene
+from trackbed.scene_files.grading import GRADINGS, measure_passing
+from trackbed.scenes import find_scene_file
+
+
+def coarse(*overrides: str) -> Scene:
+    """The demo's scene, changed."""
+    return load_scene(find_scene_file("karrech-coarse"), overrides)
+
+
+def refusal(*overrides: str) -> str:
+    with pytest.raises(SceneError) as caught:
+        coarse(*overrides)
+    return str(caught.value)
+
+
+# --- gradings -----------------------------------------------------------------------------------
+
+WIDE = ("sample.radius=0.5", 'sample.grading="EN 13450 31.5/50"')
+
+
+@pytest.mark.parametrize("name", GRADINGS)
+@pytest.mark.parametrize("scale", [1.0, 0.2])
+def test_named_gradings_keep_their_limits(name: str, scale: float) -> None:
+    """Of 400 spheres drawn by mass as much passes each sieve as the standard allows; their moments
+    are the closed ones to the part that one slice of number holds, 1/400."""
+    limits = GRADINGS[name].limits
+    assert limits is not None
+    radii = GradedRadii(GRADINGS[name].scale(scale))
+    drawn = draw_radii(radii, 400, 3)
+    passing = measure_passing(2 * drawn, scale * GRADINGS[name].sieves)
+    assert (limits[0] <= passing).all()
+    assert (passing <= limits[1]).all()
+    assert radii.smallest <= drawn.min() <= drawn.max() <= radii.greatest
+    assert drawn.mean() == pytest.approx(radii.mean, rel=1 / 400)
+    assert 4 / 3 * np.pi * (drawn**3).mean() == pytest.approx(radii.volume_mean, rel=3 / 400)
+
+
+def test_grading_of_a_scene_is_its_radii() -> None:
+    """By name, scaled, or as a table of sieves in mm and per cent; even in ln D between two."""
+    radii = coarse(*WIDE).sample.radii
+    assert (radii.smallest, radii.greatest) == (0.0112, 0.0315)
+    assert coarse(*WIDE, "sample.grading_scale=0.1").sample.radii.greatest == pytest.approx(3.15e-3)
+    table = coarse("sample.radius=0.5", "sample.grading=[[20, 0], [40, 100]]")
+    drawn = draw_radii(table.sample.radii, 1000, 1)
+    half = measure_passing(2 * drawn, np.array([0.02 * np.sqrt(2)]))
+    assert half == pytest.approx(0.5, abs=2 / 1000)
+    assert table.grain_count == 150
+
+
+@pytest.mark.parametrize(
+    ("overrides", "words"),
+    [
+        (['sample.grading="EN 13450 31.5/63"'], "did you mean EN 13450 31.5/50"),
+        (["sample.grading=[[20, 0], [40, 90]]"], "percentages that grow from 0 to 100"),
+        (["sample.grading=7"], r"\[\[sieve in mm, passing in %\]"),
+        (["sample.grading_scale=0.5"], "no sample.grading to scale"),
+        (['sample.grading="AREMA 4"'], "sample.grading: radii up to 0.0254 m do not fit"),
+        (["sample.radius=0.5", 'sample.grading="AREMA 4"', "sample.grain_radius.mean=1e-3"],
+         "sample.grain_radius: give this or grading, not both"),
+    ],
+)  # fmt: skip
+def test_gradings_that_are_none_are_refused(overrides: list[str], words: str) -> None:
+    assert re.search(words, refusal(*overrides))
+
+
+def test_few_grains_leave_the_limits_and_metres_are_doubted() -> None:
+    """Three grains cannot have four sieves' shares; sieves in metres are a bed of dust."""
+    with pytest.raises(SceneError, match=r"3 grains .* the standard's limits are"):
+        draw_radii(coarse(*WIDE).sample.radii, 3, 1)
+    dust = coarse("sample.grading=[[0.02, 0], [0.04, 100]]", "sample.count=10")
+    assert any("sieves are given in mm" in said for said in dust.warnings)
