@@ -16,6 +16,11 @@ GRAIN_MASK, WALL_MASK, BALLAST_MASK = 1, 3, 4
 """Group masks: bodies meet when they share a bit; walls, of bit 2, never meet one another."""
 PLANE, RIM = 8, 16
 """Bits of grains under a piston over a part of the bed: each meets its plane, or its rim."""
+ROLLING_STEPS = 2
+"""Time steps in which a new contact with a wall has YADE's own slider, which never slips: too few
+for its spring to brake what rolls."""
+NO_ROLLING = 1e-12
+"""Coefficient of a slider that resists nothing [-]: YADE takes 0 for one that never slips."""
 STILL = 1e-100
 """Share of the time step with which forces are worked out anew: no spring stretches, and
 velocities, which the law divides by the step, keep their digits."""
@@ -167,7 +172,12 @@ class Piston:
 
 
 def make_contact_law(parameters):
-    """Hertz-Mindlin contacts; damping and friction are those of the pair of materials."""
+    """Hertz-Mindlin contacts; damping and friction are those of the pair of materials.
+
+    ``rolling``, where the scene names it, is resisted by a spring and a slider: between grains by
+    eta (R_1 + R_2)/2 F_n at most, which is mu_r R* F_n of two alike and an eighth more at 1 to 2.
+    """
+    rolling = parameters.get("rolling")
 
     def of_pairs(key, value=float):
         matches = [
@@ -181,13 +191,31 @@ def make_contact_law(parameters):
         betas=of_pairs("damping_tangential"),
         frictAngle=of_pairs("friction", atan),
     )
+    if rolling and rolling["grain"]:
+        physics.eta = rolling["grain"] / 2
+        physics.krot = rolling["spring"] * (rolling["radius"] / 2) ** 2
     # hertzian: a wall is flat; by itself YADE takes it for a sphere like the one that touches it.
     shapes = [
         wrapper.Ig2_Sphere_Sphere_ScGeom(),
         wrapper.Ig2_Wall_Sphere_ScGeom(hertzian=True),
         wrapper.Ig2_Facet_Sphere_ScGeom(hertzian=True),
     ]
-    return wrapper.InteractionLoop(shapes, [physics], [wrapper.Law2_ScGeom_MindlinPhys_Mindlin()])
+    law = wrapper.Law2_ScGeom_MindlinPhys_Mindlin(includeMoment=bool(rolling))
+    return wrapper.InteractionLoop(shapes, [physics], [law])
+
+
+def limit_rolling(parameters):
+    """Spring and slider of rolling at walls: R* = R; YADE takes a wall for a sphere of 1,000 km.
+
+    No slider at all is none that slips: where nothing resists, the slider is next to nothing.
+    """
+    rolling = parameters["rolling"]
+    for wall_number in range(parameters["grain_count"], len(O.bodies)):
+        for contact in O.bodies[wall_number].intrs():
+            grain = O.bodies[min(contact.id1, contact.id2)]
+            radius, name = grain.shape.radius, O.bodies[wall_number].material.label
+            contact.phys.kr = rolling["spring"] * radius**2
+            contact.phys.maxBendPl = max(rolling[name], NO_ROLLING) * radius
 
 
 def set_engines(parameters, forces=(), watch=(), behind=()):
@@ -200,10 +228,12 @@ def set_engines(parameters, forces=(), watch=(), behind=()):
     motion = wrapper.NewtonIntegrator(
         damping=0, gravity=(0, 0, -parameters["gravity"]), kinSplit=True
     )
+    rolling = wrapper.PyRunner(command="bed.limit_rolling(parameters)", iterPeriod=ROLLING_STEPS)
     O.engines = [
         wrapper.ForceResetter(),
         collider,
         make_contact_law(parameters),
+        *[rolling] * ("rolling" in parameters),
         *forces,
         *watch,
         motion,

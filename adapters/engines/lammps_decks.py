@@ -14,6 +14,7 @@ import numpy as np
 
 from adapters.bed import Container, FloatArray, IntArray, State, contact_law
 from adapters.engines.decks import STATE_COLUMNS, place_piston_atom
+from adapters.engines.plan import find_rolling_stiffness
 from adapters.files import Frame, read_frames
 from adapters.scene import Scene
 
@@ -22,12 +23,15 @@ TANGENTIAL = "mindlin_rescale/force"
 is what LAMMPS calls ``mindlin``, YADE's ``mindlin/force``."""
 
 
-def format_contact(modulus: float, shear: float, restitution: float, friction: float) -> str:
+def format_contact(
+    modulus: float, shear: float, restitution: float, friction: float, rolling: str = ""
+) -> str:
     """Words of a granular contact law: eqs 5 to 7 for E* = ``modulus`` and G* = ``shear`` [Pa].
 
     K_n = 4/3 E*, K_t = 8 G*; the damping is that of the ``restitution``, see
     `adapters.bed.contact_law`; along the tangent it is larger by sqrt(k_t/S_n) = sqrt(4 G*/E*), so
     that both have the same alpha.  Without ``friction`` there is no tangential force at all.
+    ``rolling`` are words of `format_rolling`.
     """
     if friction > 0:
         ratio = sqrt(4 * shear / modulus)
@@ -35,14 +39,22 @@ def format_contact(modulus: float, shear: float, restitution: float, friction: f
     else:
         tangential = "linear_nohistory 0.0 0.0"
     normal = f"hertz {4 / 3 * modulus:.17g} {restitution:.17g}"
-    return f"{normal} tangential {tangential} damping coeff_restitution"
+    return f"{normal} tangential {tangential}{rolling} damping coeff_restitution"
+
+
+def format_rolling(scene: Scene, friction: float | None) -> str:
+    """Words of a spring and a slider that resist rolling: at most mu_r R* F_n; "" without."""
+    if not friction:
+        return ""
+    return f" rolling sds {find_rolling_stiffness(scene):.17g} 0.0 {friction:.17g}"
 
 
 def format_wall_contact(scene: Scene) -> str:
     """`format_contact` between a grain and a wall."""
     grain, wall = scene.material.grain, scene.material.wall
     shear = contact_law.combine_shear_moduli(grain.young, grain.poisson, wall.young, wall.poisson)
-    return format_contact(scene.stiffness.wall, shear, scene.restitution, wall.friction)
+    rolling = format_rolling(scene, wall.rolling_friction)
+    return format_contact(scene.stiffness.wall, shear, scene.restitution, wall.friction, rolling)
 
 
 def find_shear_modulus(scene: Scene) -> float:
@@ -57,9 +69,10 @@ def format_scene(scene: Scene) -> str:
     The cylinder is curved for LAMMPS, which takes
     1/R* = 1/R - 1/(2 R_c) with its radius R_c where LIGGGHTS takes 1/R* = 1/R.
     """
+    grain = scene.material.grain
     between = format_contact(
-        scene.stiffness.grain, find_shear_modulus(scene), scene.restitution,
-        scene.material.grain.friction,
+        scene.stiffness.grain, find_shear_modulus(scene), scene.restitution, grain.friction,
+        format_rolling(scene, grain.rolling_friction),
     )  # fmt: skip
     wall = format_wall_contact(scene)
     mirror = format_contact(scene.stiffness.mirror, 0.0, scene.restitution, 0.0)

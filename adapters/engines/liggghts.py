@@ -9,7 +9,7 @@ from pathlib import Path
 from adapters.engines import liggghts_decks
 from adapters.engines.contract import EngineStart
 from adapters.engines.decks import PISTON_MARGIN, DeckEngine, Parameters
-from adapters.engines.plan import has_friction
+from adapters.engines.plan import has_friction, has_rolling
 from adapters.scene import Scene
 
 BANNER = re.compile(r"(LIGGGHTS-PUBLIC (\d+)\.(\d+)[^,)]*)")
@@ -63,8 +63,9 @@ class LiggghtsEngine(DeckEngine):
         return own
 
     def name_parts(self, scene: Scene) -> Parameters:
-        """Contact law and output, with or without friction."""
+        """Contact law and output, with or without friction and resistance to rolling."""
         kind = "frictional" if has_friction(scene) else "frictionless"
+        kind = "rolling" if has_rolling(scene) else kind
         return {"contact_part": f"contact_{kind}.in", "output_part": f"output_{kind}.in"}
 
 

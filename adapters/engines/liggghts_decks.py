@@ -39,9 +39,11 @@ def format_scene(scene: Scene) -> str:
     young = [grain.young, wall.young] + [MIRROR_YOUNG] * mirrors
     poisson = [grain.poisson, wall.poisson] + [grain.poisson] * mirrors
     types = len(young)
-    friction = np.zeros((types, types))
+    friction, rolling = np.zeros((2, types, types))
     friction[0, 0] = grain.friction
     friction[0, 1] = friction[1, 0] = wall.friction
+    rolling[0, 0] = grain.rolling_friction or 0.0
+    rolling[0, 1] = rolling[1, 0] = wall.rolling_friction or 0.0
 
     def format_row(values: object) -> str:
         return " ".join(f"{v:.17g}" for v in np.ravel(values))  # type: ignore[call-overload]
@@ -54,11 +56,12 @@ def format_scene(scene: Scene) -> str:
         "fix restitution all property/global coefficientRestitution peratomtypepair "
         f"{types} {format_row(np.full(types * types, scene.restitution))}",
     ]
-    if friction.any():
-        lines.append(
-            f"fix friction all property/global coefficientFriction peratomtypepair "
-            f"{types} {format_row(friction)}"
-        )
+    for name, matrix in (("Friction", friction), ("RollingFriction", rolling)):
+        if matrix.any():
+            lines.append(
+                f"fix {name.lower()} all property/global coefficient{name} peratomtypepair "
+                f"{types} {format_row(matrix)}"
+            )
     lines += ["pair_style gran model ${contact_model}", "pair_coeff * *"]
     walls = scene.container.walls()
     primitives = [

@@ -22,7 +22,14 @@ from adapters.bed import (
 from adapters.engines.contract import EngineStart
 from adapters.engines.decks import PISTON_MARGIN, bound_box, bound_section, clip_convex, copy_deck
 from adapters.engines.liggghts_decks import MIRROR_YOUNG
-from adapters.engines.plan import PLAN, has_friction, plan_seating, plan_settling
+from adapters.engines.plan import (
+    PLAN,
+    find_rolling_stiffness,
+    has_friction,
+    has_rolling,
+    plan_seating,
+    plan_settling,
+)
 from adapters.engines.process import ProcessEngine
 from adapters.scene import Scene
 
@@ -162,7 +169,8 @@ def gather_shared_parameters(scene: Scene, height: float) -> dict[str, Any]:
         materials["mirror"] = (MIRROR_YOUNG, material.grain.poisson, NO_WEIGHT)
     names = ("young", "poisson", "density")
     radius = np.array([scene.sample.radii.greatest])
-    return {
+    rolling = {"rolling": describe_rolling(scene)} if has_rolling(scene) else {}
+    return rolling | {
         "grain_count": scene.grain_count,
         "time_step": scene.time_step,
         "gravity": GRAVITY,
@@ -173,6 +181,15 @@ def gather_shared_parameters(scene: Scene, height: float) -> dict[str, Any]:
         "box": np.column_stack(bound_box(container, radius, height)).tolist(),
         "walls": list_walls(container, height),
     }
+
+
+def describe_rolling(scene: Scene) -> dict[str, float]:
+    """Coefficients of rolling friction [-], the spring of rolling [N/m], the mean radius [m]."""
+    grain, wall = scene.material.grain, scene.material.wall
+    return {
+        "grain": grain.rolling_friction or 0.0, "wall": wall.rolling_friction or 0.0,
+        "mirror": 0.0, "spring": find_rolling_stiffness(scene), "radius": scene.sample.radii.mean,
+    }  # fmt: skip
 
 
 def _list_pairs(scene: Scene) -> list[dict[str, float | str]]:

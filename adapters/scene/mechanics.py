@@ -236,7 +236,7 @@ def _warn_of_sieves_in_metres(scene: Values) -> Iterator[Problem]:
         )
 
 
-IMPLAUSIBLE = (
+IMPLAUSIBLE: tuple[Check, ...] = (
     *(partial(_warn_of_implausible_size, *row) for row in SIZES), _warn_of_sieves_in_metres,
 )  # fmt: skip
 DOUBTS: tuple[Check, ...] = (

@@ -42,7 +42,9 @@ def _list_grains(scene: Scene) -> Iterator[str]:
 def _list_contacts(scene: Scene) -> Iterator[str]:
     grain = scene.material.grain
     yield "Plastic and adhesive contacts: Hertz's law is elastic, for overlaps far below a radius."
-    if grain.friction or scene.material.wall.friction:
+    if grain.rolling_friction:
+        yield "Spinning resistance: a grain may spin about the normal of its contact without end."
+    elif grain.friction or scene.material.wall.friction:
         yield "Rolling and spinning resistance: a loose grain may spin without end."
     if grain.friction and scene.engine.name in KEPT:
         yield (

@@ -107,6 +107,8 @@ class GrainMaterial(Table):
     restitution: Restitution | None = None
     """Coefficient of restitution, instead of ``viscous_alpha``."""
     friction: NonNegative  # Coulomb's coefficient between grains
+    rolling_friction: Positive | None = None
+    """Greatest torque that resists rolling between grains over R* F_n [-]; None: no resistance."""
 
 
 class WallMaterial(Table):
@@ -115,6 +117,7 @@ class WallMaterial(Table):
     young: Positive  # Young's modulus [Pa]
     poisson: Poisson
     friction: NonNegative  # Coulomb's coefficient between grain and wall
+    rolling_friction: Positive | None = None  # as that of grains, at walls, where R* = R
 
 
 class Material(Table):

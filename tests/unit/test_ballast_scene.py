@@ -3,21 +3,32 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from adapters.bed.radii import GradedRadii, draw_radii
+from adapters.engines.contract import get_engine
 from adapters.errors import SceneError
 from adapters.scene.file import load_scene
 from adapters.scene.tables import Scene
 from trackbed.scene_files.grading import GRADINGS, measure_passing
 from trackbed.scenes import find_scene_file
 
+ENGINES = ("liggghts", "lammps", "yade")
+
 
 def coarse(*overrides: str) -> Scene:
     """The demo's scene, changed."""
     return load_scene(find_scene_file("karrech-coarse"), overrides)
+
+
+def rain(folder: Path, scene: Scene) -> str:
+    """All that is written for the rain of one grain."""
+    place, radius = np.full((1, 3), 0.01), np.full(1, 3e-3)
+    get_engine(scene.engine.name).write_preparation(scene, place, radius, 0.05, folder)
+    return "".join(path.read_text() for path in sorted(folder.iterdir()) if path.suffix != ".py")
 
 
 def refusal(*overrides: str) -> str:
@@ -82,3 +93,30 @@ def test_few_grains_leave_the_limits_and_metres_are_doubted() -> None:
         draw_radii(coarse(*WIDE).sample.radii, 3, 1)
     dust = coarse("sample.grading=[[0.02, 0], [0.04, 100]]", "sample.count=10")
     assert any("sieves are given in mm" in said for said in dust.warnings)
+
+
+# --- rolling resistance -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_rolling_is_in_the_deck_where_it_is_named(engine: str, tmp_path: Path) -> None:
+    """Coefficients of grains and walls, none at mirrors; not a word of it in another deck."""
+    assert "roll" not in rain(tmp_path, coarse(f'engine.name="{engine}"')).lower()
+    named = coarse(
+        f'engine.name="{engine}"', "material.grain.rolling_friction=0.25",
+        "material.wall.rolling_friction=0.125",
+    )  # fmt: skip
+    words = {
+        "liggghts": (r"coefficientRollingFriction peratomtypepair 3 0.25 0.125 0 0.125 0 0 0 0 0",),
+        "lammps": (r"pair_coeff .* 0.25 damping", r"fix floor .* 0.125 damping"),
+        "yade": ('"grain": 0.25', '"wall": 0.125', '"mirror": 0.0'),
+    }[engine]
+    text = rain(tmp_path, named)
+    assert all(re.search(word, text) for word in words)
+    mirrors = [line for line in text.splitlines() if "fix symmetry" in line]
+    assert not any("roll" in line or "contact_model" in line for line in mirrors)
+
+
+def test_rolling_without_friction_is_refused() -> None:
+    said = refusal("material.grain.friction=0", "material.wall.rolling_friction=0.1")
+    assert "material.wall.rolling_friction: grains without friction slip" in said

@@ -46,6 +46,7 @@ for number, (state, velocity) in enumerate(zip(states, few["velocity"]), 1):
     state.vel = Vector3(*velocity)
     if not few["free"] or number in few["held"]:
         state.blockedDOFs = "xyzXYZ"
+states[0].angVel = Vector3(0, few["spin"], 0)
 if few["push"]:
     O.forces.setPermF(0, Vector3(*few["push"]))
 bed.set_engines(parameters)
@@ -88,9 +89,10 @@ def run_grains(
     """Run YADE, without gravity; as `validation.bench.few_grains.run_grains`.
 
     ``motion`` are the same lines of a LIGGGHTS deck: ``fix ... nve/sphere`` frees the grains, but
-    those of ``group held id ...``; ``addforce`` pushes the first one, ``gravity`` all, ``move
-    linear`` drives the first, ``run`` steps.  ``materials`` may change the parameters' text.
-    Velocities are those of the half step before an instant.  Raises as `YadeEngine.run`.
+    those of ``group held id ...``; ``addforce`` pushes the first one, ``omegay`` spins it, ``move
+    linear`` drives it, ``gravity`` pulls all; ``run`` steps.  ``materials`` may change the
+    parameters' text.  Velocities are those of the half step before an instant.  Raises as
+    `YadeEngine.run`.
     """
     engine = YadeEngine()
     with TemporaryDirectory() as temporary:
@@ -119,13 +121,15 @@ def run_grains(
 
 def parse_motion(lines: Sequence[str]) -> dict[str, Any]:
     """Lines of a LIGGGHTS deck as what the script understands."""
-    free, gravity, held, push, leg, legs = False, 0.0, [], [], [], []
+    free, gravity, spin, held, push, leg, legs = False, 0.0, 0.0, [], [], [], []
     for line in lines:
         words = line.split()
         if "nve/sphere" in words:
             free = True
         elif words[:3] == ["group", "held", "id"]:
             held = [int(word) for word in words[3:]]
+        elif "omegay" in words:
+            spin = float(words[-1])
         elif "gravity" in words:
             gravity = float(words[4])
         elif "addforce" in words:
@@ -134,4 +138,5 @@ def parse_motion(lines: Sequence[str]) -> dict[str, Any]:
             leg = [float(word) for word in words[5:8]]
         elif words[0] == "run":
             legs.append([leg, int(words[1])])
-    return {"free": free, "gravity": gravity, "held": held, "push": push, "legs": legs}
+    found = {"free": free, "gravity": gravity, "spin": spin}
+    return found | {"held": held, "push": push, "legs": legs}
