@@ -69,9 +69,9 @@ class Piston:
     """A flat face with a mass: a clump, driven by forces along z.
 
     Over the whole section the face is one triangle.  Over a part of it, it is a plane for the
-    grains within ``plane_reach`` of the axis, and a fan of triangles for those further out, which
-    ends where the piston does: a grain meets one of the two (`grains_share`), and is pushed twice
-    on a seam of two triangles only near the rim.
+    grains within ``plane_reach`` of the axis, or within ``plane_edges``, and a fan of triangles for
+    those further out, which ends where the piston does: a grain meets one of the two
+    (`grains_share`), and is pushed twice on a seam of two triangles only near the rim.
 
     Its members have no mass of their own, so that a contact damps with the mass of its grain.
     YADE makes no clump without a sphere; that sphere touches nothing, and at the face's height
@@ -83,9 +83,11 @@ class Piston:
         piston = parameters["piston"]
         self.mass = piston["mass"]
         self.plane_reach = piston.get("plane_reach")
+        self.plane_edges = piston.get("plane_edges")
+        self.parted = self.plane_reach is not None or self.plane_edges is not None
         self.grains = parameters["grain_count"]
         first = self.grains + len(parameters["walls"])
-        members = len(piston["triangles"]) + (self.plane_reach is not None)
+        members = len(piston["triangles"]) + self.parted
         self.faces = list(range(first, first + members))
         self.ballast = self.faces[-1] + 1
         self.clump = self.ballast + 1
@@ -95,7 +97,7 @@ class Piston:
         self.grains_share()
 
     def _make(self, piston):
-        z, parted = piston["height"], self.plane_reach is not None
+        z, parted = piston["height"], self.parted
         members = [
             facet(
                 [Vector3(x, y, z) for x, y in triangle],
@@ -120,13 +122,13 @@ class Piston:
         Then engines are to be set anew: a collider looks at pairs whose bounds began to overlap.
         The contact it had is made anew by the other face, without its tangential spring.
         """
-        if self.plane_reach is None:
+        if not self.parted:
             return False
         changed = False
         for number in range(self.grains):
             body = O.bodies[number]
             place = body.state.pos
-            inside = place[0] ** 2 + place[1] ** 2 < self.plane_reach**2
+            inside = self.covers(place[0], place[1])
             mask = GRAIN_MASK | (PLANE if inside else RIM)
             if body.mask != mask:
                 body.mask = mask
@@ -137,6 +139,13 @@ class Piston:
         if changed:  # erased ones only sleep while bounds overlap, whatever the masks say
             O.interactions.eraseNonReal()
         return changed
+
+    def covers(self, x, y):
+        """Whether a grain there [m] meets the plane, not the rim."""
+        if self.plane_edges is None:
+            return x**2 + y**2 < self.plane_reach**2
+        left, right, front, back = self.plane_edges
+        return left < x < right and front < y < back
 
     @property
     def height(self):

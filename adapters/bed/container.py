@@ -12,6 +12,8 @@ from adapters.bed.state import FloatArray
 
 GOLDEN_ANGLE = 2.399963229728653
 """Golden angle [rad]: its multiples are spread evenly over a circle."""
+WHOLE = (-np.inf, np.inf, -np.inf, np.inf)
+"""Edges of a face that covers all: its ends along x, then along y [m]."""
 SIDES_GAP = 0.01
 """Greatest gap between a cylinder and the polygon around it, over the mean grain radius."""
 
@@ -27,11 +29,17 @@ class Walls:
     plane_reach: FloatArray
     """Distance from the z axis beyond which a plane ends [m], shape (p,); inf for whole planes."""
     cylinder_radius: float = np.inf  # inner radius of the cylinder [m]; inf without one
+    piston_edges: tuple[float, float, float, float] = WHOLE
+    """Ends along x and along y of the last plane where that is a rectangular piston [m]."""
 
     @property
-    def geometry(self) -> tuple[FloatArray, FloatArray, FloatArray, float]:
-        """Points, normals and reaches of the planes, and the cylinder's radius."""
-        return self.plane_point, self.plane_normal, self.plane_reach, self.cylinder_radius
+    def geometry(self) -> tuple[FloatArray, FloatArray, FloatArray, float, FloatArray]:
+        """Points, normals and reaches of the planes, the cylinder's radius, edges of planes."""
+        edges = np.tile(WHOLE, (len(self.plane_reach), 1))
+        edges[-1] = self.piston_edges
+        return (
+            self.plane_point, self.plane_normal, self.plane_reach, self.cylinder_radius, edges
+        )  # fmt: skip
 
     def planes(self) -> Iterator[tuple[str, bool, int, float, int]]:
         """Of each plane across an axis name, whether frictionless, axis, place on it [m], sense."""
@@ -68,10 +76,14 @@ class Container:
             return self.size_x * self.size_y
         return np.pi * self.radius**2 / 2 ** len(self.symmetry)
 
-    def walls(self, piston_height: float = np.nan, piston_reach: float = np.inf) -> Walls:
+    def walls(
+        self, piston_height: float = np.nan, piston_reach: float = np.inf,
+        piston_edges: tuple[float, float, float, float] = WHOLE,
+    ) -> Walls:  # fmt: skip
         """All walls; with a piston [m] at ``piston_height`` when that is finite.
 
-        ``piston_reach`` [m] is the radius of a piston that covers a part of the section only.
+        Of a piston that covers a part of the section ``piston_reach`` [m] is the radius, or
+        ``piston_edges`` [m] are the ends along x and y.
         """
         planes: list[tuple[str, tuple[float, ...], tuple[float, ...], bool, float]] = [
             ("floor", (0, 0, 0), (0, 0, 1), False, np.inf)
@@ -96,8 +108,18 @@ class Container:
         return Walls(
             name_, np.array(point, float), np.array(normal, float), frictionless,
             np.array(reach, float),
-            self.radius if self.shape == "cylinder" and not self.sides else np.inf,
+            self.radius if self.shape == "cylinder" and not self.sides else np.inf, piston_edges,
         )  # fmt: skip
+
+    def place_footprint(self, size: tuple[float, float]) -> tuple[float, float, float, float]:
+        """Ends along x and y [m] of a rectangle of ``size`` [m] in a box: from a mirror plane on,
+        which it crosses, or in the middle."""
+        ends: list[float] = []
+        for axis, length, width in zip("xy", size, (self.size_x, self.size_y), strict=True):
+            ends += [-np.inf, length] if axis in self.symmetry else [
+                (width - length) / 2, (width + length) / 2
+            ]  # fmt: skip
+        return ends[0], ends[1], ends[2], ends[3]
 
     def side_angles(self) -> FloatArray:
         """Direction of each side's outward normal from the x axis [rad]; none without ``sides``."""

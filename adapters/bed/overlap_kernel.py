@@ -18,7 +18,7 @@ _COINCIDENT = 1e-9
 """Centres nearer than this share of the radii have no direction: one is made up."""
 
 
-Geometry = tuple[FloatArray, FloatArray, FloatArray, float]
+Geometry = tuple[FloatArray, FloatArray, FloatArray, float, FloatArray]
 """Of `adapters.bed.container.Walls`."""
 
 
@@ -42,29 +42,35 @@ def find_wall_contact(
 ) -> float:
     """Overlap [m] of a grain at ``x`` with a wall; fills ``normal``, its direction at the grain.
 
-    A plane that ends at a reach [m] from the z axis is a thin disc: grains that started
-    ``behind`` it (p,) stay behind it, and beyond its rim the nearest point of the rim counts.
+    A plane that ends at a reach [m] from the z axis, or at edges, is a thin plate: grains that
+    started ``behind`` it (p,) stay behind it, and beyond its rim the nearest point of that counts.
     """
-    points, normals, reaches, cylinder = walls
+    points, normals, reaches, cylinder, all_edges = walls
     if wall == len(reaches):
         return find_cylinder_contact(x, radius, cylinder, normal)
     point, plane_normal, reach = points[wall], normals[wall], reaches[wall]
     height = 0.0
     for a in range(3):
         height += (x[a] - point[a]) * plane_normal[a]
-    if reach == np.inf:
+    edges = all_edges[wall]
+    if reach == np.inf and edges[1] == np.inf and edges[3] == np.inf:
         normal[:] = plane_normal
         return radius - height
-    from_axis = np.hypot(x[0], x[1])
-    beyond = from_axis - reach
+    if reach == np.inf:
+        gap_x = x[0] - min(max(x[0], edges[0]), edges[1])
+        gap_y = x[1] - min(max(x[1], edges[2]), edges[3])
+        beyond = np.hypot(gap_x, gap_y)
+    else:
+        from_axis = np.hypot(x[0], x[1])
+        beyond = from_axis - reach
+        gap_x, gap_y = beyond * (x[0] / from_axis), beyond * (x[1] / from_axis)
     if beyond <= 0.0:
         side = -1.0 if behind[wall] else 1.0
         normal[:] = side * plane_normal
         return radius - side * height
     distance = np.hypot(beyond, height)
     for a in range(3):
-        outward = x[a] / from_axis if a < 2 else 0.0
-        normal[a] = (beyond * outward + height * plane_normal[a]) / distance
+        normal[a] = ((gap_x, gap_y, 0.0)[a] + height * plane_normal[a]) / distance
     return radius - distance
 
 

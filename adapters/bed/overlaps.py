@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from adapters.bed.container import Walls
+from adapters.bed.container import WHOLE, Walls
 from adapters.bed.state import BoolArray, FloatArray, IntArray, State
 from adapters.errors import UsageError
 
@@ -53,7 +53,9 @@ def find_behind_discs(position: FloatArray, walls: Walls) -> BoolArray:
     state: take it where it is beyond doubt, before a jump.  Whole planes have one side only.
     """
     height = np.einsum("nwa,wa->nw", position[:, None] - walls.plane_point, walls.plane_normal)
-    return np.asarray((height < 0) & np.isfinite(walls.plane_reach))
+    ends = np.isfinite(walls.plane_reach)
+    ends[-1] |= walls.piston_edges != WHOLE
+    return np.asarray((height < 0) & ends)
 
 
 def find_pairs_within(position: FloatArray, radius: FloatArray, gap: float) -> IntArray:

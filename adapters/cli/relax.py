@@ -63,7 +63,7 @@ def run_relax(arguments: argparse.Namespace) -> int:
     scene = load_scene(given) if given else load_scene(*find_scene_of_state(arguments.state))
     density = scene.material.grain.density
     state = read_state_file(arguments.state, density)
-    walls = scene.container.walls(state.piston_height, scene.piston_reach)
+    walls = scene.walls(state.piston_height)
     if doubt := judge_state(state, walls, str(arguments.state)):
         print(f"warning: {doubt}", file=sys.stderr)
     if arguments.before is None:
@@ -77,8 +77,8 @@ def run_relax(arguments: argparse.Namespace) -> int:
                 remedy="give the state of the same bed before the jump",
             )  # fmt: skip
         relaxation = relax(
-            state.position, before, scene.container.walls(before.piston_height, scene.piston_reach),
-            scene.stiffness, walls_after=walls, method=arguments.method,
+            state.position, before, scene.walls(before.piston_height), scene.stiffness,
+            walls_after=walls, method=arguments.method,
         )  # fmt: skip
     still = np.zeros_like(state.position)
     # Contacts and wall forces belong to the positions before and are left out.

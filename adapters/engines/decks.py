@@ -179,6 +179,17 @@ def bound_section(container: Container) -> tuple[tuple[float, float], tuple[floa
     return (low[0], low[1]), (radius, radius)
 
 
+def cover_rectangle(
+    container: Container, edges: tuple[float, float, float, float], margin: float
+) -> list[tuple[float, float]]:
+    """Corners [m] of the part of the section between ``edges`` [m], anticlockwise from the lowest;
+    ``margin`` [m] wider where there is no edge."""
+    low, high = bound_section(container)
+    x0, y0 = (max(edge, end - margin) for edge, end in zip(edges[::2], low, strict=True))
+    x1, y1 = (min(edge, end + margin) for edge, end in zip(edges[1::2], high, strict=True))
+    return [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
+
+
 def clip_convex(polygon: FloatArray, floor: list[float]) -> FloatArray:
     """Part of a convex polygon, shape (n, 2), above ``floor`` along x and along y."""
     for axis in (0, 1):

@@ -12,8 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
-from adapters.bed import Container, FloatArray, IntArray, State, contact_law
-from adapters.engines.decks import STATE_COLUMNS, place_piston_atom
+from adapters.bed import WHOLE, Container, FloatArray, IntArray, State, contact_law
+from adapters.engines.decks import (
+    PISTON_MARGIN,
+    STATE_COLUMNS,
+    cover_rectangle,
+    place_piston_atom,
+)
 from adapters.engines.plan import find_rolling_stiffness
 from adapters.files import Frame, read_frames
 from adapters.scene import Scene
@@ -101,10 +106,16 @@ def format_scene(scene: Scene) -> str:
 def format_piston_wall(scene: Scene) -> str:
     """``piston_wall.in``: the piston's face at height 0, moved by ``v_piston_position``.
 
-    A whole piston is a plane, a partial one the end of a cylinder of radius ``piston_reach``.
+    A whole piston is a plane, a partial one the end of a cylinder of radius ``piston_reach``, or of
+    a block.
     """
     motion = "move NULL NULL v_piston_position units box"
-    if isinf(scene.piston_reach):
+    if scene.piston_edges != WHOLE:
+        margin = PISTON_MARGIN * scene.sample.radii.greatest
+        (x0, y0), _, (x1, y1), _ = cover_rectangle(scene.container, scene.piston_edges, margin)
+        ends = f"{x0:.17g} {x1:.17g} {y0:.17g} {y1:.17g}"
+        region = f"block {ends} 0.0 INF side out {motion}"
+    elif isinf(scene.piston_reach):
         region = f"plane 0.0 0.0 0.0 0.0 0.0 -1.0 {motion}"
     else:
         region = f"cylinder z 0.0 0.0 {scene.piston_reach:.17g} 0.0 INF side out {motion}"

@@ -52,7 +52,7 @@ class LiggghtsEngine(DeckEngine):
         """The piston's mesh, and the moved grains."""
         margin = PISTON_MARGIN * scene.sample.radii.greatest
         liggghts_decks.write_piston_stl(
-            folder / "piston.stl", scene.container, scene.piston_reach, margin
+            folder / "piston.stl", scene.container, scene.piston_reach, margin, scene.piston_edges
         )
         own: Parameters = {
             "piston_mesh": f"piston_{start.piston_mesh}", "piston_height": start.piston_height

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from adapters.bed import Container, FloatArray
+from adapters.bed import WHOLE, Container, FloatArray
 from adapters.engines.contract import EngineStart
 from adapters.engines.decks import (
     GRAIN,
@@ -14,8 +14,8 @@ from adapters.engines.decks import (
     STATE_COLUMNS,
     WALL,
     bound_box,
-    bound_section,
     clip_convex,
+    cover_rectangle,
     place_piston_atom,
 )
 from adapters.files import Frame, write_dump
@@ -92,20 +92,20 @@ def format_dump_states(names: tuple[str, ...]) -> str:
     )
 
 
-def write_piston_stl(path: Path, container: Container, reach: float, margin: float) -> None:
+def write_piston_stl(
+    path: Path, container: Container, reach: float, margin: float,
+    edges: tuple[float, float, float, float] = WHOLE,
+) -> None:  # fmt: skip
     """Mesh of the piston's face at height 0, normal down, as STL.
 
-    A whole piston (``reach`` infinite) is a rectangle over the section and ``margin`` [m] more;
-    a partial one a disc of radius ``reach`` [m], cut ``margin`` behind the mirror planes so
-    that the mirrored edge is covered.
+    A whole piston (``reach`` infinite) is a rectangle over the section and ``margin`` [m] more, or
+    ends at the ``edges`` [m] of a block; a partial one is a disc of radius ``reach`` [m], cut
+    ``margin`` behind the mirror planes so that the mirrored edge is covered.
     """
     import meshio
 
-    low, high = bound_section(container)
     if np.isinf(reach):
-        (x0, y0), (x1, y1) = low, high
-        corners = [(x0 - margin, y0 - margin), (x1 + margin, y0 - margin)]
-        corners += [(x1 + margin, y1 + margin), (x0 - margin, y1 + margin)]
+        corners = cover_rectangle(container, edges, margin)
     else:
         angle = np.linspace(0.0, 2 * np.pi, 97)[:-1]
         circle = reach * np.column_stack([np.cos(angle), np.sin(angle)])

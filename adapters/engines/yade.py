@@ -14,13 +14,21 @@ import numpy as np
 from adapters.bed import (
     DAMPING_FACTOR,
     GRAVITY,
+    WHOLE,
     Container,
     FloatArray,
     Radii,
     find_rebound_damping,
 )
 from adapters.engines.contract import EngineStart
-from adapters.engines.decks import PISTON_MARGIN, bound_box, bound_section, clip_convex, copy_deck
+from adapters.engines.decks import (
+    PISTON_MARGIN,
+    bound_box,
+    bound_section,
+    clip_convex,
+    copy_deck,
+    cover_rectangle,
+)
 from adapters.engines.liggghts_decks import MIRROR_YOUNG
 from adapters.engines.plan import (
     PLAN,
@@ -85,7 +93,9 @@ class YadeEngine(ProcessEngine):
         content["piston"] = {
             "mass": scene.loading.piston_mass,
             "height": start.piston_height,
-            **cover_piston(scene.container, scene.piston_reach, scene.sample.radii),
+            **cover_piston(
+                scene.container, scene.piston_reach, scene.sample.radii, scene.piston_edges
+            ),
         }
         content["window"] = {
             "start": start.kind, "cycles": cycles, "steps_per_cycle": steps,
@@ -123,6 +133,8 @@ def _describe_load(scene: Scene) -> dict[str, Any]:
     }
 
 
+FAR = 1e6
+"""Where an edge that is none lies [m]: the parameters' file takes no infinity."""
 NO_WEIGHT = 1.0
 """Density of walls [kg/m^3]: nothing depends on it, and YADE wants one."""
 
@@ -245,14 +257,24 @@ def cover_side(container: Container, angle: float, height: float) -> FloatArray:
     return np.column_stack([plane, corners[:, 1]])
 
 
-def cover_piston(container: Container, reach: float, grain: Radii) -> dict[str, Any]:
+def cover_piston(
+    container: Container, reach: float, grain: Radii,
+    edges: tuple[float, float, float, float] = WHOLE,
+) -> dict[str, Any]:  # fmt: skip
     """The piston's face: ``triangles``, horizontal corners [m], shape (t, 3, 2), normal down.
 
     A whole piston (``reach`` infinite) is one triangle over the section and somewhat more.  A
     partial one, a disc of radius ``reach`` [m], is a plane for grains whose centres are within
-    ``plane_reach`` [m] of the axis, and triangles for those further out.  ``grain``: radii.
+    ``plane_reach`` [m] of the axis, and triangles for those further out; a block between ``edges``
+    [m] is a plane within ``plane_edges`` [m].  ``grain``: radii.
     """
     margin = PISTON_MARGIN * grain.greatest
+    if edges != WHOLE:
+        corners = np.array(cover_rectangle(container, edges, margin))
+        rim = YADE.rim_width * grain.mean * np.array([1, -1, 1, -1])
+        inside = np.clip(np.array(edges) + rim, -FAR, FAR)
+        triangles = cover_rim(corners[::-1], corners.mean(axis=0))
+        return {"triangles": triangles.tolist(), "plane_edges": inside.tolist()}
     if np.isinf(reach):
         low, high = bound_section(container)
         corner = np.array(low) - margin
@@ -268,14 +290,14 @@ def cover_piston(container: Container, reach: float, grain: Radii) -> dict[str, 
     }
 
 
-def cover_rim(corners: FloatArray) -> FloatArray:
-    """Triangles (n, 3, 2) from the origin to the sides of a convex polygon (n, 2) around it.
+def cover_rim(corners: FloatArray, apex: FloatArray | float = 0.0) -> FloatArray:
+    """Triangles (n, 3, 2) from the ``apex`` to the sides of a convex polygon (n, 2) around it.
 
     YADE pushes a grain on a seam of two triangles from both.  These seams go straight to the
     corners, so that near the rim, where alone grains meet them, there is as little as can be.
     """
     after = np.roll(corners, -1, axis=0)
-    return np.stack([np.zeros_like(corners), corners, after], axis=1)
+    return np.stack([np.zeros_like(corners) + apex, corners, after], axis=1)
 
 
 ENGINE = YadeEngine()

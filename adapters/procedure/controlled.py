@@ -89,8 +89,7 @@ def find_piston_regime(run: Run, control: Control) -> Regime | None:
     sink: what the mean grain settles by does not show it.  None where the piston covers all of the
     section, where no window is known yet, and where it does not sink.
     """
-    assert run.scene.loading is not None
-    if run.scene.loading.area_share == 1 or not control.stretches:
+    if run.scene.loaded_area >= run.scene.container.area or not control.stretches:
         return None
     sunk: tuple[Stretch, ...] = ()
     body = follow_loaded_body(run.folder.outcomes())

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from adapters.bed import FloatArray, State
-from adapters.errors import NotConverged
+from adapters.errors import NotConverged, NotCredible
 from adapters.scene import Scene
 
 
@@ -42,9 +42,8 @@ def relax_target(
     if procedure.relaxation == "none":
         return target, {"method": "none"}
     relaxation = relax(
-        target, before, scene.container.walls(before.piston_height, scene.piston_reach),
-        scene.stiffness, method=procedure.relaxation,
-        walls_after=scene.container.walls(piston_height, scene.piston_reach),
+        target, before, scene.walls(before.piston_height), scene.stiffness,
+        method=procedure.relaxation, walls_after=scene.walls(piston_height),
     )  # fmt: skip
     return relaxation.position, relaxation.record()
 
@@ -57,14 +56,22 @@ def relax_below(
     Where grains have no room under a piston that went down: the bed settles below one that waits.
     """
     position, record = relax_target(scene, before, target, before.piston_height)
-    top = find_top_under(position, before.radius, scene.piston_reach)
+    top = find_top_under(scene, position, before.radius)
     return position, record | {"piston": "on the bed"}, min(top, before.piston_height)
 
 
-def find_top_under(position: FloatArray, radius: FloatArray, reach: float) -> float:
-    """Highest place [m] of grains under a piston of radius ``reach`` [m].
+def find_top_under(scene: Scene, position: FloatArray, radius: FloatArray) -> float:
+    """Highest place [m] of grains under the piston; ``position`` (n, 3), ``radius`` (n,) in metres.
 
-    ``position`` (n, 3) and ``radius`` (n,) in metres.
+    Raises `NotCredible` where none is: a block smaller than the gaps between grains.
     """
-    under = np.hypot(position[:, 0], position[:, 1]) - radius < reach
+    x, y = position[:, 0], position[:, 1]
+    left, right, front, back = scene.piston_edges
+    beyond = np.hypot(x - np.clip(x, left, right), y - np.clip(y, front, back))
+    under = (beyond < radius) & (np.hypot(x, y) - radius < scene.piston_reach)
+    if not under.any():
+        raise NotCredible(
+            "no grain is under the piston", where="loading.footprint",
+            remedy="a wider footprint, or more grains",
+        )  # fmt: skip
     return float((position[:, 2] + radius)[under].max())

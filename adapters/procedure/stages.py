@@ -158,7 +158,7 @@ def prepare(run: Run) -> Bed:
         cost = run.clock.end_lap(done.cpu_s, done.start_up_s)
         _finish(run, folder, Outcome(name, 0, 0, [], cost, notes=notes))
     state = load_state(run.folder.path / name / "state.npz")
-    run.loaded_start = top = find_top_under(state.position, state.radius, scene.piston_reach)
+    run.loaded_start = top = find_top_under(scene, state.position, state.radius)
     restart = run.folder.path / name / "end.restart"
     return Bed(0, EngineStart(restart, state.time_step, 0, top, first=True))
 
@@ -310,7 +310,7 @@ def make_settlement_rows(run: Run, window: Window, healing: int) -> list[dict[st
 def _make_row(run: Run, state: State, kind: str) -> dict[str, Any]:
     preparation = run.outcome("preparation")
     container = run.scene.container
-    walls = container.walls(state.piston_height, run.scene.piston_reach)
+    walls = run.scene.walls(state.piston_height)
     bed = measure_bed(state.position, find_pairs(state.position, state.radius, walls))
     inertia = 0.4 * state.mass * state.radius**2
     return {

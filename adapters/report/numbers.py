@@ -182,8 +182,8 @@ def describe_scene(record: Record) -> str:
         return text + ", prepared and not loaded"
     peak = float(np.max(scene.stress_at(np.linspace(0, 1, 201))))
     text += f", up to {peak / 1e3:.4g} kPa at {1 / scene.loading.period:.4g} Hz"
-    if scene.loading.area_share < 1:
-        text += f" on {100 * scene.loading.area_share:.0f} % of the section"
+    if scene.loaded_area < scene.container.area:
+        text += f" on {100 * scene.loaded_area / scene.container.area:.0f} % of the section"
     return f"{text}, engine {scene.engine.name}"
 
 

@@ -12,6 +12,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from adapters.bed import RadiusDistribution
 from adapters.errors import SceneError
 from adapters.files import read_load_series
@@ -116,8 +118,19 @@ def _check_series(scene: Values) -> Iterator[Problem]:
 
 
 def _check_partial_piston(scene: Values) -> Iterator[Problem]:
-    if scene.need("loading.area_share") < 1 and scene.need("sample.container") == "box":
-        yield Problem("loading.area_share", "a piston on a part of the section needs a cylinder")
+    box = scene.need("sample.container") == "box"
+    if scene.need("loading.area_share") < 1 and box:
+        yield Problem(
+            "loading.area_share", "a disc on a part of the section needs a cylinder; a box takes "
+            "loading.footprint = [length along x, along y]",
+        )  # fmt: skip
+    if scene.has("loading.footprint"):
+        sizes = [scene.need(f"sample.size_{axis}") for axis in "xy"] if box else (0.0, 0.0)
+        if any(np.greater(scene.need("loading.footprint"), sizes)):
+            yield Problem(
+                "loading.footprint", f"does not fit: the box is {sizes[0]:g} m by {sizes[1]:g} m"
+                if box else "a rectangle needs a box; a disc in a cylinder: loading.area_share",
+            )  # fmt: skip
 
 
 def _check_procedure(scene: Values) -> Iterator[Problem]:

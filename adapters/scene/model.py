@@ -95,8 +95,8 @@ def _list_load(scene: Scene) -> Iterator[str]:
         "The piston's weight: gravity does not act on it, its mass is inertia only, and the mean "
         "stress stands for dead load."
     )
-    if scene.loading.area_share < 1:
-        yield "A thick piston: it is a disc, and grains may rise beside it and above it."
+    if scene.loaded_area < scene.container.area:
+        yield "A thick piston: it is a plate, and grains may rise beside it and above it."
 
 
 def _list_jumps(scene: Scene) -> Iterator[str]:

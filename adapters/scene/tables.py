@@ -21,10 +21,12 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from adapters.bed import (
+    WHOLE,
     Container,
     FloatArray,
     Radii,
     RadiusDistribution,
+    Walls,
     contact_law,
     count_sides,
     expect_grains,
@@ -136,6 +138,8 @@ class Loading(Table):
     frequency: Positive | None = None  # cycles a second [Hz] of a sine
     series: str | None = None  # CSV file with one period; `adapters.files.load_series`
     area_share: Share = 1.0  # part of the container's section under the piston
+    footprint: Annotated[tuple[Positive, Positive], Field(strict=False)] | None = None
+    """Lengths along x and y of a rectangle in a box that is loaded instead [m]."""
     piston_mass: Positive  # mass [kg] of the part of the piston inside the scene
 
     @cached_property
@@ -277,7 +281,20 @@ class Scene(Table):
     @property
     def loaded_area(self) -> float:
         """Area under the piston [m^2]; 0 without loading."""
-        return 0.0 if self.loading is None else self.loading.area_share * self.container.area
+        if self.loading is None or self.loading.footprint is None:
+            return 0.0 if self.loading is None else self.loading.area_share * self.container.area
+        return self.loading.footprint[0] * self.loading.footprint[1]
+
+    @property
+    def piston_edges(self) -> tuple[float, float, float, float]:
+        """Ends along x, then along y, of a rectangular piston [m]; infinite where it has none."""
+        if self.loading is None or self.loading.footprint is None:
+            return WHOLE
+        return self.container.place_footprint(self.loading.footprint)
+
+    def walls(self, piston_height: float) -> Walls:
+        """All walls of the bed, the piston at a height [m] among them."""
+        return self.container.walls(piston_height, self.piston_reach, self.piston_edges)
 
     @property
     def piston_reach(self) -> float:

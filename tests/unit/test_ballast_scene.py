@@ -7,8 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
 
+from adapters.bed.container import Container
+from adapters.bed.overlaps import find_pairs
 from adapters.bed.radii import GradedRadii, draw_radii
+from adapters.bed.state import FloatArray
 from adapters.engines.contract import get_engine
 from adapters.errors import SceneError
 from adapters.scene.file import load_scene
@@ -29,12 +35,6 @@ def rain(folder: Path, scene: Scene) -> str:
     place, radius = np.full((1, 3), 0.01), np.full(1, 3e-3)
     get_engine(scene.engine.name).write_preparation(scene, place, radius, 0.05, folder)
     return "".join(path.read_text() for path in sorted(folder.iterdir()) if path.suffix != ".py")
-
-
-def refusal(*overrides: str) -> str:
-    with pytest.raises(SceneError) as caught:
-        coarse(*overrides)
-    return str(caught.value)
 
 
 # --- gradings -----------------------------------------------------------------------------------
@@ -71,22 +71,6 @@ def test_grading_of_a_scene_is_its_radii() -> None:
     assert table.grain_count == 150
 
 
-@pytest.mark.parametrize(
-    ("overrides", "words"),
-    [
-        (['sample.grading="EN 13450 31.5/63"'], "did you mean EN 13450 31.5/50"),
-        (["sample.grading=[[20, 0], [40, 90]]"], "percentages that grow from 0 to 100"),
-        (["sample.grading=7"], r"\[\[sieve in mm, passing in %\]"),
-        (["sample.grading_scale=0.5"], "no sample.grading to scale"),
-        (['sample.grading="AREMA 4"'], "sample.grading: radii up to 0.0254 m do not fit"),
-        (["sample.radius=0.5", 'sample.grading="AREMA 4"', "sample.grain_radius.mean=1e-3"],
-         "sample.grain_radius: give this or grading, not both"),
-    ],
-)  # fmt: skip
-def test_gradings_that_are_none_are_refused(overrides: list[str], words: str) -> None:
-    assert re.search(words, refusal(*overrides))
-
-
 def test_few_grains_leave_the_limits_and_metres_are_doubted() -> None:
     """Three grains cannot have four sieves' shares; sieves in metres are a bed of dust."""
     with pytest.raises(SceneError, match=r"3 grains .* the standard's limits are"):
@@ -117,6 +101,41 @@ def test_rolling_is_in_the_deck_where_it_is_named(engine: str, tmp_path: Path) -
     assert not any("roll" in line or "contact_model" in line for line in mirrors)
 
 
-def test_rolling_without_friction_is_refused() -> None:
-    said = refusal("material.grain.friction=0", "material.wall.rolling_friction=0.1")
-    assert "material.wall.rolling_friction: grains without friction slip" in said
+# --- blocks -------------------------------------------------------------------------------------
+
+
+@given(hnp.arrays(float, (5, 3), elements=st.floats(0.0, 0.06)), st.booleans())
+def test_grains_meet_the_nearest_point_of_a_block(position: FloatArray, mirror: bool) -> None:
+    """Overlaps are those with the nearest of 10^4 points of the plate, to half their spacing."""
+    container = Container("box", ("x",) * mirror, size_x=0.06, size_y=0.05)
+    edges = container.place_footprint((0.04, 0.02))
+    walls, radius = container.walls(0.03, piston_edges=edges), np.full(5, 0.1)
+    rows = find_pairs(position, radius, walls)
+    x, y = np.meshgrid(np.linspace(max(edges[0], 0.0), edges[1], 101), np.linspace(*edges[2:], 101))
+    plate = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, 0.03)])
+    for grain in range(5):
+        row = (rows.first == grain) & (rows.second == -len(walls.plane_name))
+        nearest = np.linalg.norm(plate - position[grain], axis=1).min()
+        assert 0.1 - rows.overlap[row] == pytest.approx(nearest, abs=1e-3)
+
+
+# --- what makes no sense ------------------------------------------------------------------------
+
+REFUSED = [
+    ("ballast", ['sample.grading="EN 13450 31.5/63"'], "did you mean EN 13450 31.5/50"),
+    ("ballast", ["sample.grading=[[20, 0], [40, 90]]"], "percentages that grow from 0 to 100"),
+    ("ballast", ["sample.grading=7"], "[[sieve in mm, passing in %], ...]"),
+    ("karrech", ["sample.grading_scale=0.5"], "no sample.grading to scale"),
+    ("karrech-coarse", ['sample.grading="AREMA 4"'], "radii up to 0.0254 m do not fit"),
+    ("ballast", ["sample.grain_radius.mean=1e-3"], "give this or grading, not both"),
+    ("ballast", ["material.grain.friction=0"], "grain.rolling_friction: grains without friction"),
+    ("karrech", ["loading.footprint=[0.01, 0.01]"], "footprint: a rectangle needs a box"),
+    ("ballast", ["loading.footprint=[0.31, 0.01]"], "does not fit: the box is 0.3 m by 0.28 m"),
+    ("ballast", ["loading.area_share=0.5"], "a box takes loading.footprint"),
+]
+
+
+@pytest.mark.parametrize(("scene", "overrides", "words"), REFUSED)
+def test_senseless_scenes_are_refused(scene: str, overrides: list[str], words: str) -> None:
+    with pytest.raises(SceneError, match=re.escape(words)):
+        load_scene(find_scene_file(scene), overrides)
