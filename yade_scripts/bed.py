@@ -266,13 +266,15 @@ def renew_forces(forces=()):
 
 
 def make_load_engine(load, piston):
-    """What the load adds to its mean force, in C++; cycles start at multiples of the period."""
+    """What the load adds to its mean force, in C++; cycles start at multiples of the period, or
+    now: a stage of another frequency began at no multiple of its own."""
     if load["waveform"] == "sine":
+        phase = -2 * pi * load["frequency"] * O.time if load.get("begins_now") else 0.0
         return wrapper.HarmonicForceEngine(
             ids=[piston.clump],
             A=(0, 0, load["amplitude"] / 2),
             f=(0, 0, load["frequency"]),
-            fi=(0, 0, pi / 2),
+            fi=(0, 0, pi / 2 + phase),
         )
     return wrapper.InterpolatingDirectedForceEngine(
         ids=[piston.clump],

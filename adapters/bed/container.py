@@ -114,12 +114,11 @@ class Container:
     def place_footprint(self, size: tuple[float, float]) -> tuple[float, float, float, float]:
         """Ends along x and y [m] of a rectangle of ``size`` [m] in a box: from a mirror plane on,
         which it crosses, or in the middle."""
-        ends: list[float] = []
-        for axis, length, width in zip("xy", size, (self.size_x, self.size_y), strict=True):
-            ends += [-np.inf, length] if axis in self.symmetry else [
-                (width - length) / 2, (width + length) / 2
-            ]  # fmt: skip
-        return ends[0], ends[1], ends[2], ends[3]
+        (left, right), (front, back) = (
+            (-np.inf, length) if axis in self.symmetry else (0.5 * (w - length), 0.5 * (w + length))
+            for axis, length, w in zip("xy", size, (self.size_x, self.size_y), strict=True)
+        )
+        return left, right, front, back
 
     def side_angles(self) -> FloatArray:
         """Direction of each side's outward normal from the x axis [rad]; none without ``sides``."""

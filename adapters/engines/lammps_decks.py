@@ -49,9 +49,8 @@ def format_contact(
 
 def format_rolling(scene: Scene, friction: float | None) -> str:
     """Words of a spring and a slider that resist rolling: at most mu_r R* F_n; "" without."""
-    if not friction:
-        return ""
-    return f" rolling sds {find_rolling_stiffness(scene):.17g} 0.0 {friction:.17g}"
+    spring = find_rolling_stiffness(scene)
+    return f" rolling sds {spring:.17g} 0.0 {friction:.17g}" if friction else ""
 
 
 def format_wall_contact(scene: Scene) -> str:

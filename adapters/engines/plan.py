@@ -94,13 +94,12 @@ def has_rolling(scene: Scene) -> bool:
 def find_rolling_stiffness(scene: Scene) -> float:
     """Spring of rolling for engines where it is constant [N/m]; times R*^2 the torque a radian.
 
-    The tangential one, as in Iwashita and Oda (1998), of two mean grains that carry the peak of the
-    load, or the bed's weight, on the square (2 r)^2 that each fills.
+    The tangential one, as in Iwashita and Oda (1998), of two mean grains that carry the bed's
+    weight on the square (2 r)^2 that each fills.
     """
     grain, radii = scene.material.grain, scene.sample.radii
-    mass = scene.grain_count * radii.volume_mean * grain.density
-    stress = float(scene.stress_at(np.linspace(0, 1, 1001)).max())
-    force = max(stress, mass * GRAVITY / scene.container.area) * (2 * radii.mean) ** 2
+    weight = GRAVITY * scene.grain_count * radii.volume_mean * grain.density
+    force = weight / scene.container.area * (2 * radii.mean) ** 2
     overlap = contact_law.find_overlap_under_force(force, scene.stiffness.grain, radii.mean / 2)
     shear = contact_law.combine_shear_moduli(*2 * (grain.young, grain.poisson))
     return float(contact_law.find_tangential_stiffness(overlap, shear, radii.mean / 2))

@@ -125,7 +125,8 @@ def _describe_load(scene: Scene) -> dict[str, Any]:
         time = samples.time - samples.time[0]
         load = {"waveform": "series", "mean_force": 0.0}
         return load | {"time": time.tolist(), "force": force.tolist()}
-    return {
+    staged = {} if scene.loading.stage is None else {"begins_now": True}
+    return staged | {
         "waveform": "sine",
         "mean_force": scene.loading.mean * scene.loaded_area,  # type: ignore[operator]
         "amplitude": scene.loading.amplitude * scene.loaded_area,  # type: ignore[operator]
@@ -181,8 +182,12 @@ def gather_shared_parameters(scene: Scene, height: float) -> dict[str, Any]:
         materials["mirror"] = (MIRROR_YOUNG, material.grain.poisson, NO_WEIGHT)
     names = ("young", "poisson", "density")
     radius = np.array([scene.sample.radii.greatest])
-    rolling = {"rolling": describe_rolling(scene)} if has_rolling(scene) else {}
-    return rolling | {
+    rolling = {
+        "grain": material.grain.rolling_friction or 0.0, "mirror": 0.0,
+        "wall": material.wall.rolling_friction or 0.0, "radius": scene.sample.radii.mean,
+        "spring": find_rolling_stiffness(scene),
+    }  # fmt: skip
+    return ({"rolling": rolling} if has_rolling(scene) else {}) | {
         "grain_count": scene.grain_count,
         "time_step": scene.time_step,
         "gravity": GRAVITY,
@@ -193,15 +198,6 @@ def gather_shared_parameters(scene: Scene, height: float) -> dict[str, Any]:
         "box": np.column_stack(bound_box(container, radius, height)).tolist(),
         "walls": list_walls(container, height),
     }
-
-
-def describe_rolling(scene: Scene) -> dict[str, float]:
-    """Coefficients of rolling friction [-], the spring of rolling [N/m], the mean radius [m]."""
-    grain, wall = scene.material.grain, scene.material.wall
-    return {
-        "grain": grain.rolling_friction or 0.0, "wall": wall.rolling_friction or 0.0,
-        "mirror": 0.0, "spring": find_rolling_stiffness(scene), "radius": scene.sample.radii.mean,
-    }  # fmt: skip
 
 
 def _list_pairs(scene: Scene) -> list[dict[str, float | str]]:

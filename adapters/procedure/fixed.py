@@ -73,7 +73,7 @@ def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
                     gains = estimate_gains(run, bed, h) if by_history else None
                     share, gain = 1.0, gains.mean_grain if gains else 0.0
                     if gains:
-                        room = find_known_room(run.folder.outcomes(), bed.cycle)
+                        room = find_known_room(run.folder.outcomes(), bed.cycle, run.first_cycle)
                         share = SHARES[attempt - 1] * (min(1.0, room / gain) if gain else 1.0)
                     new = run.folder.outcome(name) is None
                     moved = stages.jump(run, bed, h, attempt, gains, share)
@@ -122,7 +122,7 @@ def compute_on(run: Run, bed: Bed) -> Bed:
     return bed
 
 
-def find_known_room(outcomes: Sequence[Outcome], end: int) -> float:
+def find_known_room(outcomes: Sequence[Outcome], end: int, begin: int = 0) -> float:
     """What the next jump by history may try to move the mean grain by [m]; inf: all that is asked.
 
     Debts grow behind a jump without room, and shares of them with them: a bed that settles by 30 um
@@ -131,7 +131,8 @@ def find_known_room(outcomes: Sequence[Outcome], end: int) -> float:
     """
     room = np.inf
     for one in outcomes:
-        if one.stage != "jump" or one.last_cycle > end or not one.notes.get("asked"):
+        known = begin <= one.first_cycle and one.last_cycle <= end
+        if one.stage != "jump" or not known or not one.notes.get("asked"):
             continue
         tried, got = min(room, one.notes["asked"]), one.notes["gain"]
         if one.notes["attempt"] == 1:

@@ -34,7 +34,8 @@ def estimate_sinking(run: Run, bed: Bed, h: int) -> float:
     """Settlement of the loaded body in a jump of ``h`` cycles [m]."""
     body = follow_loaded_body(run.folder.outcomes())
     sinking = estimate_gain(run, bed, h, body, LOADED_BODY)
-    return min(sinking, bound_burst(list_jumps(body, bed.cycle), bed.cycle, h))
+    jumps = [one for one in list_jumps(body, bed.cycle) if one.cycles[0] >= run.first_cycle]
+    return min(sinking, bound_burst(jumps, bed.cycle, h))
 
 
 def estimate_gain(

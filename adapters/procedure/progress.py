@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 from adapters.engines import get_engine, plan_settling
 from adapters.jumps import JUMP, Settings
-from adapters.scene import Procedure, Scene
+from adapters.scene import Procedure, Scene, list_stages
 
 SHOWN = 6
 """Jumps that are listed one by one."""
@@ -63,9 +63,10 @@ class Progress:
             print(text, file=self.stream, flush=True)
 
 
-def plan_jumps(p: Procedure) -> list[tuple[int, int]]:
-    """Cycles before and after each jump of given length, where none fails or has to wait."""
-    cycle = p.k_i + p.window_cycles
+def plan_jumps(p: Procedure, begin: int = 0) -> list[tuple[int, int]]:
+    """Cycles before and after each jump of given length, where none fails or has to wait, in the
+    stage of a load from cycle ``begin`` on."""
+    cycle = begin + p.k_i + p.window_cycles
     jumps: list[tuple[int, int]] = []
     while p.h and len(jumps) < p.total_cycles:
         longest = p.total_cycles - cycle - p.healing_cycles - p.window_cycles
@@ -102,7 +103,8 @@ def describe_plan(scene: Scene, height: float) -> Iterator[str]:
     p = scene.procedure
     to_compute = total = 0 if p is None else p.total_cycles
     if p is not None:
-        jumps = plan_jumps(p)
+        stages = [(begin, stage.procedure) for begin, stage in list_stages(scene)]
+        jumps = [jump for begin, own in stages if own for jump in plan_jumps(own, begin)]
         to_compute -= sum(end - start for start, end in jumps)
         listed = ", ".join(f"{start} to {end}" for start, end in jumps[:SHOWN])
         more = f" and {len(jumps) - SHOWN} more" if len(jumps) > SHOWN else ""

@@ -23,7 +23,7 @@ from adapters.procedure.fixed import settle_fixed
 from adapters.procedure.progress import Progress, describe_plan, warn_without_jumps
 from adapters.procedure.record import MEMBERS, read_members, refuse_other_member
 from adapters.procedure.stages import Bed, Clock, Run, Variant
-from adapters.scene import Scene, load_scene
+from adapters.scene import Scene, list_stages, load_scene
 from trackbed.memory import refuse_more_memory
 from trackbed.run_files import list_differences, record_provenance, refuse_writing, write_whole
 
@@ -39,13 +39,18 @@ what anyone measures of a grain of millimetres, far above the round-off of its p
 
 def settle(run: Run) -> Bed:
     """The flow chart, Fig. 10: rain, k_i cycles, then k cycles and a jump of h until the end."""
-    p = run.procedure
     bed = stages.prepare(run)
+    (_, run.scene), *later = list_stages(run.scene)
+    p = run.procedure
     bed = stages.compute(run, bed, p.k_i)
     bed = replace(bed, start=replace(bed.start, perturbation=run.variant.perturbation))
     if p.tolerance is not None and run.variant.jumps:
         return settle_controlled(run, bed)
-    return settle_fixed(run, bed)
+    bed = settle_fixed(run, bed)
+    for begin, scene in later:
+        run.first_cycle, run.scene = begin, scene
+        bed = settle_fixed(run, bed)
+    return bed
 
 
 def run_scene(
@@ -119,10 +124,12 @@ def extend(folder: RunFolder, manifest: dict[str, Any], scene: Scene, cycles: in
             remedy="extend the run around it: trackbed resume RUN --cycles N",
         )  # fmt: skip
     p = scene.procedure
-    if p is None or cycles < p.total_cycles:
+    staged = len(list_stages(scene)) > 1
+    if p is None or cycles < p.total_cycles or staged:
         have = f"this run is of {p.total_cycles} cycles" if p else "this run has no load cycles"
+        why = "has stages of given lengths" if staged else f"can not be shortened to {cycles}"
         raise UsageError(
-            f"{have}, and can not be shortened to {cycles}" if p else have,
+            f"{have}, and {why}" if p else have,
             where=str(folder.path), remedy="give more cycles, or another folder",
         )  # fmt: skip
     more = [f"procedure.total_cycles={cycles}", f"procedure.k_i={p.k_i}"]
@@ -204,8 +211,9 @@ def open_member(folder: RunFolder, scene: Scene, number: int) -> Iterator[RunFol
         own = whole | {"members": 1, "member": number}
         write_whole(manifest, json.dumps(own, indent=1) + "\n")
         with note_stop(inner):
-            assert scene.procedure is not None
-            inner.share_start(folder, scene.procedure.k_i)
+            first = list_stages(scene)[0][1].procedure
+            assert first is not None
+            inner.share_start(folder, first.k_i)
             yield inner
 
 
@@ -245,7 +253,7 @@ def count_shared_cycles(folder: RunFolder, scene: Scene) -> int:
 
     The first window, and where jumps waited for the piston all windows before the first jump.
     """
-    p = scene.procedure
+    p = list_stages(scene)[0][1].procedure
     assert p is not None
     first = p.k_i + p.window_cycles
     if p.seating == "any":

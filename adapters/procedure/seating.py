@@ -110,20 +110,23 @@ def find_last_hung_cycle(run: Run, bed: Bed) -> int:
 
     A run that is resumed decides again as it did, whatever its folder holds beyond that cycle.
     """
-    hung = find_hung_cycles(run.scene, run.folder.outcomes())
+    outcomes = [one for one in run.folder.outcomes() if one.first_cycle >= run.first_cycle]
+    hung = find_hung_cycles(run.scene, outcomes)
     return int(hung[hung <= bed.cycle].max(initial=0))
 
 
 def find_count_start(run: Run, bed: Bed) -> int:
-    """Cycle from which the first k_i count: 0 unless the run waits and its piston hung."""
-    return find_last_hung_cycle(run, bed) if run.procedure.seating == "waits" else 0
+    """Cycle from which the first k_i count: where this load began, or its piston last hung."""
+    hung = find_last_hung_cycle(run, bed) if run.procedure.seating == "waits" else 0
+    return max(run.first_cycle, hung)
 
 
 def seat_piston(run: Run, bed: Bed, cycles: int) -> Bed:
     """Windows until the bed has carried its piston for so many ``cycles``, where the run waits."""
     p = run.procedure
     while (hung := find_count_start(run, bed)) and bed.cycle < min(hung + cycles, p.total_cycles):
-        run.progress.print_line(f"the piston hung on few grains until cycle {hung}: computing on")
+        why = "the piston hung on few grains until" if hung > run.first_cycle else "new load from"
+        run.progress.print_line(f"{why} cycle {hung}: computing on")
         bed = stages.compute(run, bed, min(p.window_cycles, p.total_cycles - bed.cycle))
     return bed
 

@@ -101,6 +101,7 @@ class Run:
     cycle_by_cycle: bool = False
     """Where no jump is allowed: True computes every cycle, False refuses."""
     clock: Clock = field(default_factory=Clock)
+    first_cycle: int = 0  # cycles done before the stage of the load that ``scene`` has
     computed_here: int = 0
     loaded_start: float = np.nan
     """Height of the loaded body before the first cycle [m]."""

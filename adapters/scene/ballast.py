@@ -1,4 +1,4 @@
-"""What scenes for ballast name: a grading of the grains."""
+"""What scenes for ballast name: a grading of the grains, stages of the load."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pydantic import Field, PlainValidator
 
 from adapters.bed import GradedRadii
 from adapters.errors import SceneError
-from trackbed.scene_files import GRADINGS, Grading, Positive, suggest_word
+from trackbed.scene_files import GRADINGS, Grading, NonNegative, Positive, Table, suggest_word
 
 Sieves = tuple[tuple[float, float], ...]
 """Side of each sieve's hole [mm], and mass that passes it [%]."""
@@ -22,6 +22,8 @@ def make_grading(key: str | Sieves) -> Grading:
             raise ValueError(f"unknown grading {key!r}{suggest_word(key, GRADINGS)}")
         return GRADINGS[key]
     sieves, percent = np.array(key, float).reshape(-1, 2).T
+    if sieves.max(initial=0.0) < 0.1:
+        raise ValueError(f"sieves are given in mm, and the coarsest would be {sieves.max():g} mm")
     return Grading(sieves / 1e3, percent / 100)
 
 
@@ -40,7 +42,15 @@ def read_grading(key: Any) -> str | Sieves:
 
 
 GradingKey = Annotated[str | Sieves, PlainValidator(read_grading)]
-GradingScale = Annotated[Positive, Field(le=10)]
+
+
+class Stage(Table):
+    """A sine of another level or frequency that goes on where the load before it ends."""
+
+    from_cycle: Annotated[int, Field(ge=1)]  # cycles done when it begins
+    amplitude: Positive  # stress from trough to peak [Pa]
+    mean: NonNegative  # mean stress [Pa]
+    frequency: Positive  # cycles a second [Hz]
 
 
 def make_radii(key: str | Sieves, scale: float | None) -> GradedRadii:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -120,17 +121,26 @@ def _check_series(scene: Values) -> Iterator[Problem]:
 def _check_partial_piston(scene: Values) -> Iterator[Problem]:
     box = scene.need("sample.container") == "box"
     if scene.need("loading.area_share") < 1 and box:
-        yield Problem(
-            "loading.area_share", "a disc on a part of the section needs a cylinder; a box takes "
-            "loading.footprint = [length along x, along y]",
-        )  # fmt: skip
-    if scene.has("loading.footprint"):
-        sizes = [scene.need(f"sample.size_{axis}") for axis in "xy"] if box else (0.0, 0.0)
-        if any(np.greater(scene.need("loading.footprint"), sizes)):
-            yield Problem(
-                "loading.footprint", f"does not fit: the box is {sizes[0]:g} m by {sizes[1]:g} m"
-                if box else "a rectangle needs a box; a disc in a cylinder: loading.area_share",
-            )  # fmt: skip
+        said = "a disc on a part of the section needs a cylinder; a box takes loading.footprint"
+        yield Problem("loading.area_share", said)
+    lengths = scene.get("loading.footprint")
+    sizes = [scene.need(f"sample.size_{axis}") for axis in "xy"] if box else [0.0, 0.0]
+    if lengths and np.greater(lengths, sizes).any():
+        have = f"this one is {sizes[0]:g} m by {sizes[1]:g} m" if box else "not a cylinder"
+        yield Problem("loading.footprint", f"needs a box that holds it, {have}")
+
+
+def _check_stages(scene: Values) -> Iterator[Problem]:
+    key, stages = "loading.stage", scene.need("loading.stage")
+    begins = [0, *(one["from_cycle"] for one in stages), scene.need("procedure.total_cycles")]
+    if any(after <= before for before, after in pairwise(begins)):
+        yield Problem(key, f"from_cycle must grow, to below total_cycles = {begins[-1]}")
+    if scene.need("loading.waveform") != "sine":
+        yield Problem(key, "follows a sine, not a series")
+    if scene.has(TOLERANCE_KEY) or scene.get("procedure.settlement") != "history":
+        yield Problem(key, 'jumps by history alone know when a load began: name = "growing"')
+    elif scene.get("procedure.name") is None and scene.need("procedure.k_i") >= begins[1]:
+        yield Problem(key, f"from_cycle must be above k_i = {scene.need('procedure.k_i')}")
 
 
 def _check_procedure(scene: Values) -> Iterator[Problem]:
@@ -221,8 +231,8 @@ def _check_relaxation(scene: Values) -> Iterator[Problem]:
 CHECKS: tuple[Check, ...] = (
     _check_alternatives, *(partial(_check_owned_keys, *row) for row in OWNED), _check_symmetry,
     _check_grain_radius, _check_grading_scale, _check_rolling, _check_series, _check_partial_piston,
-    _check_procedure, _check_jumps, _check_settlement, _check_seating, _check_launcher,
-    _check_engine, _check_law, _check_move, _check_relaxation, *mechanics.CHECKS,
+    _check_stages, _check_procedure, _check_jumps, _check_settlement, _check_seating,
+    _check_launcher, _check_engine, _check_law, _check_move, _check_relaxation, *mechanics.CHECKS,
 )  # fmt: skip
 
 

@@ -52,8 +52,15 @@ def _check_room(scene: Values) -> Iterator[Problem]:
         )
 
 
+def _list_levels(scene: Values) -> list[tuple[float, float]]:
+    """Mean and amplitude of each stage of a sine [Pa]."""
+    first = scene.need("loading.mean"), scene.need("loading.amplitude")
+    stages = scene.get("loading.stage") or ()
+    return [first, *((stage["mean"], stage["amplitude"]) for stage in stages)]
+
+
 def _check_tension(scene: Values) -> Iterator[Problem]:
-    trough = scene.need("loading.mean") - scene.need("loading.amplitude") / 2
+    trough = min(mean - amplitude / 2 for mean, amplitude in _list_levels(scene))
     if trough < 0:
         yield Problem(
             "loading.mean",
@@ -99,7 +106,7 @@ def _find_overlap_share(scene: Values) -> tuple[str, float, float]:
     """
     if scene.need("loading.waveform") == "sine":
         key = "loading.amplitude"
-        stress = scene.need("loading.mean") + scene.need(key) / 2
+        stress = max(mean + amplitude / 2 for mean, amplitude in _list_levels(scene))
     else:
         key = "loading.series"
         try:
@@ -229,16 +236,7 @@ def _warn_of_implausible_size(
         yield Problem(key, said.removeprefix(f"{key}: "))
 
 
-def _warn_of_sieves_in_metres(scene: Values) -> Iterator[Problem]:
-    if scene.has("sample.grading") and (size := 2 * find_radii(scene).greatest) < 1e-3:
-        yield Problem(
-            "sample.grading", f"the greatest grain is {1e3 * size:g} mm: sieves are given in mm"
-        )
-
-
-IMPLAUSIBLE: tuple[Check, ...] = (
-    *(partial(_warn_of_implausible_size, *row) for row in SIZES), _warn_of_sieves_in_metres,
-)  # fmt: skip
+IMPLAUSIBLE = tuple(partial(_warn_of_implausible_size, *row) for row in SIZES)
 DOUBTS: tuple[Check, ...] = (
     *IMPLAUSIBLE,
     _warn_of_long_step, _warn_of_narrow_bed, _warn_of_few_steps, _warn_of_size_ratio,

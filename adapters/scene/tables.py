@@ -34,7 +34,7 @@ from adapters.bed import (
 from adapters.files import LoadSeries, read_load_series
 from adapters.laws.fit import FIRST_WINDOW
 from adapters.moves import DEFAULT as MOVE_DEFAULT
-from adapters.scene.ballast import GradingKey, GradingScale, make_radii
+from adapters.scene.ballast import GradingKey, Stage, make_radii
 from adapters.scene.checks import find_problems, find_warnings
 from adapters.scene.mechanics import COUNT_GREATEST
 from trackbed.scene_files import NonNegative, Positive, Table
@@ -88,7 +88,7 @@ class Sample(Table):
     grain_radius: GrainRadius | None = None
     grading: GradingKey | None = None
     """Grading by a standard's name, or sieves [mm] with the mass that passes [%], instead."""
-    grading_scale: GradingScale | None = None  # factor on all sieves of ``grading`` [-]; 1
+    grading_scale: Positive | None = None  # factor on all sieves of ``grading`` [-]; 1
 
     @property
     def radii(self) -> Radii:
@@ -140,6 +140,8 @@ class Loading(Table):
     area_share: Share = 1.0  # part of the container's section under the piston
     footprint: Annotated[tuple[Positive, Positive], Field(strict=False)] | None = None
     """Lengths along x and y of a rectangle in a box that is loaded instead [m]."""
+    stage: Annotated[tuple[Stage, ...], Field(strict=False, min_length=1)] | None = None
+    """Loads that follow this one, in the order of their first cycles."""
     piston_mass: Positive  # mass [kg] of the part of the piston inside the scene
 
     @cached_property
@@ -333,7 +335,8 @@ class Scene(Table):
         """Time step [s]: the longest the engine table allows that divides the load's period.
 
         With a load series it divides the interval between two samples.  A cycle has a multiple
-        of `TRACK_SAMPLES` steps, so that the piston's record holds its end.
+        of `TRACK_SAMPLES` steps, so that the piston's record holds its end, and in each stage of a
+        load as many: cycles begin at multiples of them.
         """
         if self.engine.time_step is not None:
             longest = self.engine.time_step
@@ -343,7 +346,9 @@ class Scene(Table):
         if self.loading is None:
             return longest
         interval = self.loading.period / self.samples_per_cycle
-        return interval / ceil(interval / longest * (1 - 1e-12))
+        periods = [1 / stage.frequency for stage in self.loading.stage or ()]
+        slowest = max([interval, *(period / self.samples_per_cycle for period in periods)])
+        return interval / ceil(slowest / longest * (1 - 1e-12))
 
     @property
     def steps_per_cycle(self) -> int:

@@ -12,8 +12,9 @@ from adapters.bed.overlaps import find_pairs
 from adapters.engines.contract import get_engine
 from adapters.procedure.run import run_scene
 from adapters.scene.file import load_scene
-from tests.engine_sample import QUIET, REAL, window_of
-from trackbed.scenes import find_scene_file
+from adapters.scene.stages import list_stages
+from tests.engine_sample import QUIET, REAL, TINY, window_of
+from trackbed.scenes import find_scene_file, read_template
 
 SMALL = (
     "sample.fill_height=0.06", "loading.footprint=[0.08, 0.07]", "material.grain.young=1e9",
@@ -46,3 +47,23 @@ def test_block_pushes_what_lies_under_it(name: str, tmp_path: Path) -> None:
     found = np.einsum("na,na->n", force, normal)
     assert found == pytest.approx(expected, abs=0.01 * expected.max())
     assert 0 < len(grain) < len(state.radius)
+
+
+@pytest.mark.parametrize("name", REAL)
+def test_stages_follow_one_another(name: str, tmp_path: Path) -> None:
+    """From cycle 2 on the load that presses the piston has the second stage's level, and the time
+    of a cycle its period: sine and frequency of every sample, to the step in which an engine looks.
+    """
+    text = read_template("karrech-coarse")
+    stage = "[[loading.stage]]\nfrom_cycle = 2\namplitude = 9e3\nmean = 8e3\nfrequency = 30.0\n"
+    (tmp_path / "scene.toml").write_text(f"{text}\n{stage}")
+    overrides = (f'engine.name="{name}"', *TINY[:4], "procedure.total_cycles=4")
+    run_scene(tmp_path / "scene.toml", tmp_path / "run", overrides=overrides, progress=QUIET)
+    for begin, scene in list_stages(load_scene(tmp_path / "scene.toml", overrides)):
+        tracks = [window_of(path, ".").piston for path in sorted((tmp_path / "run").glob("window*"))
+                  if begin <= int(path.name[-6:]) < begin + 2]  # fmt: skip
+        step, force = (np.concatenate([getattr(one, key) for one in tracks]) for key in
+                       ("time_step", "target_force"))  # fmt: skip
+        expected = scene.stress_at(step / scene.steps_per_cycle) * scene.loaded_area
+        assert force == pytest.approx(expected, abs=0.01 * expected.max())
+        assert scene.time_step * scene.steps_per_cycle == pytest.approx(1 / (50, 30)[begin // 2])

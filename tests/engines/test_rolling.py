@@ -12,26 +12,19 @@ import pytest
 from adapters.bed import contact_law as law
 from adapters.bed.state import FloatArray
 from tests.driven_contacts import find_grain_mass
-from validation.bench import few_grains, few_grains_lammps, few_grains_yade
+from tests.engines.test_contact_law_engine import every_engine
+from validation.bench import few_grains_lammps
 from validation.bench.few_grains import RADIUS, TrackRun, load_table_1
 
-RUNS = {
-    "liggghts": few_grains.run_grains,
-    "lammps": few_grains_lammps.run_grains,
-    "yade": few_grains_yade.run_grains,
-}
-every_engine = pytest.mark.parametrize(
-    ("name", "run"), [pytest.param(*one, marks=pytest.mark.engine(one[0])) for one in RUNS.items()]
-)
 MU, STEP, SAMPLE = 0.05, 2e-6, 1500
 
 
 def track_sphere(
-    name: str, run: TrackRun, *settings: str, speed: float = 0.0, spin: float = 1.0,
+    run: TrackRun, *settings: str, speed: float = 0.0, spin: float = 1.0,
     below: bool = False,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:  # fmt: skip
     """Time [s], speed over R and spin [rad/s] of a sphere at rest on the floor, or on another."""
-    scene = load_table_1(f'engine.name="{name}"', "material.grain.young=1e9", *settings)
+    scene = load_table_1("material.grain.young=1e9", *settings)
     modulus, radius = scene.stiffness.wall, RADIUS
     if below:
         modulus, radius = scene.stiffness.grain, RADIUS / 2
@@ -41,7 +34,7 @@ def track_sphere(
     velocity = np.array([[speed, 0.0, 0.0], [0.0, 0.0, 0.0]])[: 1 + below]
     motion = ["group held id 2"] * below
     motion += ["fix fall grain_1 gravity 1.0 vector 0.0 0.0 -1.0"]
-    axes = f"omega 0.0 {spin} 0.0" if name == "lammps" else f"omegay {spin}"
+    axes = f"omega 0.0 {spin} 0.0" if run is few_grains_lammps.run_grains else f"omegay {spin}"
     motion += [f"set group grain_1 {axes}", "fix motion grain_1 nve/sphere", f"run {10 * SAMPLE}"]
     track = run(scene, place, velocity, motion, time_step=STEP, every=SAMPLE)
     for contacts, positions in zip(track.contacts, track.position, strict=True):
@@ -52,13 +45,13 @@ def track_sphere(
 
 @every_engine
 @pytest.mark.parametrize("below", [False, True])
-def test_spinning_sphere_comes_to_rest(name: str, run: TrackRun, below: bool) -> None:
+def test_spinning_sphere_comes_to_rest(run: TrackRun, below: bool) -> None:
     """Without friction omega falls by 5 mu_r g/(2R) a second, on another sphere by half of that,
     and is at rest behind omega_0 over this: it turns back by what the spring held, 5e-3 omega_0.
     """
     floor, grain = (0.9 * MU, MU) if below else (MU, 0.9 * MU)
     time, _, spin = track_sphere(
-        name, run, "material.wall.friction=0", "material.grain.friction=1e-9",
+        run, "material.wall.friction=0", "material.grain.friction=1e-9",
         f"material.wall.rolling_friction={floor}", f"material.grain.rolling_friction={grain}",
         below=below,
     )  # fmt: skip
@@ -71,19 +64,19 @@ def test_spinning_sphere_comes_to_rest(name: str, run: TrackRun, below: bool) ->
 
 
 @every_engine
-def test_rolling_sphere_slows_by_two_sevenths(name: str, run: TrackRun) -> None:
+def test_rolling_sphere_slows_by_two_sevenths(run: TrackRun) -> None:
     """Rolling on, with friction, it loses 2/7 of that: d omega/dt = 5 mu_r g/(7 R)."""
     settings = (
         f"material.wall.rolling_friction={MU}", f"material.grain.rolling_friction={2 * MU}"
     )  # fmt: skip
-    time, speed, spin = track_sphere(name, run, *settings, speed=RADIUS)
+    time, speed, spin = track_sphere(run, *settings, speed=RADIUS)
     assert np.diff(spin)[1:] / time[1] == pytest.approx(-5 * MU / (7 * RADIUS), rel=1e-3)
     assert speed[1:] == pytest.approx(spin[1:], rel=1e-3)
 
 
 @every_engine
-def test_slipping_sphere_rolls_at_five_sevenths(name: str, run: TrackRun) -> None:
+def test_slipping_sphere_rolls_at_five_sevenths(run: TrackRun) -> None:
     """u = 5 u_0/7 once it rolls, without resistance to rolling; slipping ends in 2 u_0/(7 mu g)."""
-    _, speed, spin = track_sphere(name, run, speed=0.01, spin=0.0)
+    _, speed, spin = track_sphere(run, speed=0.01, spin=0.0)
     assert speed[-1] * RADIUS == pytest.approx(5 / 7 * 0.01, rel=2e-3)
     assert spin[-1] == pytest.approx(speed[-1], rel=2e-3)

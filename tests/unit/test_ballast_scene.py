@@ -15,12 +15,17 @@ from adapters.bed.container import Container
 from adapters.bed.overlaps import find_pairs
 from adapters.bed.radii import GradedRadii, draw_radii
 from adapters.bed.state import FloatArray
+from adapters.engines import fake as engine_fake
 from adapters.engines.contract import get_engine
+from adapters.engines.fake import SETTLEMENT, FakeBed
 from adapters.errors import SceneError
+from adapters.files.run_folder import RunFolder
+from adapters.procedure.run import run_scene
 from adapters.scene.file import load_scene
 from adapters.scene.tables import Scene
+from tests.small_bed import read_rows
 from trackbed.scene_files.grading import GRADINGS, measure_passing
-from trackbed.scenes import find_scene_file
+from trackbed.scenes import find_scene_file, read_template
 
 ENGINES = ("liggghts", "lammps", "yade")
 
@@ -71,12 +76,10 @@ def test_grading_of_a_scene_is_its_radii() -> None:
     assert table.grain_count == 150
 
 
-def test_few_grains_leave_the_limits_and_metres_are_doubted() -> None:
-    """Three grains cannot have four sieves' shares; sieves in metres are a bed of dust."""
+def test_few_grains_leave_the_limits() -> None:
+    """Three grains cannot have four sieves' shares."""
     with pytest.raises(SceneError, match=r"3 grains .* the standard's limits are"):
         draw_radii(coarse(*WIDE).sample.radii, 3, 1)
-    dust = coarse("sample.grading=[[0.02, 0], [0.04, 100]]", "sample.count=10")
-    assert any("sieves are given in mm" in said for said in dust.warnings)
 
 
 # --- rolling resistance -------------------------------------------------------------------------
@@ -121,17 +124,26 @@ def test_grains_meet_the_nearest_point_of_a_block(position: FloatArray, mirror: 
 
 # --- what makes no sense ------------------------------------------------------------------------
 
+SECOND = "loading.stage=[{from_cycle=600, amplitude=9e3, mean=4e3, frequency=9.0}]"
 REFUSED = [
     ("ballast", ['sample.grading="EN 13450 31.5/63"'], "did you mean EN 13450 31.5/50"),
     ("ballast", ["sample.grading=[[20, 0], [40, 90]]"], "percentages that grow from 0 to 100"),
+    ("ballast", ["sample.grading=[[0.02, 0], [0.04, 100]]"], "sieves are given in mm"),
     ("ballast", ["sample.grading=7"], "[[sieve in mm, passing in %], ...]"),
     ("karrech", ["sample.grading_scale=0.5"], "no sample.grading to scale"),
     ("karrech-coarse", ['sample.grading="AREMA 4"'], "radii up to 0.0254 m do not fit"),
     ("ballast", ["sample.grain_radius.mean=1e-3"], "give this or grading, not both"),
     ("ballast", ["material.grain.friction=0"], "grain.rolling_friction: grains without friction"),
-    ("karrech", ["loading.footprint=[0.01, 0.01]"], "footprint: a rectangle needs a box"),
-    ("ballast", ["loading.footprint=[0.31, 0.01]"], "does not fit: the box is 0.3 m by 0.28 m"),
+    (
+        "karrech",
+        ["loading.footprint=[0.01, 0.01]"],
+        "footprint: needs a box that holds it, not a cyl",
+    ),
+    ("ballast", ["loading.footprint=[0.31, 0.01]"], "holds it, this one is 0.3 m by 0.28 m"),
     ("ballast", ["loading.area_share=0.5"], "a box takes loading.footprint"),
+    ("ballast", [SECOND], "from_cycle must grow, to below total_cycles = 500"),
+    ("ballast", [SECOND, "procedure.tolerance=0.1"], "by history alone know when a load began"),
+    ("ballast", [SECOND], "the stress would fall to mean - amplitude/2 = -500 Pa"),
 ]
 
 
@@ -139,3 +151,23 @@ REFUSED = [
 def test_senseless_scenes_are_refused(scene: str, overrides: list[str], words: str) -> None:
     with pytest.raises(SceneError, match=re.escape(words)):
         load_scene(find_scene_file(scene), overrides)
+
+
+# --- stages -------------------------------------------------------------------------------------
+
+STAGE = "\n[[loading.stage]]\nfrom_cycle = 200\namplitude = 9e3\nmean = 4500.0\nfrequency = 30.0\n"
+
+
+def test_jumps_keep_to_their_stage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a bed that settles by ln of the cycles of each load no jump crosses to another load, and
+    jumps land within 2 % of what it settles by in all: they forecast by the cycles of their load.
+    """
+    bed = FakeBed(lambda n: SETTLEMENT * (np.log1p(n) + 3 * np.log1p(np.clip(n - 200, 0, None))))
+    monkeypatch.setattr(engine_fake, "BED", bed)
+    (tmp_path / "scene.toml").write_text(read_template("karrech-coarse") + STAGE)
+    run_scene(tmp_path / "scene.toml", tmp_path / "run", overrides=('engine.name="fake"',))
+    done = [one for one in RunFolder(tmp_path / "run").outcomes() if one.stage == "jump"]
+    assert len(done) >= 6
+    assert not any(one.first_cycle < 200 < one.last_cycle for one in done)
+    settled = float(read_rows(tmp_path / "run")[-1]["mean_grain_settlement"])
+    assert settled == pytest.approx(bed.settlement(0, 500)[-1], rel=0.02)

@@ -1,0 +1,33 @@
+"""A load in several stages: the scene of each of them."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+from adapters.scene.procedures import fill_procedure
+from adapters.scene.tables import Scene
+
+
+def list_stages(scene: Scene) -> list[tuple[int, Scene]]:
+    """Of each stage of the load the cycles done before it, and a scene that ends with it.
+
+    Of a procedure with a name each has jumps for its own number of cycles.
+    """
+    p, loading = scene.procedure, scene.loading
+    if p is None or loading is None or not loading.stage:
+        return [(0, scene)]
+    begins = [0, *(stage.from_cycle for stage in loading.stage), p.total_cycles]
+    found = []
+    for level, (begin, end) in zip((loading, *loading.stage), pairwise(begins), strict=True):
+        given = {"name": p.name, "k": p.k, "healing_cycles": p.healing_cycles}
+        plan = fill_procedure(given | {"total_cycles": end - begin}) if p.name else {}
+        own = {"k_i": plan["k_i"], "h": tuple(plan["h"])} if plan else {}
+        load = {key: getattr(level, key) for key in ("amplitude", "mean", "frequency")}
+        step = 1 / (load["frequency"] * scene.steps_per_cycle)
+        parts = {
+            "loading": loading.model_copy(update=load | {"stage": ()}),
+            "procedure": p.model_copy(update=own | {"total_cycles": end}),
+            "engine": scene.engine.model_copy(update={"time_step": step}),
+        }
+        found.append((begin, scene.model_copy(update=parts)))
+    return found
