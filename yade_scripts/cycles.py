@@ -48,6 +48,17 @@ def move_grains(positions):
         state.pos, state.vel, state.angVel = Vector3(*position), Vector3.Zero, Vector3.Zero
 
 
+def renew_friction():
+    """Give contacts that the rain made, with less friction, that of the load cycles."""
+    for contact in O.interactions:
+        if contact.isReal:
+            pair = {O.bodies[number].material.label for number in (contact.id1, contact.id2)}
+            found = [p for p in parameters["pairs"] if {p["first"], p["second"]} == pair]
+            contact.phys.tangensOfFrictionAngle = found[0]["friction"]
+
+
+if window.get("renew_friction"):
+    renew_friction()
 loop_s = time.process_time()
 if window["start"] == "first":
     seat()

@@ -103,6 +103,8 @@ class YadeEngine(ProcessEngine):
         }  # fmt: skip
         if start.first:
             content["window"]["seat"] = asdict(plan_seating(scene))
+            if scene.sample.rain_friction is not None:
+                content["window"]["renew_friction"] = True
         if start.moved is not None:
             content["window"]["moved"] = start.moved.position.tolist()
         if start.kind == "perturbed":

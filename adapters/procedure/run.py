@@ -23,7 +23,7 @@ from adapters.procedure.fixed import settle_fixed
 from adapters.procedure.progress import Progress, describe_plan, warn_without_jumps
 from adapters.procedure.record import MEMBERS, read_members, refuse_other_member
 from adapters.procedure.stages import Bed, Clock, Run, Variant
-from adapters.scene import Scene, list_stages, load_scene
+from adapters.scene import Scene, bound_friction, list_stages, load_scene
 from trackbed.memory import refuse_more_memory
 from trackbed.run_files import list_differences, record_provenance, refuse_writing, write_whole
 
@@ -343,7 +343,7 @@ def _write_dry_run(scene: Scene, run_path: Path) -> None:
     position, height = draw_sample_start(
         radius, scene.container, scene.sample.relative_density_start, scene.sample.seed
     )
-    engine.write_preparation(scene, position, radius, height, folder)
+    engine.write_preparation(bound_friction(scene), position, radius, height, folder)
     for sentence in describe_plan(scene, height):
         print(f"# {sentence}")
     print(f"cd {shlex.quote(str(folder))}")

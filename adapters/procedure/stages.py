@@ -43,7 +43,7 @@ from adapters.moves import Jump, get_move
 from adapters.procedure import checks
 from adapters.procedure.progress import Progress
 from adapters.procedure.room import find_room, find_top_under
-from adapters.scene import Procedure, Scene
+from adapters.scene import Procedure, Scene, bound_friction
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,8 @@ def prepare(run: Run) -> Bed:
             radius, scene.container, sample.relative_density_start, sample.seed
         )
         folder = _begin(run, name)
-        decks = run.engine.write_preparation(scene, position, radius, height, folder)
+        rain = bound_friction(scene)
+        decks = run.engine.write_preparation(rain, position, radius, height, folder)
         done = run.engine.run(scene, "in.prepare", folder, lambda: None, decks)
         with run.clock.time_part("parse"):
             state = read_state(folder, run.engine.wall_names(scene, piston=False))

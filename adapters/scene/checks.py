@@ -104,6 +104,11 @@ def _check_grading_scale(scene: Values) -> Iterator[Problem]:
         yield Problem("sample.grading_scale", "there is no sample.grading to scale")
 
 
+def _check_rain(scene: Values) -> Iterator[Problem]:
+    if scene.need("sample.rain_friction") > (most := scene.need("material.grain.friction")):
+        yield Problem("sample.rain_friction", f"must be at most the grains' friction, {most:g}")
+
+
 def _check_rolling(scene: Values) -> Iterator[Problem]:
     grain, wall = (scene.get(f"material.{one}.rolling_friction") for one in ("grain", "wall"))
     key = f"material.{'grain' if grain else 'wall'}.rolling_friction"
@@ -230,9 +235,10 @@ def _check_relaxation(scene: Values) -> Iterator[Problem]:
 
 CHECKS: tuple[Check, ...] = (
     _check_alternatives, *(partial(_check_owned_keys, *row) for row in OWNED), _check_symmetry,
-    _check_grain_radius, _check_grading_scale, _check_rolling, _check_series, _check_partial_piston,
-    _check_stages, _check_procedure, _check_jumps, _check_settlement, _check_seating,
-    _check_launcher, _check_engine, _check_law, _check_move, _check_relaxation, *mechanics.CHECKS,
+    _check_grain_radius, _check_grading_scale, _check_rain, _check_rolling, _check_series,
+    _check_partial_piston, _check_stages, _check_procedure, _check_jumps, _check_settlement,
+    _check_seating, _check_launcher, _check_engine, _check_law, _check_move, _check_relaxation,
+    *mechanics.CHECKS,
 )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""A load in several stages: the scene of each of them."""
+"""The scene while the bed rains, and of each stage of its load."""
 
 from __future__ import annotations
 
@@ -6,6 +6,17 @@ from itertools import pairwise
 
 from adapters.scene.procedures import fill_procedure
 from adapters.scene.tables import Scene
+
+
+def bound_friction(scene: Scene) -> Scene:
+    """The scene while its bed rains and settles: with no more friction than ``rain_friction``."""
+    most, material = scene.sample.rain_friction, scene.material
+    if most is None:
+        return scene
+    parts = {
+        name: one.model_copy(update={"friction": min(most, one.friction)}) for name, one in material
+    }
+    return scene.model_copy(update={"material": material.model_copy(update=parts)})
 
 
 def list_stages(scene: Scene) -> list[tuple[int, Scene]]:

@@ -85,6 +85,8 @@ class Sample(Table):
     relative_density_start: Annotated[float, Field(ge=1e-3, le=0.15, allow_inf_nan=False)] = 0.05
     """Relative density of the random start, before the rain."""
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 1  # seed of radii and start positions
+    rain_friction: Positive | None = None
+    """Coulomb's coefficient of all contacts while the bed rains and settles: less packs denser."""
     grain_radius: GrainRadius | None = None
     grading: GradingKey | None = None
     """Grading by a standard's name, or sieves [mm] with the mass that passes [%], instead."""

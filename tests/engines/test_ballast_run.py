@@ -36,17 +36,14 @@ def test_block_pushes_what_lies_under_it(name: str, tmp_path: Path) -> None:
     walls = scene.walls(state.piston_height)
     rows = find_pairs(state.position, state.radius, walls)
     under = (rows.second == -len(walls.plane_name)) & (rows.overlap > 0)
-    grain = rows.first[under]
-    expected = np.zeros(len(state.radius))
-    expected[grain] = find_normal_force(
-        rows.overlap[under], scene.stiffness.wall, state.radius[grain]
-    )
-    normal = np.zeros_like(state.position)
-    normal[grain] = rows.normal[under]
-    force = state.wall_force[get_engine(name).wall_names(scene, piston=True)[-1]]
-    found = np.einsum("na,na->n", force, normal)
-    assert found == pytest.approx(expected, abs=0.01 * expected.max())
-    assert 0 < len(grain) < len(state.radius)
+    grain, force = rows.first[under], state.wall_force[get_engine(name).wall_names(scene, True)[-1]]
+    push = find_normal_force(rows.overlap[under], scene.stiffness.wall, state.radius[grain])
+    found = np.einsum("na,na->n", force[grain], rows.normal[under])
+    assert found == pytest.approx(push, abs=0.01 * push.max())
+    assert np.abs(np.delete(force, grain, axis=0)).max() < 0.01 * push.max()
+    first = window_of(tmp_path, "window_000000").contacts[-1]  # of these many were made by the rain
+    sizes = np.linalg.norm([first.normal_force, first.tangential_force], axis=2)
+    assert (sizes[1] > 2 * scene.sample.rain_friction * sizes[0]).mean() > 0.1
 
 
 @pytest.mark.parametrize("name", REAL)

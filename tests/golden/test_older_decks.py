@@ -16,9 +16,7 @@ from adapters.engines.contract import EngineStart, get_engine
 from adapters.scene.tables import Scene
 from tests.unit.test_decks import KINDS, STARTS, scene
 
-DIGESTS = {
-    "liggghts": "2eed4c670540c883", "lammps": "3ebdcb7838600de6", "yade": "bb207c2191750d79",
-}  # fmt: skip
+DIGESTS = {"liggghts": "2eed4c670540c883", "lammps": "3ebdcb7838600de6", "yade": "bb207c2191750d79"}
 """SHA-256 of names and texts of all files but restarts and YADE's scripts, which read the rest."""
 
 

@@ -1,11 +1,6 @@
 """Scene files: TOML with lines, all problems at once, the nearest word; and grading curves."""
 
-from trackbed.scene_files.grading import (
-    GRADINGS,
-    Grading,
-    draw_sizes,
-    refuse_outside_limits,
-)
+from trackbed.scene_files.grading import GRADINGS, Grading, draw_sizes, refuse_outside_limits
 from trackbed.scene_files.reader import (
     Guide,
     Problem,
