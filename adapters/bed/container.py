@@ -37,9 +37,7 @@ class Walls:
         """Points, normals and reaches of the planes, the cylinder's radius, edges of planes."""
         edges = np.tile(WHOLE, (len(self.plane_reach), 1))
         edges[-1] = self.piston_edges
-        return (
-            self.plane_point, self.plane_normal, self.plane_reach, self.cylinder_radius, edges
-        )  # fmt: skip
+        return self.plane_point, self.plane_normal, self.plane_reach, self.cylinder_radius, edges
 
     def planes(self) -> Iterator[tuple[str, bool, int, float, int]]:
         """Of each plane across an axis name, whether frictionless, axis, place on it [m], sense."""

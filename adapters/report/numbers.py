@@ -30,7 +30,7 @@ from adapters.report.error import (
     measure_jump,
 )
 from adapters.report.verdict import FITTED, FULL, NOTHING, PROCEDURE, list_failures, split_cost
-from adapters.scene import flatten_keys, list_omissions
+from adapters.scene import flatten_keys, list_omissions, list_stages
 
 
 @dataclass(frozen=True)
@@ -180,8 +180,12 @@ def describe_scene(record: Record) -> str:
     text = f"{scene.grain_count} grains in a {shape}{scene.sample.container}"
     if scene.loading is None or scene.procedure is None:
         return text + ", prepared and not loaded"
-    peak = float(np.max(scene.stress_at(np.linspace(0, 1, 201))))
-    text += f", up to {peak / 1e3:.4g} kPa at {1 / scene.loading.period:.4g} Hz"
+    for begin, stage in list_stages(scene):
+        peak = np.max(stage.stress_at(np.linspace(0, 1, 201)))
+        text += f", from cycle {begin} on" if begin else ""
+        text += (
+            f", up to {peak / 1e3:.4g} kPa at {1 / stage.time_step / stage.steps_per_cycle:.4g} Hz"
+        )
     if scene.loaded_area < scene.container.area:
         text += f" on {100 * scene.loaded_area / scene.container.area:.0f} % of the section"
     return f"{text}, engine {scene.engine.name}"

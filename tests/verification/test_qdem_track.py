@@ -16,7 +16,6 @@ from qdem_fem.cli.run import Progress
 from qdem_fem.element.material import Material
 from qdem_fem.files.errors import CheckpointError, EnergyLost, NotConverged, SceneError
 from qdem_fem.grains.sets import make_grains
-from qdem_fem.grains.sizes import Grading
 from qdem_fem.march import energies, kinetic_damping
 from qdem_fem.mesh.generation import make_box_mesh
 from qdem_fem.report.track import find_grain_mobility
@@ -34,6 +33,7 @@ from qdem_fem.track.recipe import BedRecipe, make_bed_grains
 from qdem_fem.track.sleeper_mesh import SleeperShape
 from qdem_fem.track.table import BogieTable, TrackTable
 from trackbed.command import main
+from trackbed.scene_files.grading import Grading
 from validation.bench.track_trials import SCENE, load_track
 
 GRAVITY = (0.0, 0.0, -9.81)
