@@ -98,8 +98,8 @@ def find_rolling_stiffness(scene: Scene) -> float:
     weight on the square (2 r)^2 that each fills.
     """
     grain, radii = scene.material.grain, scene.sample.radii
-    weight = GRAVITY * scene.grain_count * radii.volume_mean * grain.density
-    force = weight / scene.container.area * (2 * radii.mean) ** 2
+    stress = GRAVITY * scene.grain_count * radii.volume_mean * grain.density / scene.container.area
+    force = stress * (2 * radii.mean) ** 2
     overlap = contact_law.find_overlap_under_force(force, scene.stiffness.grain, radii.mean / 2)
     shear = contact_law.combine_shear_moduli(*2 * (grain.young, grain.poisson))
     return float(contact_law.find_tangential_stiffness(overlap, shear, radii.mean / 2))

@@ -183,9 +183,8 @@ def describe_scene(record: Record) -> str:
     for begin, stage in list_stages(scene):
         peak = np.max(stage.stress_at(np.linspace(0, 1, 201)))
         text += f", from cycle {begin} on" if begin else ""
-        text += (
-            f", up to {peak / 1e3:.4g} kPa at {1 / stage.time_step / stage.steps_per_cycle:.4g} Hz"
-        )
+        period = stage.time_step * stage.steps_per_cycle
+        text += f", up to {peak / 1e3:.4g} kPa at {1 / period:.4g} Hz"
     if scene.loaded_area < scene.container.area:
         text += f" on {100 * scene.loaded_area / scene.container.area:.0f} % of the section"
     return f"{text}, engine {scene.engine.name}"

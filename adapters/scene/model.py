@@ -30,9 +30,8 @@ def _list_grains(scene: Scene) -> Iterator[str]:
     yield "Breakage, abrasion and wear of grains."
     law = scene.sample.grain_radius
     if law is None:
-        radii = scene.sample.radii
-        low, high = 2e3 * radii.smallest, 2e3 * radii.greatest
-        yield f"Grains below {low:.4g} mm and above {high:.4g} mm; fines and water."
+        low, high = scene.sample.radii.smallest, scene.sample.radii.greatest
+        yield f"Grains below {2e3 * low:.4g} mm and above {2e3 * high:.4g} mm; fines and water."
     elif law.distribution == "normal" and law.standard_deviation:
         yield (f"Radii beyond {law.truncation:g} standard deviations of the mean; fines and water.")
     else:
