@@ -19,7 +19,7 @@ from trackbed.scenes import find_scene_file, read_template
 SMALL = (
     "sample.fill_height=0.06", "loading.footprint=[0.08, 0.07]", "material.grain.young=1e9",
     "loading.amplitude=5e3", "loading.mean=1e4", "procedure.total_cycles=3", "procedure.k_i=2",
-    "procedure.k=2", "procedure.h=1",
+    "procedure.k=2", "procedure.h=1", "sample.rain_friction=0.1",
 )  # fmt: skip
 
 
