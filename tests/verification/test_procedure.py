@@ -229,11 +229,20 @@ def test_a_jump_by_history_lowers_the_loaded_body_by_its_own_cycles(
 
 def test_no_burst_is_extrapolated() -> None:
     """By hand: 80 um from cycle 60 to 150, jump and window, are 87.3 um a unit of ln N; a jump from
-    150 to 300 may sink by twice that times ln 2.  Before any jump, or where it rose: no bound."""
+    150 to 300 may sink by twice that times ln 2.  Before any jump, or where it never sank: no
+    bound."""
     jumped = Jumped(np.array([60, 125, 150]), np.array([0.0, 70e-6, 80e-6]))
     assert bound_burst([jumped], 150, 150) == pytest.approx(160e-6 * np.log(2) / np.log(2.5))
     assert bound_burst([], 150, 150) == np.inf
     assert bound_burst([replace(jumped, settlement=-jumped.settlement)], 150, 150) == np.inf
+    # a burst of 200 um in the window behind a second jump: 330 um since cycle 60 are the bound
+    burst = Jumped(np.array([150, 285, 300]), np.array([80e-6, 130e-6, 330e-6]))
+    since_first = 2 * 330e-6 * np.log(2) / np.log(5)
+    assert bound_burst([jumped, burst], 300, 300) == pytest.approx(since_first)
+    # a body that rose in the last window is bounded by all before it
+    risen = Jumped(np.array([150, 285, 300]), np.array([80e-6, 70e-6, 60e-6]))
+    since_first = 2 * 60e-6 * np.log(2) / np.log(5)
+    assert bound_burst([jumped, risen], 300, 300) == pytest.approx(since_first)
 
 
 def test_room_that_jumps_found() -> None:
