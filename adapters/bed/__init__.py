@@ -40,6 +40,7 @@ from adapters.bed.sample import (
     SURFACE_SHARE,
     draw_sample_start,
     find_sample_mass,
+    find_top_under,
     measure_bed_height,
     measure_relative_density,
     measure_sample,
@@ -62,7 +63,7 @@ __all__ = [
     "check_bed", "combine_moduli", "contact_law", "count_sides", "draw_radii", "draw_sample_start",
     "expect_grains", "find_behind_discs", "find_literal_restitution", "find_normal_force",
     "find_overlap_under_force", "find_pairs", "find_radius_that_fits", "find_rayleigh_time",
-    "find_rebound_damping", "find_sample_mass", "judge_state", "list_wall_names", "list_wall_rows",
-    "load_state", "make_no_contacts", "measure_bed", "measure_bed_height",
+    "find_rebound_damping", "find_sample_mass", "find_top_under", "judge_state", "list_wall_names",
+    "list_wall_rows", "load_state", "make_no_contacts", "measure_bed", "measure_bed_height",
     "measure_relative_density", "measure_rows", "measure_sample", "save_state", "solve_collision",
 ]  # fmt: skip

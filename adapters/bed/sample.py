@@ -17,7 +17,7 @@ from adapters.bed.container import Container
 from adapters.bed.overlaps import find_pairs_within
 from adapters.bed.radii import find_radius_that_fits
 from adapters.bed.state import Contacts, FloatArray, IntArray, State
-from adapters.errors import NotConverged, SceneError
+from adapters.errors import NotConverged, NotCredible, SceneError
 
 GRAVITY = 9.81
 """Acceleration of gravity [m/s^2], along -z."""
@@ -179,3 +179,23 @@ def measure_sample(state: State, container: Container) -> SampleFigures:
         ),
         height=height,
     )
+
+
+def find_top_under(
+    position: FloatArray, radius: FloatArray, edges: tuple[float, float, float, float], reach: float
+) -> float:
+    """Highest place of grains under a piston [m]; ``position`` (n, 3), ``radius`` (n,) [m].
+
+    ``edges`` of a rectangular piston along x, then y, and ``reach`` of a round one [m], infinite
+    where there are none.  Raises `NotCredible` where no grain is: a block smaller than the gaps.
+    """
+    x, y = position[:, 0], position[:, 1]
+    left, right, front, back = edges
+    beyond = np.hypot(x - np.clip(x, left, right), y - np.clip(y, front, back))
+    under = (beyond < radius) & (np.hypot(x, y) - radius < reach)
+    if not under.any():
+        raise NotCredible(
+            "no grain is under the piston", where="loading.footprint",
+            remedy="a wider footprint, or more grains",
+        )  # fmt: skip
+    return float((position[:, 2] + radius)[under].max())

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
-from adapters.bed import FloatArray, State
-from adapters.errors import NotConverged, NotCredible
+from adapters.bed import FloatArray, State, find_top_under
+from adapters.errors import NotConverged
 from adapters.scene import Scene
 
 
@@ -56,22 +54,5 @@ def relax_below(
     Where grains have no room under a piston that went down: the bed settles below one that waits.
     """
     position, record = relax_target(scene, before, target, before.piston_height)
-    top = find_top_under(scene, position, before.radius)
+    top = find_top_under(position, before.radius, scene.piston_edges, scene.piston_reach)
     return position, record | {"piston": "on the bed"}, min(top, before.piston_height)
-
-
-def find_top_under(scene: Scene, position: FloatArray, radius: FloatArray) -> float:
-    """Highest place [m] of grains under the piston; ``position`` (n, 3), ``radius`` (n,) in metres.
-
-    Raises `NotCredible` where none is: a block smaller than the gaps between grains.
-    """
-    x, y = position[:, 0], position[:, 1]
-    left, right, front, back = scene.piston_edges
-    beyond = np.hypot(x - np.clip(x, left, right), y - np.clip(y, front, back))
-    under = (beyond < radius) & (np.hypot(x, y) - radius < scene.piston_reach)
-    if not under.any():
-        raise NotCredible(
-            "no grain is under the piston", where="loading.footprint",
-            remedy="a wider footprint, or more grains",
-        )  # fmt: skip
-    return float((position[:, 2] + radius)[under].max())

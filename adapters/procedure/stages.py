@@ -21,6 +21,7 @@ from adapters.bed import (
     draw_radii,
     draw_sample_start,
     find_pairs,
+    find_top_under,
     load_state,
     measure_bed,
     measure_bed_height,
@@ -42,7 +43,7 @@ from adapters.laws import get_law
 from adapters.moves import Jump, get_move
 from adapters.procedure import checks
 from adapters.procedure.progress import Progress
-from adapters.procedure.room import find_room, find_top_under
+from adapters.procedure.room import find_room
 from adapters.scene import Procedure, Scene, bound_friction
 
 
@@ -160,7 +161,8 @@ def prepare(run: Run) -> Bed:
         cost = run.clock.end_lap(done.cpu_s, done.start_up_s)
         _finish(run, folder, Outcome(name, 0, 0, [], cost, notes=notes))
     state = load_state(run.folder.path / name / "state.npz")
-    run.loaded_start = top = find_top_under(scene, state.position, state.radius)
+    edges, reach = scene.piston_edges, scene.piston_reach
+    run.loaded_start = top = find_top_under(state.position, state.radius, edges, reach)
     restart = run.folder.path / name / "end.restart"
     return Bed(0, EngineStart(restart, state.time_step, 0, top, first=True))
 
