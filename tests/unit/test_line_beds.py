@@ -179,6 +179,12 @@ def test_intervals_hold_what_they_are_of():
         ("cycle,a,b,c\n1,1,1,1\n100,2,2,0.5\n", "1 of 3 beds rise from cycle"),
         ("cycle,a,b,c\n1,1,1,1\n100,2,2,x\n", "'x' is not a number"),
         ("cycle,a [kN],b,c\n1,1,1,1\n100,2,2,2\n", "is in kN, which is not known here"),
+        ("day,a,b,c\n1,1,1,1\n10,2,2,2\n100,3,3,3\n", "there is no column cycle"),
+        ("1,1,1,1\n10,2,2,2\n100,3,3,3\n", "there is no column cycle"),
+        ("no,cycle,a [mm],b [mm]\n1,1,1,1\n2,9,2,2\n3,99,3,3\n", "only some columns have this"),
+        ("cycle,a,b,c\n0,0,0,0\n1,1,1,1\n100,2,2,2\n", "no readings of all beds divide"),
+        ("cycle,a,b,c\n0,0,0,0\n", "cycles 1 to 0 only"),
+        ("cycle,a,b,c\n1,1,1,1\n10,5,5,5\n100,3,3,3\n1000,4,4,4\n", "rises from cycle 10 to 100"),
     ],
 )
 def test_a_table_that_shows_no_scatter_is_refused(tmp_path, text, said, capsys):
@@ -187,6 +193,70 @@ def test_a_table_that_shows_no_scatter_is_refused(tmp_path, text, said, capsys):
     path.write_text(text)
     assert main(["line", "--beds", str(path)]) == 2
     assert said in capsys.readouterr().err
+
+
+def test_readings_far_apart_lend_no_persistence(tmp_path, capsys):
+    """Gains from 1 to 30 and from 30 to 1e4 cycles that are strangers, of 400 beds: r = 0 within
+    three errors; a straight line from 30 on would make it 0.4 in windows that end at 100.  The
+    reading at cycle 0 changes nothing, and 6 m are hardly meant.  The preamble is skipped."""
+    path, rng = tmp_path / "beds.csv", np.random.default_rng(3)
+    gains = spread_around_one(rng.normal(size=(2, 400)), 0.3)
+    table = np.cumsum([np.full(400, 9.0), np.full(400, -8.0), *gains * [[1.0], [3.0]]], axis=0)
+    head = "km 12\n" + ",".join(["axles", *(f"s{i}" for i in range(400))])
+    np.savetxt(path, np.column_stack([[0, 1, 30, 1e4], table]), delimiter=",", header=head,
+               comments="")  # fmt: skip
+    assert main(["line", "--beds", str(path), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert abs(found["persistence_1"]) < 3 / 400**0.5
+    assert found["window"] == pytest.approx(1e4 / 30, rel=0.06)  # within half a step of 10^0.05
+    for said in ("readings at cycle 0 are left out", "as mm it would be 0.0"):
+        assert any(said in one for one in found["doubts"])
+
+
+def test_a_logarithm_gives_no_law_and_beds_that_stop_no_memory(tmp_path, capsys):
+    """s = ln N as a N^b would settle a hundred times as far by the first axle; beds that stop at
+    100 cycles do not say what they forget: their scatter counts as lasting."""
+    path, factor = tmp_path / "beds.csv", draw_factors(9)
+    for cycles, said in (
+        (CYCLES, "as the logarithm of cycles or slower"),
+        (np.minimum(CYCLES, 100), "persistence is not shown: nan"),
+    ):
+        table = np.column_stack([CYCLES, 1e-3 * np.outer(np.log(cycles), factor)])
+        head = ",".join(["cycle", *(f"s{i}" for i in range(9))])
+        np.savetxt(path, table, delimiter=",", header=head, comments="")
+        assert main(["line", "--beds", str(path), "--json"]) == 0
+        found = json.loads(capsys.readouterr().out)
+        assert not any(one.startswith("law=") for one in found["settings"])
+        assert "scatter.memory=1000" in found["settings"]
+        assert found["variation_of_rate"] == found["variation_of_gain"]
+        assert any(said in one for one in found["doubts"])
+    table = np.column_stack([CYCLES, 1e-3 * np.outer(CYCLES**0.05, factor)])
+    np.savetxt(path, table, delimiter=",", header=head, comments="")
+    assert main(["line", "--beds", str(path)]) == 0
+    assert "settles more by this law than was read in all" in capsys.readouterr().out
+
+
+def test_a_sweep_with_holes_says_what_it_knows(tmp_path, capsys):
+    """One bed without deflection, one without its manifest, one that ends early: stiffness and m
+    come from the others; a settlement that is no number is refused with its line."""
+    folder = write_sweep(tmp_path, draw_factors(6), 23e3, 46e3)
+    (folder / "members" / "23000-1" / "manifest.json").unlink()
+    path = folder / "settlement.csv"
+    rows = [one.split(",") for one in path.read_text().splitlines()]
+    rows = [[*one[:3], "", one[4]] if one[0] == "46000-2" else one for one in rows
+            if not (one[0] == "46000-3" and one[1] == "10000.0")]  # fmt: skip
+    path.write_text("\n".join(map(",".join, rows)))
+    assert main(["line", "--beds", str(folder), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["m"] == pytest.approx(M, abs=1e-6)
+    assert found["bed_n_per_m"] > 0
+    for said in ("23000-1: its load is not known", "to 10000 are left out: some beds have none"):
+        assert any(said in one for one in found["doubts"])
+    path.write_text(
+        "\n".join(map(",".join, [*rows[:7], [*rows[7][:2], "nan", *rows[7][3:]], *rows[8:]]))
+    )
+    assert main(["line", "--beds", str(folder)]) == 2
+    assert "settlement.csv:8: a settlement is not a finite number" in capsys.readouterr().err
 
 
 def test_a_sweep_that_is_none_is_refused(tmp_path, capsys):

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from track_line.arrays import Floats
+from track_line.arrays import Bools, Floats
 from track_line.laws import SEAT_AREA
 from trackbed.errors import UsageError
 
 A_DECADE = 20
-"""Cycles of an `Ensemble` in each decade, evenly spaced in ln N."""
+"""Cycles of an `Ensemble` in each decade, or a little fewer, evenly spaced in ln N."""
 BLOCK = 0.1
 """Share of the cycles up to N over which a settlement is averaged [-]: a bed springs at the end of
 a cycle, and what it springs is no memory of it."""
@@ -26,12 +26,15 @@ SHORTEST = 10.0
 
 @dataclass(frozen=True)
 class Ensemble:
-    """n beds at k cycles, evenly spaced in ln N up to the last."""
+    """n beds at k cycles, evenly spaced in ln N from first to last."""
 
     cycle: Floats
     """N, shape (k,) [-]."""
     settled: Floats
     """Shape (n, k) [m]."""
+    read: Bools
+    """Cycles that all beds were read at, within half a step, shape (k,); between readings a
+    straight line in ln N is taken, which knows nothing of a bed."""
     packing: NDArray[np.int64]
     """Which rain of grains, or place in the track, each bed is, shape (n,)."""
     pressure: Floats
@@ -59,26 +62,39 @@ class Ensemble:
         return np.unique(self.pressure, return_inverse=True)[1]
 
 
-def align_beds(curves: Sequence[tuple[Floats, Floats]], where: str, **others: Any) -> Ensemble:
+def align_beds(
+    curves: Sequence[tuple[Floats, Floats]], where: str, *, notes: Sequence[str] = (), **others: Any
+) -> Ensemble:  # fmt: skip
     """Beds of ``curves``, cycles (ascending) and settlements [m] each, at cycles that all have.
 
     ``others`` are further fields of `Ensemble`.  Raises `UsageError` for too few beds or cycles.
     """
+    if any(cycle[0] <= 0 for cycle, _ in curves):
+        notes = [*notes, "readings at cycle 0 are left out: windows are of the logarithm of cycles"]
     if len(curves) < FEWEST:
         raise UsageError(
             f"{len(curves)} beds show no scatter", where=where,
             remedy=f"give {FEWEST} at least, and thirty to know whether a bad bed stays one",
         )  # fmt: skip
-    first = max(max(float(cycle[0]), 1.0) for cycle, _ in curves)
+    first = max(max(float(cycle[cycle > 0].min(initial=cycle[-1])), 1.0) for cycle, _ in curves)
     last = min(float(cycle[-1]) for cycle, _ in curves)
+    if last < (longest := max(float(cycle[-1]) for cycle, _ in curves)):
+        notes = [*notes, f"cycles {last:g} to {longest:g} are left out: some beds have none there"]
     if last < SHORTEST * first:
         raise UsageError(
             f"all beds have cycles {first:g} to {last:g} only, which shows no law", where=where,
             remedy=f"measure to {SHORTEST:g} times the first cycle at least",
         )  # fmt: skip
-    steps = int(A_DECADE * np.log10(last / first) + 1e-9)
-    cycle = last * 10.0 ** (np.arange(-steps, 1) / A_DECADE)
-    near = cycle[:, None] * np.linspace(1 - BLOCK, 1, 10)
-    settled = [np.interp(np.log(np.maximum(near, one[0])), np.log(np.maximum(one, 1e-300)), s)
-               for one, s in curves]  # fmt: skip
-    return Ensemble(cycle, np.mean(settled, axis=2), **others)
+    cycle = np.geomspace(first, last, int(A_DECADE * np.log10(last / first) + 1e-9) + 1)
+    half = np.log(cycle[1] / cycle[0]) / 2
+    near = np.log(np.maximum(cycle[:, None] * np.linspace(1 - BLOCK, 1, 10), first))
+    logs = [np.log(np.maximum(one, np.finfo(float).tiny)) for one, _ in curves]
+    settled = [np.interp(near, x, s).mean(axis=1) for x, (_, s) in zip(logs, curves, strict=True)]
+    read = np.all([find_distance(near[:, -1], x) <= half for x in logs], axis=0)
+    return Ensemble(cycle, np.array(settled), read, notes=tuple(notes), **others)
+
+
+def find_distance(places: Floats, readings: Floats) -> Floats:
+    """From each of ``places`` (k,) to the nearest of ``readings``, ascending."""
+    behind = np.clip(np.searchsorted(readings, places), 1, len(readings) - 1)
+    return np.minimum(abs(places - readings[behind - 1]), abs(places - readings[behind]))

@@ -28,6 +28,8 @@ LEVEL = 0.9
 EXPONENTS = (0.01, 1.0)
 """Between which b is looked for: about a logarithm, a constant rate [-]."""
 
+SLOWEST = 0.0101
+"""b that is at the lower end of `EXPONENTS`: N^b has no curve so flat, and `a` means nothing."""
 ONE = 1 - 1e-12
 """Greatest correlation that has an interval [-]."""
 SMALL = 1e-6
@@ -91,22 +93,30 @@ def fit_beds(ensemble: Ensemble) -> BedFit:
             remedy="settlement is positive downwards; leave out beds whose readings are wrong",
         )
     here = load == max(load, key=lambda one: (np.count_nonzero(load == one), one))
-    seated, a, b = fit_power(cycle, settled[here].mean(axis=0))
+    read = ensemble.read
+    ends = find_ends(ensemble)
+    gains = -np.diff(settled[:, ends], axis=1).T
+    late, early = (means := gains[:, here].mean(axis=1))[:2]
+    if means.min() < 0:
+        rise = int(means.argmin())
+        raise UsageError(
+            f"the mean bed rises from cycle {cycle[ends[rise + 1]]:.3g} to {cycle[ends[rise]]:.3g}",
+            remedy="give the readings between one tamping and the next alone",
+        )
+    seated, a, b = fit_power(cycle[read], settled[here][:, read].mean(axis=0))
+    interval = bound_exponent(cycle[read], settled[here][:, read])
+    if b < SLOWEST:
+        seated, a, b, interval = np.nan, np.nan, np.nan, (np.nan, np.nan)
     stiff, uneven = (centre(np.log(of), load) for of in (ensemble.bedding, gain))
 
-    steps = min(A_DECADE, (len(cycle) - 1) // 2)
-    ends = np.arange(len(cycle) - 1, -1, -steps)
-    gains = -np.diff(settled[:, ends], axis=1).T
     logs = [centre(np.log(np.where(one > 0, one, np.nan)), load) for one in gains]
     persistence = tuple(find_correlation(*pair, n) for pair in pairwise(logs))
-    late, early = gains[:2, here].mean(axis=1)
     memory = Estimate(*(find_memory(r, late, early) for r in vars(persistence[0]).values()))
     total = estimate_variation(uneven, load, n)
     neighbours = find_likeness(uneven) if ensemble.in_order else Estimate()
     return BedFit(
         force=float(ensemble.force[here][0]), a=a, m=fit_load(ensemble, gain),
-        b=Estimate(b, *bound_exponent(cycle, settled[here])), seated=seated,
-        bed=float(np.mean(ensemble.bedding[here])) * SEAT_AREA,
+        b=Estimate(b, *interval), seated=seated, bed=average(ensemble.bedding[here]) * SEAT_AREA,
         stiffness=estimate_variation(stiff, load, n), total=total,
         together=find_correlation(stiff, uneven, n), window=float(cycle[ends[0]] / cycle[ends[1]]),
         persistence=persistence, rose=int(np.count_nonzero(~(gains > 0).all(axis=0))),
@@ -114,6 +124,31 @@ def fit_beds(ensemble: Ensemble) -> BedFit:
         length=Estimate(*map(find_length, vars(neighbours).values())),
         unseen=float(late / (cycle[ends[0]] - cycle[ends[1]])),
     )  # fmt: skip
+
+
+def find_ends(ensemble: Ensemble) -> NDArray[np.int64]:
+    """Places of cycles that end windows, the last first: decades, or halves of less than two, each
+    moved to the nearest cycle that was read, lest a straight line lend two windows one slope.
+
+    Raises `UsageError` where no two windows follow one another.
+    """
+    last = len(ensemble.cycle) - 1
+    wanted = np.arange(last, -1, -min(A_DECADE, last // 2))
+    known = np.flatnonzero(ensemble.read)
+    ends = np.unique([known[abs(known - one).argmin()] for one in wanted if known.size])[::-1]
+    if len(ends) < 3:
+        raise UsageError(
+            f"no readings of all beds divide cycles {ensemble.cycle[0]:.3g} to "
+            f"{ensemble.cycle[-1]:.3g}", remedy="read all beds at the same cycles, three times at "
+            "least, evenly spaced in their logarithm",
+        )  # fmt: skip
+    return np.asarray(ends)
+
+
+def average(values: Floats) -> float:
+    """Mean of the numbers that are known; nan where none is."""
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if known.size else np.nan
 
 
 def centre(logs: Floats, group: NDArray[np.int64]) -> Floats:
@@ -152,11 +187,12 @@ def bound_exponent(cycle: Floats, settled: Floats) -> tuple[float, float]:
 
 def fit_load(ensemble: Ensemble, gain: Floats) -> Estimate:
     """m: slope of ln gain over ln load, within packings where they have several loads."""
-    x, y = np.log(ensemble.force), np.log(gain)
-    if not np.ptp(ensemble.load):
+    known = np.isfinite(ensemble.force)
+    x, y, packing = np.log(ensemble.force[known]), np.log(gain[known]), ensemble.packing[known]
+    if not known.any() or not np.ptp(x):
         return Estimate()
-    within = len(np.unique(ensemble.packing)) < len(x)
-    group = ensemble.packing if within else np.zeros(len(x), int)
+    within = len(np.unique(packing)) < len(x)
+    group = packing if within else np.zeros(len(x), int)
     x, y = centre(x, group), centre(y, group)
     freedom = len(x) - len(np.unique(group)) - 1
     m = float(x @ y / (x @ x))
@@ -222,7 +258,7 @@ def find_memory(persistence: float, late: float, early: float) -> float:
 def share_kept(settlement: float, memory: float) -> float:
     """Standard deviation of a mean over a ``settlement`` [m] of scatter with this ``memory`` [m],
     for ever where it is not known, over that of the scatter [-]."""
-    x = settlement / max(SHORTEST_MEMORY, memory)
+    x = settlement / max(memory, SHORTEST_MEMORY)  # in this order nan stays
     return float(np.sqrt(2 * (x + np.expm1(-x))) / x) if x > SMALL else 1.0
 
 

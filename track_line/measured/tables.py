@@ -18,6 +18,8 @@ LOADS = ("loading.amplitude", "loading.mean")
 """Keys of a sweep that change the load and nothing else."""
 SEED = "sample.seed"
 LENGTHS = ("m", "mm", "cm", "um", "µm")
+CYCLES = ("cycle", "cycles", "n", "axle", "axles")
+"""Names of the column of cycles."""
 LATE = 10.0
 """The elastic deflection is the mean over cycles from the last one over this."""
 CURVE = ("cycle", "loaded_body_settlement", "elastic_deflection")
@@ -33,13 +35,16 @@ def read_beds(path: Path) -> Ensemble:
 
 def _read_sleepers(path: Path) -> Ensemble:
     """Settlements [m, or the unit behind a column's name] of sleepers as they lie in a track."""
-    header = read_table(path).header
-    if len(header) < 2:
+    table = read_table(path, [CYCLES])
+    place = find_column(table, CYCLES, ("-", "1"))  # tonnes or days in its place are no cycles
+    others = [at for at in range(len(table.header)) if at != place]
+    names = [table.header[at] for at in (place, *others)]
+    (cycle, *settled), _ = read_columns(path, names, [("-", "1"), *[LENGTHS] * len(others)])
+    if len({table.split_title(at, LENGTHS)[1] for at in others}) > 1:
         raise UsageError(
-            "there are no names of columns", where=str(path),
-            remedy="the first line names them: cycle, then each sleeper, such as s1 [mm]",
+            "only some columns have this unit", where=f"{path}:{table.header_line}",
+            remedy="name cycles and sleepers alone, each sleeper with its unit, such as s1 [mm]",
         )  # fmt: skip
-    (cycle, *settled), _ = read_columns(path, header, [("-", "1"), *[LENGTHS] * (len(header) - 1)])
     if not (cycle[0] >= 0 and (np.diff(cycle) > 0).all()):
         raise UsageError(
             "cycles do not ascend", where=str(path), remedy="give each reading once, in order"
@@ -80,11 +85,13 @@ def _read_sweep(folder: Path) -> Ensemble:
         greatest, swing = read_pressure(folder / run)
         late = deflection[cycle >= cycle[-1] / LATE]
         late = late[late > 0]
+        if not np.isfinite(greatest):
+            notes.append(f"{name}: its load is not known, nor its stiffness")
         found.append((int(seed), greatest, swing / late.mean() if late.size else np.nan))
     packing, pressure, bedding = np.array(found, float).reshape(-1, 3).T
     return align_beds(
         curves, str(folder), packing=packing.astype(int), pressure=pressure, bedding=bedding,
-        in_order=False, notes=tuple(notes),
+        in_order=False, notes=notes,
     )  # fmt: skip
 
 
@@ -104,6 +111,9 @@ def _read_curve(rows: Table, mine: Any) -> Floats:
         curve = np.array(cells, float).reshape(-1, 3).T
     except ValueError as error:
         raise UsageError(f"{error}", where=str(rows.path), remedy="sweep again") from None
+    if not np.isfinite(curve[:2]).all():
+        place = own.where(int(np.argmin(np.isfinite(curve[:2]).all(axis=0))))
+        raise UsageError("a settlement is not a finite number", where=place, remedy="sweep again")
     return np.asarray(curve[:, np.argsort(curve[0], kind="stable")])
 
 

@@ -12,7 +12,11 @@ from track_line.beds import SHORTEST_MEMORY
 from track_line.laws import get_law
 from track_line.measured.ensemble import Ensemble
 from track_line.measured.fit import BedFit, Estimate
+from trackbed.plausible import describe_implausible
 
+FOREVER = 1e3
+"""Memory of scatter that lasts, as `fit.share_kept` takes what is not known [m]: no bed settles a
+thousandth of it."""
 ENOUGH = 30
 """Packings from which on a correlation is known to +-0.3 at `fit.LEVEL`."""
 
@@ -22,16 +26,18 @@ def format_settings(fit: BedFit) -> list[str]:
 
     In place of the scene's law, which they replace.
     """
+    memory = FOREVER if isnan(fit.memory.value) else max(fit.memory.value, SHORTEST_MEMORY)
     law = {"a": fit.a, "b": fit.b.value, "m": fit.m.value, "force": fit.force}
     known = ", ".join(f"{name}={value:.4g}" for name, value in law.items() if isfinite(value))
     values = {
         "track.bed": fit.bed, "scatter.settlement": min(fit.settlement, 3.0),
         "scatter.stiffness": fit.stiffness.value, "scatter.together": fit.together.value,
-        "scatter.memory": max(fit.memory.value, SHORTEST_MEMORY),
+        "scatter.memory": min(memory, FOREVER),
         "scatter.length": fit.length.value,
     }  # fmt: skip
     settings = [f"{key}={value:.4g}" for key, value in values.items() if isfinite(value)]
-    return [f'law={{name="power", parameters={{{known}}}}}', *settings]
+    whole = f'law={{name="power", parameters={{{known}}}}}'
+    return settings if isnan(fit.b.value) else [whole, *settings]
 
 
 def summarise_fit(ensemble: Ensemble, fit: BedFit) -> dict[str, Any]:
@@ -78,6 +84,19 @@ def format_figures(figures: dict[str, Any]) -> str:
 def list_doubts(ensemble: Ensemble, fit: BedFit) -> Iterator[str]:
     """What of the table was left out, and what these beds can not know, a sentence each."""
     yield from ensemble.notes
+    deepest = float(abs(ensemble.settled).max())
+    if said := describe_implausible("settlement", deepest, "the deepest bed"):
+        yield said
+    if isnan(fit.b.value):
+        yield (
+            "the beds settle as the logarithm of cycles or slower, as no power law does: the "
+            "scene's own law remains"
+        )
+    elif (ensemble.cycle[-1] / ensemble.cycle[0]) ** fit.b.value < 2:
+        yield (
+            f"before its first reading at cycle {ensemble.cycle[0]:.3g} a bed settles more by this "
+            "law than was read in all: D1 hangs on what nobody saw"
+        )
     law, tried = get_law("power")(), ensemble.force
     if isnan(fit.force):
         yield "the load is not known: give that of half a sleeper as law.parameters.force"
@@ -98,7 +117,7 @@ def list_doubts(ensemble: Ensemble, fit: BedFit) -> Iterator[str]:
         yield (
             f"persistence is not shown: {latest.value:.2g} ({latest.low:.2g} to {latest.high:.2g}) "
             f"of {ensemble.packings} packings, where {ENOUGH} would do; D1 depends on it fivefold: "
-            "run with this scatter.memory and with one far longer than the settlement"
+            "run with a scatter.memory far below the settlement, and with one far above it"
         )
     if fit.rose:
         yield f"{fit.rose} beds rise in a window and are left out of its correlations"
