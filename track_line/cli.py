@@ -97,8 +97,7 @@ def _run(
     folder, manifest = RunFolder(path), make_manifest(file.tables.model_dump(mode="json"))
     manifest["beds"] = doubts
     given = {"resume": arguments.resume, "force": arguments.force}
-    finished = folder.look_ahead(manifest, **given)
-    if finished and finished.get("limit_m") == file.limit:
+    if finished := folder.look_ahead(manifest, **given):
         return finished | {"folder": str(path)}
     progress = Progress()
 

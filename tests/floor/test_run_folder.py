@@ -220,6 +220,12 @@ def test_an_empty_folder_is_taken_and_a_run_goes_on(tmp_path: Path) -> None:
     (tmp_path / "result.json").write_text('{"done": 1}')
     with pytest.raises(UsageError, match="is finished"):
         settle()
+    assert folder.look_ahead(manifest(title="another"), resume=True, force=False) == {"done": 1}
+    assert folder.look_ahead(manifest(title="a third"), resume=True, force=False) is None
+    assert settle(resume=True, title="another")
+    assert folder.summary
+    assert settle(resume=True, title="a third")
+    assert folder.summary is None  # what was found is not of these keys
     later = json.loads((tmp_path / "manifest.json").read_text()) | {"format": 2}
     (tmp_path / "manifest.json").write_text(json.dumps(later))
     with pytest.raises(UsageError, match="of format 2") as caught:

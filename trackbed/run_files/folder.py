@@ -181,17 +181,16 @@ class RunFolder:
         An empty folder is taken.  One with another scene's run, a finished run, or an unfinished
         run without ``resume``, raises `UsageError` and is left as it is, unless ``force``: then
         the run's own files are removed.  So does a folder with files of other people and no run,
-        always.  A run that goes on with other `free` keys gets their scene and manifest.
+        always.  A run that goes on with other `free` keys gets their scene and manifest, and has no
+        result until it has one for these.
         """
-        if goes_on := self._judge(manifest, resume=resume, force=force):
-            there = whole.read_object(self.path / MANIFEST) or {}
-            if all(there.get(part) == manifest.get(part) for part in self.compared):
-                return True
-        else:
-            with whole.refuse_writing(self.path):
-                for pattern in self.own:
-                    for path in self.path.glob(pattern):
-                        path.unlink()
+        goes_on = self._judge(manifest, resume=resume, force=force)
+        if goes_on and self._is_same(manifest):
+            return True
+        with whole.refuse_writing(self.path):
+            for pattern in (RESULT,) if goes_on else self.own:
+                for path in self.path.glob(pattern):
+                    path.unlink()
         whole.write_whole(self.path / "scene.toml", scene)
         content = {"format": FORMAT, **manifest}
         whole.write_whole(self.path / MANIFEST, json.dumps(content, indent=1) + "\n")
@@ -201,11 +200,17 @@ class RunFolder:
         self, manifest: Mapping[str, Any], *, resume: bool, force: bool
     ) -> dict[str, Any] | None:
         """Raise what `prepare` would, before anything is compiled; the summary of a run that would
-        go on and is finished."""
+        go on and is finished, with the same `free` keys."""
         if not self.path.exists():
             return None
         with self.lock():
-            return self.summary if self._judge(manifest, resume=resume, force=force) else None
+            goes_on = self._judge(manifest, resume=resume, force=force)
+            return self.summary if goes_on and self._is_same(manifest) else None
+
+    def _is_same(self, manifest: Mapping[str, Any]) -> bool:
+        """Whether the run that is there has the same keys, `free` ones too."""
+        there = whole.read_object(self.path / MANIFEST) or {}
+        return all(there.get(part) == manifest.get(part) for part in self.compared)
 
     def _judge(self, manifest: Mapping[str, Any], *, resume: bool, force: bool) -> bool:
         there = whole.read_object(self.path / MANIFEST)
