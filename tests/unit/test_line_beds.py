@@ -10,14 +10,18 @@ import numpy as np
 import pytest
 from scipy.integrate import dblquad
 from scipy.signal import lfilter
+from scipy.stats import chi2, t
 
 from track_line.beds import Beds, Scatter, renew_scores, spread_around_one
 from track_line.measured import fit_beds, read_beds
 from track_line.measured.fit import (
     estimate_variation,
     find_correlation,
+    find_ends,
+    find_length,
     find_likeness,
     find_memory,
+    fit_power,
     share_kept,
 )
 from trackbed.command import main
@@ -234,6 +238,44 @@ def test_a_logarithm_gives_no_law_and_beds_that_stop_no_memory(tmp_path, capsys)
     np.savetxt(path, table, delimiter=",", header=head, comments="")
     assert main(["line", "--beds", str(path)]) == 0
     assert "settles more by this law than was read in all" in capsys.readouterr().out
+
+
+def test_few_packings_count_once_and_windows_in_their_order(tmp_path):
+    """Four packings under three loads leave one degree of freedom for a correlation and three for a
+    variation, of 12 - 3 numbers; the memory is that of windows that were read; the
+    rate that may hide is the last window's gain over its cycles; b's interval is the jackknife's;
+    the deflection is the late one; neighbours of r = e^-1 are alike over their spacing."""
+    factor = draw_factors(4)
+    folder = write_sweep(tmp_path, factor, 23e3, 46e3, 92e3)
+    path = folder / "settlement.csv"
+    head, *rows = (one.split(",") for one in path.read_text().splitlines())
+    rows = [[*one[:3], "1.0", one[4]] if float(one[1]) < 900 else one for one in rows]
+    wild = np.random.default_rng(2).lognormal(sigma=0.2, size=(12, 3))
+    for place, row in enumerate(rows):  # gains of each decade by a factor of its own
+        decade, bed = min(int(np.log10(float(row[1]))), 3), place // len(CYCLES)
+        shift = 1e-4 * sum(wild[bed][: max(decade, 0)]) * float(row[1]) ** 0.2
+        row[2] = str(float(row[2]) + shift)
+    path.write_text("\n".join(map(",".join, [head, *rows])))
+    beds = read_beds(folder)
+    fit = fit_beds(beds)
+    gain = beds.settled[:, -1] - beds.settled[:, 0]
+    logs = np.concatenate([x - x.mean() for x in np.log(gain).reshape(3, 4)])
+    spread = (logs @ logs / 9) ** 0.5
+    assert fit.total.value == pytest.approx(np.expm1(spread**2) ** 0.5)
+    assert fit.total.high == pytest.approx(np.expm1(spread**2 * 3 / chi2.ppf(0.05, 3)) ** 0.5)
+    here = np.arange(8, 12)
+    last, middle, first = find_ends(beds)[:3]
+    late, early = -np.diff(beds.settled[here][:, [last, middle, first]].mean(axis=0))
+    memory = find_memory(fit.persistence[0].value, late, early)
+    assert fit.memory.value == pytest.approx(memory, rel=1e-6)
+    assert fit.unseen == pytest.approx(late / (beds.cycle[last] - beds.cycle[middle]))
+    cycle, settled = beds.cycle[beds.read], beds.settled[here][:, beds.read]
+    left = [fit_power(cycle, settled[np.delete(np.arange(4), i)].mean(axis=0))[2]
+            for i in range(4)]  # fmt: skip
+    error = (3 / 4 * ((np.array(left) - np.mean(left)) ** 2).sum()) ** 0.5
+    assert fit.b.high - fit.b.value == pytest.approx(t.ppf(0.95, 3) * error)
+    assert fit.bed == pytest.approx(46e3 * AREA / 50e-6 * (1 / factor).mean(), rel=1e-6)
+    assert find_length(np.exp(-1)) == pytest.approx(0.6)
 
 
 def test_a_sweep_with_holes_says_what_it_knows(tmp_path, capsys):
