@@ -14,9 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from adapters.bed import FloatArray
-from adapters.decks.engine import Adopted, format_run, run_deck
+from adapters.decks.engine import Adopted, format_run, list_inputs, run_deck
 from adapters.decks.states import States, read_states
-from trackbed.run_files import write_whole
+from adapters.errors import NotCredible
+from trackbed.run_files import digest_file, write_whole
 
 ROUND_OFF = 1e-6
 """Greatest difference over the longest way of a grain [-]: LAMMPS parts by the last digits, which
@@ -49,8 +50,9 @@ class Difference:
 
 
 def digest_deck(bed: Adopted) -> str:
-    """SHA-256 of what a deck computes."""
+    """SHA-256 of what a deck computes, and of the files that it reads."""
     text = format_run(bed, "whole", 1) + ("\n".join(bed.deck.lines) if bed.deck.is_script else "")
+    text += "".join(digest_file(bed.deck.path.parent / one) for one in list_inputs(bed.deck))
     return hashlib.sha256(text.encode(errors="surrogateescape")).hexdigest()
 
 
@@ -70,12 +72,18 @@ def is_checked(scene: Path, bed: Adopted) -> bool:
 def check_cut(bed: Adopted, folder: Path, cycles: int = 2) -> Difference:
     """Run ``cycles`` cycles both ways in ``folder`` and compare them.
 
-    Raises `EngineMissing`, `EngineFailed`, `NotCredible` where grains come or go.
+    Raises `EngineMissing`, `EngineFailed`, `NotCredible` where grains come or go, or lie still.
     """
     before = folder / "whole"
     before.mkdir()
     run_deck(bed, format_run(bed, "whole", cycles), before / "whole.in")
     one, ends = read_states(before, 0, cycles, bed), list[States]()
+    for cycle in range(1, cycles + 1):
+        if np.array_equal(one.position[cycle], one.position[cycle - 1]):
+            raise NotCredible(
+                f"no grain moves in cycle {cycle}", where=str(bed.deck.path),
+                remedy="put the marks around the commands that load the bed, whatever the step is",
+            )  # fmt: skip
     for cycle in range(cycles):
         window = folder / f"window_{cycle + 1}"
         window.mkdir()

@@ -22,6 +22,8 @@ from trackbed.run_files import write_whole
 COMPLETE = re.compile(r"^COMPLETE step \d+", re.MULTILINE)
 FAILED = re.compile(r"ERROR.* .|\w+(Error|Exception): ")
 """How a line begins that says why an engine, or a script in YADE, ends."""
+PLACE = re.compile(r'^ *File "(?!trackbed_)([^"/]+)", line (\d+)', re.MULTILINE)
+"""Where in a script an exception was raised: its file without a folder, unlike our own."""
 SILENT_S = 7200.0
 """Without a word in any file before an engine is ended [s], as of every engine here."""
 MEANT = {
@@ -31,6 +33,7 @@ MEANT = {
     "NameError": "of what stands above the cycle, a window has imports, functions and classes not "
     "inside of if or try, numbers, texts, vectors, arrays, bodies and lists of these: make other "
     "things between the marks, and give an engine a label",
+    "MagicMock": "yade.qt shows nothing here: leave its engines out",
     "reuse of fix ID": "a fix is made in each cycle: undo it above '# trackbed: end'",
 }
 """What an engine says, and what that means in a deck."""
@@ -64,7 +67,7 @@ def list_output_folders(deck: Deck) -> list[Path]:
     for word in (word for one in deck.commands for word in one.words[1:] if "/" in word):
         inner = Path(word).parent
         is_file = re.search(r"[.*]", Path(word).name) or (deck.path.parent / inner).is_dir()
-        if is_file and not inner.is_absolute() and not {"$", ".."} & {*str(inner), *inner.parts}:
+        if is_file and not inner.is_absolute() and not {"$", "..", " "} & {*str(inner), *inner.parts}:
             found.add(inner)
     return sorted(found)
 
@@ -85,7 +88,8 @@ def run_deck(bed: Adopted, text: str, path: Path) -> float:
     """
     folder, inputs = path.parent, list_inputs(bed.deck)
     if bed.deck.is_script:
-        path, inputs = path.with_suffix(".py"), [*inputs, Path(bed.deck.path.name)]
+        path = path.with_name(f"trackbed_{path.stem}.py")  # a user's may be called window.py
+        inputs = [*inputs, Path(bed.deck.path.name)]
         ours = folder / "yade_scripts"
         ours.mkdir(exist_ok=True)
         copy_deck(ours, ("__init__.py", "adopted.py", "record.py"), ours.name)
@@ -115,6 +119,10 @@ def explain_failure(status: int, text: str, deck: Path) -> EngineFailed:
     """The error for a deck that ended early, with the engine's own words."""
     lines = [line.strip() for line in text.splitlines() if line.strip()]
     said = [line for line in lines if FAILED.match(line)] or lines[-2:]
+    if status == 0:
+        said = ["the deck itself ends it, as by exit or quit, before its cycle is through"]
+    elif places := PLACE.findall(text):
+        said.append(f"{places[-1][0]}, line {places[-1][1]}")
     remedy = next((meaning for words, meaning in MEANT.items() if words in text), "")
     error = EngineFailed(
         f"the engine ended with status {status}: {' | '.join(said[-2:])}", where=str(deck),

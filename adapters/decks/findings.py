@@ -54,7 +54,7 @@ def find_outside(commands: Iterable[Command]) -> Iterator[Finding]:
     """Files that no run carries along."""
     for one in commands:
         for word in one.words[1:]:
-            if is_outside(word) and len(Path(word).parts) > 1:
+            if is_outside(word) and word.strip() not in ("/", ".."):
                 what = f"{word} lies outside of the folder of the deck, and is not carried along"
                 yield stop(one, what, "put it beside the deck, and name it so")
 

@@ -124,6 +124,7 @@ def read_lines(path: Path) -> list[str]:
     try:
         plain = path.is_file() or not path.exists()  # what is read from a pipe is not there again
         text = read_bounded(path, errors="surrogateescape") if plain else ""  # in any encoding
+        text = text.removeprefix("\ufeff")  # which editors of Windows put there
         reason = "" if plain and "\0" not in text else "it is no text file"
     except OSError as error:
         text, reason = "", error.strerror or str(error)

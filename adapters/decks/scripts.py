@@ -34,7 +34,7 @@ class Statement(Command):
         found = [type(self.node).__name__]
         for one in ast.walk(self.node):
             if isinstance(one, ast.Constant) and isinstance(one.value, str):
-                found.append(one.value)
+                found += [one.value] if one.value.isprintable() else []  # else it names no file
             elif isinstance(one, ast.Import | ast.ImportFrom):
                 names = (getattr(one, "module", None), *(name.name for name in one.names))
                 found += [f"{name}.py" for name in names if name]
@@ -64,7 +64,8 @@ def read_script(path: Path, lines: Sequence[str] | None = None) -> Deck:
     try:
         nodes = ast.parse("\n".join(lines), path.name).body
     except (SyntaxError, ValueError) as error:
-        raise UsageError(f"this is no script of YADE: {error}", where=str(path)) from error
+        what = "it is not in UTF-8" if isinstance(error, UnicodeError) else error
+        raise UsageError(f"this is no script of YADE: {what}", where=str(path)) from error
     for node in nodes:
         end = node.end_lineno or node.lineno
         if any(node.lineno < mark <= end for mark in marks or ()):

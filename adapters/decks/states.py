@@ -61,6 +61,8 @@ def read_states(folder: Path, first: int, last: int, bed: Adopted) -> States:
     read = read_scene_end if bed.deck.is_script else read_end
     ends = [read(folder, number, bed) for number in range(first, last + 1)]
     start, end = ends[0], ends[-1]
+    if not len(start.last):
+        raise NotCredible("there are no grains where the cycle begins", where=str(bed.deck.path))
     for number, one in enumerate(ends, first):
         if not np.array_equal(one.last[:, 0], start.last[:, 0]):
             raise NotCredible(

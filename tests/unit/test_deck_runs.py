@@ -15,7 +15,7 @@ import pytest
 
 from adapters.decks import run as decks
 from adapters.decks.adopt import adopt
-from adapters.decks.check import keep_check
+from adapters.decks.check import is_checked, keep_check
 from adapters.decks.jump import jump
 from adapters.decks.record import read_deck_record
 from adapters.decks.scene import load_deck_scene
@@ -285,4 +285,32 @@ def test_a_deck_that_was_never_checked_is_named(
         settle(tmp_path, total_cycles=6)
     copy.write_text(copy.read_text().replace("O.run(6)", "O.run()"))
     with pytest.raises(SceneError, match="never ends"):
+        settle(tmp_path, total_cycles=6)
+
+
+def test_what_a_deck_calls_after_cycles_stays(
+    bed: Bed, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Pictures and folders of the user's, beside states of ours, which go."""
+    run = bed.run
+
+    def draw(given: Any, text: str, path: Path) -> float:
+        (path.parent / "cycle_frames").mkdir()
+        (path.parent / "cycle_1.png").touch()
+        return run(given, text, path)
+
+    monkeypatch.setattr(bed, "run", draw)
+    window = settle(tmp_path, total_cycles=6).path / "window_000000"
+    assert [one.name for one in sorted(window.glob("cycle*"))] == ["cycle_1.png", "cycle_frames"]
+
+
+def test_a_file_that_the_deck_reads_is_part_of_it(bed: Bed, tmp_path: Path) -> None:
+    """Changed between two runs, nothing is gone on with, and the check counts no more."""
+    text = cut("O.run(5)", "import helpers\nplate = O.bodies[3]")
+    scene = adopt(write_script(tmp_path, text), "yade").scene
+    settle(tmp_path, total_cycles=6)
+    keep_check(scene, load_deck_scene(scene)[1])
+    scene.with_name("helpers.py").write_text("def pull(g):\n    return 0, 0, -2 * g\n")
+    assert not is_checked(scene, load_deck_scene(scene)[1])
+    with pytest.raises(SceneError, match="differs from the one this run was started with"):
         settle(tmp_path, total_cycles=6)

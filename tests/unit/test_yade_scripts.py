@@ -8,7 +8,7 @@ import pytest
 
 from adapters.decks.adopt import adopt
 from adapters.decks.detect import add_marks, find_obstacles, list_contents
-from adapters.decks.engine import list_inputs
+from adapters.decks.engine import explain_failure, list_inputs
 from adapters.decks.parse import BEGIN, END
 from adapters.decks.scripts import read_script
 from adapters.errors import UsageError
@@ -97,3 +97,41 @@ def test_scripts_that_can_not_be_cut_are_refused(
     with pytest.raises(UsageError, match=said):
         adopt(tmp_path / name, "yade")
     assert [one.name for one in tmp_path.iterdir()] == [name]
+
+
+@pytest.mark.parametrize("text", [
+    '"""See https://yade-dem.org/doc\nand others."""', f'"""{"A bed of mine " * 30}/ b."""',
+    "a = 'x\\0y/c.d'", "a = 'velocity [m/s]. see'",
+])  # fmt: skip
+def test_a_text_that_names_no_file_makes_no_folder(text: str, tmp_path: Path) -> None:
+    adoption = adopt(write_script(tmp_path, cut("O.run(5)", text)), "yade")
+    names = ["bed.py", "scene.toml"]
+    assert sorted(one.name for one in adoption.scene.parent.iterdir()) == names
+
+
+def test_a_file_outside_is_seen_in_a_text_with_values(tmp_path: Path) -> None:
+    """Its folder is a part of its own there; a division is none."""
+    deck = read_script(write_script(tmp_path, cut("O.run(5)\nopen(f'../{O.iter}.txt')")))
+    assert "../ lies outside" in str(find_obstacles(deck, "yade"))
+    deck = read_script(write_script(tmp_path, cut("O.run(5)\nprint(f'{a} / {b}')")))
+    assert find_obstacles(deck, "yade") == []
+
+
+def test_encodings_of_windows_are_read_or_named(tmp_path: Path) -> None:
+    """A byte order mark and ends of lines are; another encoding is not."""
+    path = write_script(tmp_path)
+    path.write_bytes(b"\xef\xbb\xbf" + cut("O.run(5)").replace("\n", "\r\n").encode())
+    assert adopt(path, "yade").deck.lines[0] == "from yade import pack"
+    path.write_bytes(b"# -*- coding: latin-1 -*-\n# f\xfcr\nO.run(5)\n")
+    with pytest.raises(UsageError, match="it is not in UTF-8"):
+        adopt(path, "yade")
+
+
+def test_where_a_script_ends_is_said() -> None:
+    """Its own line, not that of trackbed's; and an exit, which fails nothing."""
+    text = (
+        '  File "trackbed_window.py", line 7, in <module>\n  File "bed.py", line 18, in <module>\n'
+        '  File "/a/yade_scripts/adopted.py", line 9, in pack\nIndexError: list index\n'
+    )
+    assert "IndexError: list index | bed.py, line 18" in explain_failure(1, text, Path("b")).what
+    assert "as by exit or quit" in explain_failure(0, "Running script\n", Path("b")).what
