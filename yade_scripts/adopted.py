@@ -10,9 +10,11 @@ Called by the scripts that ``trackbed adopt`` and ``trackbed run`` write.
 import ast
 import json
 import os
+import random
 import sys
 import tokenize
 from contextlib import suppress
+from types import FunctionType
 from unittest.mock import MagicMock
 
 import numpy as np
@@ -26,8 +28,10 @@ DECLARED = (ast.Import, ast.ImportFrom, ast.FunctionDef, ast.ClassDef)
 """Statements above the cycle that a window executes again."""
 TAG = "trackbed"
 """Under which a saved scene holds the script's variables."""
-PLOTTED = "plot.data"
-"""Among them, what the script gathers to plot."""
+PLOTTED = ("data", "plots", "labels")
+"""Of YADE's module plot, what a scene does not hold."""
+RANDOM, LOST = "random.states", "names.lost"
+"""Where random numbers go on, and names of what no window can have; no variables have a dot."""
 VECTORS = {name: getattr(yade, name) for name in ("Vector2", "Vector3", "Quaternion")}
 
 
@@ -47,16 +51,23 @@ def run(kind, script, marks, cycles, loaded, names):
     cycle = build([one for one in statements if first < one.lineno < last], script)
     if kind == "window":
         values = load_values()
-        names |= {name: value for name, value in values.items() if not isinstance(value, list)}
+        held = {key: values.pop(key) for key in [*values] if "." in key}
+        for name in held.pop(LOST):  # else it would be what YADE calls so
+            names.pop(name, None)
+        names |= values  # which defaults of functions may be
         for one in before:
             if isinstance(one, DECLARED):
                 with suppress(ImportError):  # of modules that YADE made of what is carried
                     exec(build([one], script), names)
-        names |= {name: unpack(value) for name, value in values.items()}
+        names |= values
+        restore_held(held, names)
         move_grains(list_loaded(loaded, names))
     else:
         exec(build(before, script), names)
         O.wait()
+        pulls = [one.gravity for one in O.engines if isinstance(one, wrapper.NewtonIntegrator)]
+        if any(pull[0] or pull[1] or pull[2] > 0 for pull in pulls):
+            sys.exit("ERROR: gravity is not along -z, where settlement is: turn the script")
         write_state(0, loaded, names, given)
     for number in range(1, cycles + 1):
         exec(cycle, names)
@@ -107,12 +118,34 @@ def unpack(value):
 
 
 def load_values():
-    """Load ``cycle_0.restart``; the values of the script's variables that it holds."""
+    """Load ``cycle_0.restart``; the values by name, of variables and with a dot of `list_held`."""
     load_scene("cycle_0.restart")
     values = json.loads(bytes.fromhex(O.tags[TAG]))
     O.tags[TAG] = ""
-    plot.data |= unpack(values.pop(PLOTTED))
-    return values
+    return {name: unpack(value) for name, value in values.items()}
+
+
+def list_held(names):
+    """What modules, and functions and classes of ``names``, hold: (name with a dot, value)."""
+    yield from ((f"plot.{key}", {**vars(plot)[key]}) for key in PLOTTED)
+    yield RANDOM, [random.getstate(), np.random.get_state()]  # noqa: NPY002  the script's own
+    for name, one in names.items():
+        if isinstance(one, (FunctionType, type)) and one.__module__ == "__main__":
+            own = [key for key in vars(one) if not key.startswith("__")]
+            own += ["__defaults__"] * isinstance(one, FunctionType)
+            yield from ((f"{name}.{key}", getattr(one, key)) for key in own)
+
+
+def restore_held(held, names):
+    """Give back what `list_held` found."""
+    for key in PLOTTED:
+        vars(plot)[key].update(held.pop(f"plot.{key}", {}))
+    for state, restore in zip(held.pop(RANDOM), (random.setstate, np.random.set_state)):
+        restore(state)
+    for key, value in held.items():
+        name, _, inner = key.partition(".")
+        if name in names:  # else what wants it ends with its name
+            setattr(names[name], inner, value)
 
 
 def list_loaded(loaded, names):
@@ -180,11 +213,14 @@ def write_state(number, loaded, names, given):
         velocity=[split_vector(one.vel) for one in states],
         height=np.mean([one.state.pos[2] for one in bodies]) if bodies else np.nan,
     )
-    values = {PLOTTED: pack({**plot.data})}
-    for name, value in names.items():
-        if name not in given or value is not given[name]:
-            with suppress(TypeError):  # what a cycle misses then, ends it
-                values[name] = pack(value)
+    own = {name: one for name, one in names.items() if name not in given or one is not given[name]}
+    values, lost = {}, []
+    for name, value in (*own.items(), *list_held(own)):
+        try:
+            values[name] = pack(value)
+        except TypeError:  # what a cycle misses then, ends it
+            lost.append(name)
+    values[LOST] = pack(lost)
     O.tags[TAG] = json.dumps(values).encode().hex()
     write_scene(f"cycle_{number}.restart")
     O.tags[TAG] = ""

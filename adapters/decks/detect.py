@@ -60,7 +60,7 @@ PATTERNS = (
     ("cycle", r"(?:create_box|read_data|read_restart|clear|create_atoms|reset_timestep)(?!\S)",
      "stops", "'{all}' inside the cycle begins another bed", f"put it above '{BEGIN}'"),
     ("cycle", r"if ", "note", "'{all}': every cycle must take the same branch", ""),
-    ("before", rf"if .*{DECLARED}", "stops",
+    ("before", rf"if .*(?:{DECLARED}|\b(?:variable|timestep|neighbor)\s)", "stops",
      "'{all}' declares something or not: a window can not know which",
      "write the command that it comes to, without if"),
     ("both", r"if .*\binclude\s", "stops",
@@ -203,14 +203,23 @@ def find_branches(deck: Deck, engine: str) -> Iterator[Finding]:
             what = f"'{one.short}' leaves the cycle"
             yield stop(one, what, f"put '{END}' above this loop's next and jump")
     around = {one.word(1): n for n, one in enumerate(deck.before) if one.name == "label"}
-    turned = {name for one in deck.after if one.name == "next" for name in one.words[1:]}
+    turned = {name for one in deck.commands if one.name == "next" for name in one.words[1:]}
+    turned -= {one.word(1) for one in deck.cycle if one.name == "variable"}
     for one in deck.after:
         if one.name == "jump" and one.word(2) in around:
             what = f"the loop {one.word(2)} around the cycle is left out: trackbed counts cycles"
             yield note(one, what)
-    for one in (*list_live(deck.before), *deck.cycle):
-        for name in sorted(turned & one.substituted()):
-            what = f"${{{name}}} in '{one.short}' keeps its first value: its loop is left out"
+    used = (*list_live(deck.before), *deck.cycle)
+    reads = {one: one.substituted() | {*re.findall(r"\bv_(\w+)", one.text)} for one in used}
+    wanted = set[str]().union(*reads.values())  # what only made the bed is wanted no more
+    first = {one.word(1): one for one in deck.cycle[::-1] if one.name == "variable"}
+    for one, read in reads.items():
+        idle = one.name == "variable" and one.word(1) not in wanted
+        for name in sorted(turned & read) if not idle else ():
+            what = f"${{{name}}} in '{one.short}' keeps its first value: no window repeats next"
+            yield stop(one, what, "a cycle that is the same in each turn")
+        if one in first.values() and one.word(1) in read:
+            what = f"'{one.short}' goes on from cycle to cycle, and begins again in each window"
             yield stop(one, what, "a cycle that is the same in each turn")
     for number, one in enumerate(deck.before):
         for label in re.findall(r"\bjump SELF (\w+)", one.text):

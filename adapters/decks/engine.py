@@ -11,7 +11,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
 
-from adapters.decks.parse import VARIABLE, Deck, is_outside
+from adapters.decks.parse import VARIABLE, Deck, is_outside, list_included
 from adapters.decks.scripts import format_script
 from adapters.decks.split import format_prepare, format_whole, format_window
 from adapters.engines import copy_deck, get_engine, run_process
@@ -52,7 +52,8 @@ class Adopted:
 
 def list_inputs(deck: Deck) -> list[Path]:
     """Files that a deck names, from its folder: meshes, data, tables, included decks."""
-    found = {Path(one.file) for one in deck.commands} - {Path(deck.path.name)}
+    included = () if deck.is_script else list_included(deck.lines, deck.path.parent)
+    found = {Path(one) for one in included}
     for word in (word for one in deck.commands for word in one.words[1:]):
         if re.search(r"[./]", word) and not is_outside(word):
             pattern = VARIABLE.sub("*", word) if "$" in word else glob.escape(word)
@@ -67,7 +68,8 @@ def list_output_folders(deck: Deck) -> list[Path]:
     for word in (word for one in deck.commands for word in one.words[1:] if "/" in word):
         inner = Path(word).parent
         is_file = re.search(r"[.*]", Path(word).name) or (deck.path.parent / inner).is_dir()
-        if is_file and not inner.is_absolute() and not {"$", "..", " "} & {*str(inner), *inner.parts}:
+        no_folder = {"$", "..", " "} & {*str(inner), *inner.parts}
+        if is_file and not (inner.is_absolute() or no_folder):
             found.add(inner)
     return sorted(found)
 

@@ -176,6 +176,14 @@ def join_lines(lines: Sequence[str], file: str) -> Iterator[Command]:
         text = ""
 
 
+def list_included(lines: Sequence[str], folder: Path) -> Iterator[str]:
+    """Names of the files that lines include, and that these include; `read_deck` refuses others."""
+    for one in join_lines(lines, ""):
+        if one.name == "include":
+            yield one.word(1)
+            yield from list_included(read_lines(folder / one.word(1)), folder)
+
+
 def is_outside(name: str) -> bool:
     """Whether a file of this name lies outside of its deck's folder, wherever that is."""
     return Path(name).is_absolute() or ".." in Path(name).parts

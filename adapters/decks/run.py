@@ -8,6 +8,7 @@ bed is not relaxed: its healing cycles bring the overlaps back.
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import sys
 import time
@@ -49,8 +50,6 @@ TRIES = 3
 CALM = 10.0
 """Kinetic energy behind a jump and its healing over the greatest at cycle ends before it [-]: a
 jump that throws the bed apart leaves thousands of times as much, a calm one about as much."""
-OURS = ("restart", "dump", "npz")
-"""Endings of what a window leaves at the end of each cycle."""
 PRESSED = 0.1
 """By how much a jump may deepen the greatest overlap of two grains, over the least radius [-]."""
 
@@ -261,9 +260,9 @@ def finish(
     """Keep the states and the last restart file of a stage, and say how far the run is."""
     save_states(states, folder / "states.npz")
     (folder / f"cycle_{len(rows)}.restart").rename(folder / "end.restart")
-    for one in OURS:  # a deck may call files of its own after cycles
-        for number in range(len(rows) + 1):
-            (folder / f"cycle_{number}.{one}").unlink(missing_ok=True)
+    for one in folder.glob("cycle_*"):
+        if re.fullmatch(r"cycle_\d+\.(restart|dump|npz)", one.name):  # else it is the deck's own
+            one.unlink()
     cost = {"engine": engine_s, "other": time.process_time() - started}
     stage, last = folder.name.partition("_")[0], place.cycle + len(rows)
     run.folder.finish(folder, Outcome(stage, place.cycle, last, rows, cost))

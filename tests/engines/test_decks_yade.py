@@ -15,6 +15,7 @@ from adapters.decks.engine import format_run, run_deck
 from adapters.decks.parse import BEGIN, END
 from adapters.decks.scene import load_deck_scene
 from adapters.decks.states import read_states
+from adapters.errors import NotCredible
 from adapters.files import RunFolder
 from tests import own_decks
 from tests.unit.test_yade_scripts import write_script
@@ -118,6 +119,10 @@ def test_a_script_is_run_with_jumps_and_a_full_run_beside_it(
     ("top = max", "packed = pack.SpherePack()\ntop = max", "name 'packed' is not defined"),
     ("def count():", "if True:\n  def count():", "name 'count' is not defined"),
     ("plate = O.bodies[O", "plate = [*O.bodies][:0] or None and O.bodies[O", "plate holds no body"),
+    ("gravity=(0, 0, -9.81)", "gravity=Vector3(0, -9.81, 0)", "gravity is not along -z"),
+    ("def count():", "log = open('a', 'w')\ndef count():\n    log.write('a')",
+     "name 'log' is not defined"),  # nor taken for the function of that name
+    ("wallMask=31))", "wallMask=31))\nexit()", "as by exit or quit"),
     ("plate = O.b", "O.bodies.append(box((1, 1, 1), (1, 1, 1)))\nO.bodies[-1].dynamic = True\n"
      "plate = O.b", "a Box, moves by itself"),
 ])  # fmt: skip
@@ -131,3 +136,47 @@ def test_what_no_window_can_have_is_named(
     path = write_script(tmp_path, text.replace(old, new, 1))
     assert command.main(["adopt", str(path), "--engine", "yade", "--check"]) == 5
     assert said in capsys.readouterr().err
+
+
+STATE = """
+import random
+random.seed(3)
+class Load:
+    turns = 0
+down = Vector3(0, 0, -30)
+def pull_down(a=down, seen=[]):
+    seen.append(1)
+    pull_down.called = len(seen)
+    return a * len(seen) - Vector3(0, 0, random.random())
+down = None
+plot.plots = {"i": ("i",)}
+"""
+CHANGED = """
+Load.turns += 1
+newton.gravity = pull_down()
+assert Load.turns == pull_down.called
+plot.plot(noShow=True).savefig("cycle_plot.png")
+"""
+
+
+def test_what_functions_classes_and_random_numbers_hold_goes_on(tmp_path: Path) -> None:
+    """As in one process, to the last digits, in a script of the name that its window would have."""
+    before, mark, cycle = own_decks.YADE.replace("O.run(20000)", "O.run(600)").partition(BEGIN)
+    cycle = cycle.replace("newton.gravity = helpers.pull(weight)", CHANGED)
+    path = write_script(tmp_path, before + STATE + mark + cycle).rename(tmp_path / "window.py")
+    found = check_cut(load_deck_scene(adopt(path, "yade").scene)[1], tmp_path)
+    assert found.place.max() < 1e-9 * found.path.max()
+
+
+@pytest.mark.parametrize(("text", "said"), [
+    ("O.run(9, True)", "there are no grains"),
+    (f"O.bodies.append(sphere((0, 0, 0), 1))\n{BEGIN}\nwhile O.iter < 9: O.run(9, True)\n{END}",
+     "no grain moves in cycle 2"),
+])  # fmt: skip
+def test_a_bed_that_is_not_there_or_lies_still_is_named(
+    text: str, said: str, tmp_path: Path
+) -> None:
+    head = "O.engines = [ForceResetter(), NewtonIntegrator(gravity=(0, 0, -9.81))]\nO.dt = 1e-5\n"
+    bed = load_deck_scene(adopt(write_script(tmp_path, head + text), "yade").scene)[1]
+    with pytest.raises(NotCredible, match=said):
+        check_cut(bed, tmp_path)

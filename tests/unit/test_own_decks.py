@@ -65,6 +65,23 @@ def test_a_deck_is_cut_at_its_marks_with_its_includes(tmp_path: Path) -> None:
     assert list_output_folders(deck) == [Path("post")]
 
 
+def test_files_that_only_include_others_go_along(tmp_path: Path) -> None:
+    """And empty ones: the copy is the same deck."""
+    (tmp_path / "one.in").write_text("# mine\ninclude two.in\n")
+    (tmp_path / "two.in").write_text("# nothing\n")
+    adoption = adopt(write_deck(tmp_path, own_decks.LIGGGHTS + "include one.in\n"), "liggghts")
+    names = {one.name for one in adoption.scene.parent.glob("*.in")}
+    assert names == {"walls.in", "one.in", "two.in"}
+
+
+def test_loops_that_begin_again_or_made_the_bed_are_no_obstacles(tmp_path: Path) -> None:
+    """Inside of the cycle, in a window as in one process; and above it."""
+    cycle = "variable n equal 1\nvariable n equal $n+1\nvariable k loop 2\n"
+    cycle += "label in\nrun $k\nnext k\njump SELF in"
+    bed = cycle.replace("run $k", "variable x equal 2*$k\ncreate_atoms 1 single 0 0 $x")
+    assert find_obstacles(read_text(tmp_path, cut(bed.replace("k", "m"), cycle)), "lammps") == []
+
+
 def test_a_window_repeats_what_the_restart_file_does_not_hold(tmp_path: Path) -> None:
     """Header, restart file, then live declarations: nothing that made the bed, nothing undone."""
     deck = read_deck(write_deck(tmp_path))
@@ -169,6 +186,14 @@ OBSTACLES = {
     "loop variable": ("lammps", cut("variable c loop 9\nlabel out", "fix g all gravity ${c}\n"
                                     "run 5\nunfix g", "next c\njump SELF out"),
                       "stops", "${c} in 'fix g all gravity ${c}' keeps its first value"),
+    "next above": ("lammps", cut("variable c index 1 2\nnext c\nfix g all gravity v_c"),
+                   "stops", "${c} in 'fix g all gravity v_c' keeps its first value"),
+    "next inside": ("lammps", cut("variable c index 1 2", "fix g all gravity ${c}\nrun 5\nnext c\n"
+                                  "unfix g"), "stops", "no window repeats next"),
+    "count": ("lammps", cut("variable n equal 0", "variable n equal ${n}+1\nrun 5"),
+              "stops", "begins again in each window"),
+    "variable in if": ("lammps", cut('if "1 > 0" then "variable n equal 1"'),
+                       "stops", "without if"),
     "made in a loop": ("lammps", cut("variable c loop 9\nlabel up\nfix g all gravity 1\nnext c\n"
                                      "jump SELF up"), "stops", "is made in a loop"),
     "jumped over": ("lammps", cut('if "1 > 0" then "jump SELF on"\nfix g all gravity 1\n'
