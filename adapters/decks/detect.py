@@ -212,13 +212,13 @@ def find_branches(deck: Deck, engine: str) -> Iterator[Finding]:
     used = (*list_live(deck.before), *deck.cycle)
     reads = {one: one.substituted() | {*re.findall(r"\bv_(\w+)", one.text)} for one in used}
     wanted = set[str]().union(*reads.values())  # what only made the bed is wanted no more
-    first = {one.word(1): one for one in deck.cycle[::-1] if one.name == "variable"}
+    earliest = {one.word(1): one for one in deck.cycle[::-1] if one.name == "variable"}
     for one, read in reads.items():
         idle = one.name == "variable" and one.word(1) not in wanted
         for name in sorted(turned & read) if not idle else ():
             what = f"${{{name}}} in '{one.short}' keeps its first value: no window repeats next"
             yield stop(one, what, "a cycle that is the same in each turn")
-        if one in first.values() and one.word(1) in read:
+        if one in earliest.values() and one.word(1) in read:
             what = f"'{one.short}' goes on from cycle to cycle, and begins again in each window"
             yield stop(one, what, "a cycle that is the same in each turn")
     for number, one in enumerate(deck.before):
