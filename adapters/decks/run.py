@@ -217,7 +217,8 @@ def jump_bed(run: DeckRun, place: Place, h: int, name: str) -> Place:
         first = place.cycle + 1 - len(seen)
         target = jump(seen, h, states.radius, law=p.law, move=p.move, first_cycle=first)
         before = make_state(states, -1, place.cycle)
-        like: Any = SimpleNamespace(procedure=p, folder=run.folder)  # what forecasts ask of a run
+        # what forecasts ask of a run
+        like: Any = SimpleNamespace(procedure=p, folder=run.folder, first_cycle=0)
         at: Any = place
         if p.settlement == "history":
             gain = estimate_gain(like, at, h, run.folder.outcomes(), SLOPES)
