@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from statistics import median
@@ -12,7 +11,7 @@ from validation.study import describe_commits, format_table
 
 LOOKS = {
     "time-stepping": ("o", "#0072B2"), "acceleration": ("s", "#56B4E9"),
-    "MuJoCo": ("^", "#D55E00"), "ODE": ("v", "#009E73"), "LMGC90": ("D", "#CC79A7"),
+    "MuJoCo": ("^", "#D55E00"),
 }  # fmt: skip
 """Mark and colour of each engine; colours of Okabe and Ito, which the colour-blind tell apart."""
 TITLES = {
@@ -39,7 +38,6 @@ def describe(rows: Sequence[Row]) -> dict[str, str]:
         "bars.",
         "ENGINES": _tabulate_engines(lines),
         "CASES": _tabulate_families(rows),
-        "ABSENT": _list_absent(lines),
         "COMMITS": describe_commits(row["origin"]["commit"] for row in rows),
     }
 
@@ -74,12 +72,6 @@ def _tabulate_families(rows: Sequence[Row]) -> str:
             cells.append(f"{sum(own)} of {len(own)}" if own else "")
         table.append([*cells, f"{margin:.2g}"])
     return format_table(("family", "cases", *LOOKS, "margin"), table)
-
-
-def _list_absent(lines: Sequence[Row]) -> str:
-    reasons = Counter((_name(line), line["why"]) for line in lines
-                      if line["peer"] and line["steps"] == 0)  # fmt: skip
-    return "\n".join(f"- {name}, {count}: {why}" for (name, why), count in reasons.items())
 
 
 def draw(rows: Sequence[Row], picture: Path) -> None:

@@ -1,8 +1,4 @@
-"""The trials, family by family.
-
-MuJoCo, ODE and LMGC90 were run once on the scenes that are judged by a displacement; what ran them
-is `git show 6035ef5:validation/rigid_scene_worker.py`.  Measured again, a family keeps their rows.
-"""
+"""The trials, family by family; MuJoCo runs those that are judged by a displacement."""
 
 from __future__ import annotations
 
@@ -21,11 +17,12 @@ from rigid_lcp.scene.simulation import Method, Simulation
 from validation.bench.rigid import hard_scenes as hard
 from validation.bench.rigid import scenes
 from validation.bench.rigid.rest_limit import find_arch_limit
-from validation.study import find_record, read_record
+from validation.studies.rigid_hard_cases.rival import move_in_mujoco
 
 Floats = NDArray[np.float64]
 Row = dict[str, Any]
 BOTH: tuple[Method, ...] = ("time-stepping", "acceleration")
+RIVAL = "MuJoCo"
 RESTS = "rests"
 SLIDES = 1e-12
 """Speed after one step above which a pair of cards slides [m/s]; exact ones rest at 1e-17."""
@@ -92,10 +89,24 @@ def try_ours(trial: Trial, method: Method) -> Row:
     return judge(trial.case, trial.answer, "off", trial.bar, method, run_trial, "m")
 
 
+def try_rival(trial: Trial) -> Row:
+    """A trial by MuJoCo, its cost that of the steps alone."""
+    cost = 0.0
+
+    def run_trial() -> tuple[float, int]:
+        nonlocal cost
+        moved, steps, cost = move_in_mujoco(trial.build(), trial.seconds)
+        return trial.off(moved), steps
+
+    row = judge(trial.case, trial.answer, "off", trial.bar, RIVAL, run_trial, "m")
+    return row | {"peer": True, "cpu_s": float(f"{cost:.3g}")}
+
+
 def try_all(trials: Sequence[Trial]) -> Iterator[Row]:
-    """Every trial by its methods."""
+    """Every trial by its methods, and by MuJoCo."""
     for trial in trials:
         yield from (try_ours(trial, method) for method in trial.methods)
+        yield try_rival(trial)
 
 
 def try_inclines() -> Iterator[Row]:
@@ -328,10 +339,7 @@ def measure(family: str) -> Row:
     scenes.stack(3).advance(2e-3)
     scenes.tilt_block(0.1, 0.5, method="acceleration").advance(2e-3)
     hard.incline_in_space(0.1, 0.9, 0.5).advance(2e-3)
-    ours = list(FAMILIES[family]())
-    path = find_record("rigid-hard-cases")
-    known = [row for row in (read_record(path) if path.exists() else []) if row["part"] == family]
-    return {"rows": ours + [row for part in known for row in part["rows"] if row["peer"]]}
+    return {"rows": list(FAMILIES[family]())}
 
 
 PARTS: dict[str, Callable[[], Row]] = {name: partial(measure, name) for name in FAMILIES}
