@@ -12,9 +12,8 @@ from adapters.bed import contact_law
 from adapters.bed.radii import draw_radii
 from adapters.bed.sample import GRAVITY, draw_sample_start, measure_bed_height
 from adapters.bed.state import FloatArray
-from adapters.engines.lammps import LammpsEngine
 from adapters.errors import NotCredible
-from validation.studies.engines.packing import WAYS, Way, change_law, load_bed, measure, run_way
+from validation.studies.engines.packing import Way, load_bed, measure, run_way
 from validation.studies.engines.speed import MIRROR, SIDE, check_end, load_tiles, mirror_tiles
 
 pytestmark = pytest.mark.studies
@@ -58,17 +57,6 @@ def test_density_and_coordination_are_those_of_the_positions(tmp_path: Path) -> 
     assert figures.settlement == 0
     top = 0.9 * measure_bed_height(apart, radius)
     assert figures.density < 4 / 3 * np.pi * np.sum(radius**3) / (scene.container.area * top)
-
-
-@pytest.mark.parametrize("way", [w for w in WAYS if not w.pulls], ids=lambda w: w.name)
-def test_a_way_without_pull_says_so_to_every_contact(way: Way, tmp_path: Path) -> None:
-    scene = way.scene(1)
-    start, radius = start_of(way)
-    LammpsEngine().write_preparation(scene, start, radius, 0.2, tmp_path)
-    change_law(way, tmp_path)
-    laws = [line for line in (tmp_path / "scene.in").read_text().splitlines() if "hertz" in line]
-    assert len(laws) >= 4
-    assert all("limit_damping" in line for line in laws)
 
 
 def test_beds_differ_by_their_seed_alone() -> None:

@@ -15,9 +15,7 @@ what in it?  What does a step cost on LIGGGHTS, LAMMPS and YADE?
   called real when the interval at 0.05/9 excludes zero: three pairs of engines times three
   figures (settlement, coordination number, relative density);
 * noise: LIGGGHTS against itself with one grain 1e-9 m aside: no two engines can be distinguished by
-  less than what this twin strays;
-* what a gap comes from: one setting is changed at a time.  Nothing is added, dropped or run again
-  because of what it gave;
+  less than what this twin strays.  No run is added, dropped or run again because of what it gave;
 * twice the time step (``fast``): settlement, stiffness under the piston and the energy that a cycle
   loses, on all eight beds and each engine beside the usual step.
 

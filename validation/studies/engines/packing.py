@@ -17,7 +17,6 @@ from adapters.bed.sample import (
 )
 from adapters.bed.state import FloatArray
 from adapters.engines.contract import Engine, EngineStart, get_engine
-from adapters.engines.lammps_decks import TANGENTIAL
 from adapters.files.window import Window, read_state, read_window
 from adapters.procedure.checks import check_state, check_window
 from adapters.scene.file import load_scene
@@ -30,9 +29,6 @@ TWIN = 1e-9
 
 LAST = 10
 """Cycle ends at the end of a run over which coordination number and density are averaged."""
-
-NO_PULL = ("damping coeff_restitution", "damping coeff_restitution limit_damping")
-"""Words of LAMMPS' decks, and those with which no contact pulls."""
 
 FAST = ('engine.rayleigh_share="fast"',)
 """Twice the time step, as `trackbed run --fast` has it."""
@@ -48,10 +44,6 @@ class Way:
     engine: str
     settings: tuple[str, ...] = ()
     """Keys of the scene that differ."""
-    rule: str = ""
-    """LAMMPS' tangential rule; empty for the engine's own."""
-    pulls: bool = True
-    """False: contacts end where their force turns to tension, as YADE's always do (LAMMPS)."""
     aside: float = 0.0
     """By how much the first grain starts aside [m]."""
 
@@ -68,19 +60,12 @@ WAYS = (
     Way("liggghts", "liggghts"),
     Way("lammps", "lammps"),
     Way("yade", "yade"),
-    Way("lammps, mindlin", "lammps", rule="mindlin"),
-    Way("lammps, mindlin/force", "lammps", rule="mindlin/force"),
     Way("liggghts, twin", "liggghts", aside=TWIN),
-    Way("liggghts, half the step", "liggghts", ("engine.rayleigh_share=0.1",)),
-    Way("liggghts, walls as grains", "liggghts", ("material.wall.young=1e9",)),
-    Way("liggghts, piston of 0.1 kg", "liggghts", ("loading.piston_mass=0.1",)),
-    Way("lammps, mindlin/force, no pull", "lammps", rule="mindlin/force", pulls=False),
-    Way("yade, rebound e", "yade", ("material.grain.restitution=0.2145",)),
     Way("liggghts, fast", "liggghts", FAST),
     Way("lammps, fast", "lammps", FAST),
     Way("yade, fast", "yade", FAST),
 )
-"""The three engines, then one setting at a time."""
+"""The three engines, the twin, twice the time step."""
 
 
 @dataclass(frozen=True)
@@ -171,29 +156,15 @@ def run_way(
         made.mkdir(parents=True)
     top = float((position[:, 2] + radius).max())
     decks = engine.write_preparation(scene, position, radius, top, settled)
-    change_law(way, settled)
     rest = engine.run(scene, "in.prepare", settled, lambda: None, decks)
     state = read_state(settled, engine.wall_names(scene, piston=False))
     check_state(scene, state)
     face = float((state.position[:, 2] + radius).max())
     begin = EngineStart(settled / "end.restart", state.time_step, 0, face, first=True)
     decks = engine.write_cycles(scene, begin, cycles, loaded)
-    change_law(way, loaded)
     done = engine.run(scene, "in.cycles", loaded, lambda: None, decks)
     window = read_window(loaded, 0, engine.wall_names(scene, piston=True), face)
     check_window(scene, window, cycles)
     common = load_bed(seed, 'engine.name="liggghts"')
     figures = measure(window, start, common if way.engine == "yade" else scene)
     return figures, rest.cpu_s + done.cpu_s
-
-
-def change_law(way: Way, folder: Path) -> None:
-    """Have every contact of a way's decks keep its rule, and pull or not, where the way says so."""
-    changes = [(TANGENTIAL, way.rule)] * bool(way.rule) + [NO_PULL] * (not way.pulls)
-    for old, new in changes:
-        edited = 0
-        for path in folder.glob("*.in"):
-            text = path.read_text()
-            edited += text.count(old)
-            path.write_text(text.replace(old, new))
-        assert edited, f"no contact law in {folder}"
