@@ -16,9 +16,11 @@ from validation.studies.rigid_solvers.run import (
     BUDGET_S,
     CLARABEL,
     HYBRID,
+    LARGE,
     OSQP,
     OURS,
     SEEDS,
+    SMALL_S,
     YIELD_S,
 )
 from validation.study import describe_commits, format_table
@@ -43,7 +45,7 @@ def describe(rows: Sequence[Row]) -> dict[str, str]:
         "EXAMINED": _tabulate_examined(rows),
         "UNSOLVED": _list_unsolved(rows),
         "BUDGETS": ", ".join(f"{seconds:g} s ({name})" for name, seconds in BUDGET_S.items())
-        + f"; near yield {YIELD_S:g} s",
+        + f"; near yield {YIELD_S:g} s, Siconos below {LARGE} contacts {SMALL_S:g} s",
         "COMMITS": describe_commits(row["origin"]["commit"] for row in rows),
     }
 
