@@ -2,7 +2,7 @@
 
 Question: Schwager and Poeschel (2002, section 10) expect that rigid grains may take steps of 1e-3 s
 where Molecular Dynamics needs 1e-7 s, and that both cost the same in the end for ballast.  Do they,
-at equal error of the residual settlement after five load cycles?  Does the step matter in space?
+at equal error of the residual settlement after five load cycles?
 Answer: rigid steps of 1 ms cost what soft grains of 1e9 N/m do, with 500 times fewer steps; but the
 two limits differ by half of their mean, so that smaller errors cannot be distinguished from noise.
 
@@ -11,7 +11,6 @@ out, poured and tamped once by rigid grains; every method starts from that state
 under the least load and five cycles.  Reference of a level: the mean of the finest level of each
 method, bed by bed; a finest level is judged by the other.  Error: mean over the beds of the
 difference to the reference over the reference's mean, with Student's interval of paired beds.
-In space: ten samples of ``sleeper-3d.toml``, rigid grains at three steps, six cycles.
 """
 
 ROOMS = "rigid_lcp: collision contact friction motion shapes"

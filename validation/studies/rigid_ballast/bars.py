@@ -38,7 +38,7 @@ class Summary:
 
 def list_runs(rows: Sequence[Row], level: Level) -> list[Row]:
     """Runs of a level, bed after bed."""
-    return [row["runs"][level.name] for row in rows if "runs" in row]
+    return [row["runs"][level.name] for row in rows]
 
 
 def list_ends(rows: Sequence[Row], method: str) -> Floats:

@@ -9,7 +9,6 @@ import numpy as np
 
 from validation.studies.rigid_ballast.bars import Summary, list_ends, list_runs, summarise
 from validation.studies.rigid_ballast.run import Row
-from validation.studies.rigid_ballast.space import CYCLES, STEPS
 from validation.study import describe_commits, estimate_mean, format_table
 
 COLOURS = {"rigid": "#0b5fa5", "soft": "#d1495b"}
@@ -20,7 +19,6 @@ def describe(rows: Sequence[Row]) -> dict[str, str]:
     return {
         "LIMITS": _describe_limits(rows),
         "LEVELS": _tabulate_levels(rows, summarise(rows)),
-        "SPACE": _tabulate_space(rows),
         "COMMITS": describe_commits(row["origin"]["commit"] for row in rows),
     }
 
@@ -57,29 +55,6 @@ def _tabulate_levels(rows: Sequence[Row], found: Sequence[Summary]) -> str:
     head = ("level", "after 1 cycle [mm]", "after 5 [mm]", "error [%]", "elastic recoil [mm]",
             "CPU s a run", "steps", "cost over h = 1 ms")  # fmt: skip
     return format_table(head, table)
-
-
-def _tabulate_space(rows: Sequence[Row]) -> str:
-    """Settlement in space by the step, and its difference from the finest."""
-    samples = [row["space"] for row in rows if "space" in row]
-    ends = {step: np.array([each[f"{step:g}"]["settlement"][-1] for each in samples])
-            for step in STEPS}  # fmt: skip
-    table = []
-    for step in STEPS:
-        runs = [each[f"{step:g}"] for each in samples]
-        mean, wide = estimate_mean(ends[step])
-        apart, half = estimate_mean(ends[step] - ends[min(STEPS)])
-        shift = "" if step == min(STEPS) else f"{1e3 * apart:+.3f} ± {1e3 * half:.3f}"
-        table.append([
-            f"{1e3 * step:g} ms", f"{1e3 * mean:.3f} ± {1e3 * wide:.3f}", shift,
-            f"{np.mean([run['cpu_s'] for run in runs]) / CYCLES:.2g}",
-            f"{max(run['residual'] for run in runs):.1e}",
-        ])  # fmt: skip
-    head = ("step", "settlement [mm]", "less that at the finest step [mm]", "CPU s a cycle",
-            "worst residual")  # fmt: skip
-    least, most = 1e3 * min(ends[min(STEPS)]), 1e3 * max(ends[min(STEPS)])
-    words = f"{len(samples)} samples, which settle by {least:.2g} to {most:.2g} mm."
-    return f"{words}\n\n{format_table(head, table)}"
 
 
 def draw(rows: Sequence[Row], picture: Path) -> None:

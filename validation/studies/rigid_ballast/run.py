@@ -1,4 +1,4 @@
-"""A bed by every level of both methods, and a sample in space: a part each."""
+"""A bed by every level of both methods: a part each."""
 
 from __future__ import annotations
 
@@ -13,10 +13,9 @@ from rigid_lcp.motion.state import Motion
 from rigid_lcp.motion.world import Scene
 from validation.studies.rigid_ballast.bed import Moment, load_rigid, load_soft, prepare_bed
 from validation.studies.rigid_ballast.soft import STEP_SHARE
-from validation.studies.rigid_ballast.space import measure_space
 
 Row = dict[str, Any]
-CYCLES, BEDS, SAMPLES = 5, 30, 10
+CYCLES, BEDS = 5, 30
 TOLERANCE = 1e-6
 """Residual of the rigid levels [-]."""
 
@@ -74,4 +73,4 @@ def measure_bed(seed: int) -> Row:
 
 PARTS: dict[str, Callable[[], Row]] = {
     f"bed {seed}": partial(measure_bed, seed) for seed in range(1, BEDS + 1)
-} | {f"space {sample}": partial(measure_space, sample) for sample in range(1, SAMPLES + 1)}
+}
