@@ -3,17 +3,17 @@
 Stored: those of the folder ``friction_problems`` under the environment variable ``TRACKBED_DATA``
 (real ones of the test suite of Siconos, Apache-2.0, and packings).  Test suite: the other problems
 in Siconos's own files, which no setting was chosen by, in the folder TRACKBED_SICONOS (in its
-source package ``numerics/src/FrictionContact/test/data``).  Unseen: the same, changed: q by
-5 % noise, friction by a factor from 0.7 to 1.3, contacts in another order, all by a seed.
-Generated: towers, and settled packings of discs and spheres, also without friction, of other seeds
-and frictions, which no setting was chosen by, and near yield: a stored packing under less friction.
+source package ``numerics/src/FrictionContact/test/data``), which the examination changes: q by 5 %
+noise, friction by a factor from 0.7 to 1.3, contacts in another order, all by a seed.  Generated:
+towers, and settled packings of discs and spheres, also without friction, of other seeds and
+frictions, which no setting was chosen by, and near yield: a stored packing under less friction.
 Large packings settle for minutes and are kept in the folder TRACKBED_BEDS, if set.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
@@ -99,19 +99,6 @@ def list_suite() -> list[NamedProblem]:
         for path in paths
     ]
     return sorted(problems, key=lambda each: (each.make().contacts, each.name))
-
-
-def list_unseen(seeds: Iterable[int] = (1, 2)) -> list[NamedProblem]:
-    """The stored problems changed at random: the same families, not the same problems."""
-    return [
-        NamedProblem(f"{each.name}~{seed}", "unseen", partial(_change, each, seed), seed)
-        for each in list_stored()
-        for seed in seeds
-    ]
-
-
-def _change(each: NamedProblem, seed: int) -> FrictionProblem:
-    return vary(each.make(), np.random.default_rng(seed))
 
 
 def vary(problem: FrictionProblem, generator: np.random.Generator) -> FrictionProblem:
@@ -253,6 +240,6 @@ def _make_frictionless(grains: int, dim: int, seed: int) -> FrictionProblem:
 def list_problems() -> list[NamedProblem]:
     """Everything that is raced; without the stored ones where their folders are not named."""
     return [
-        *list_stored(), *list_suite(), *list_generated(), *list_other_packings(),
-        *list_unseen(), *list_frictionless(), *list_yielding(),
+        *list_stored(), *list_generated(), *list_other_packings(), *list_frictionless(),
+        *list_yielding(),
     ]  # fmt: skip

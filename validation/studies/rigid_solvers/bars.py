@@ -37,7 +37,7 @@ def _check_family(family: str, rows: Sequence[Row]) -> list[Check]:
     named = f" ({', '.join(missed)})" if missed else ""
     why = WHY if family == reading.YIELDING else ""
     slowest = max(reading.find_cost(row, OURS) for row in rows)
-    barred = family in ("stored", "unseen")
+    barred = family == "stored"
     checks = [Check(f"{family}: problems of {len(rows)} not brought to their bar{named}",
                     len(missed), "= 0", not missed, why=why)]  # fmt: skip
     if isfinite(slowest):

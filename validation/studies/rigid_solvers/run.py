@@ -50,8 +50,9 @@ BUDGET_S = {OURS: 60.0, HYBRID: 5.0, OSQP: 5.0, CLARABEL: 1.0, "Siconos": 5.0}
 YIELD_S = 60.0
 SMALL_S = 1.0
 """and for Siconos below `LARGE` contacts, where it has some ten solvers for each problem."""
-FEW = {"unseen": (OURS, HYBRID), "other": (OURS, HYBRID), "frictionless": (OURS, HYBRID, OSQP),
-       "near": (OURS, HYBRID)}  # fmt: skip
+FEW = {
+    "other": (OURS, HYBRID), "frictionless": (OURS, HYBRID, OSQP), "near": (OURS, HYBRID),
+}  # fmt: skip
 """What is run on families of many problems, by the first word of their names."""
 SHORT_S, REPEATED_S = 0.5, 0.1
 """Runs of less time [s] are repeated for so long; their cost is the median."""
