@@ -42,17 +42,11 @@ class NamedProblem:
     name: str
     family: str
     make: Callable[[], FrictionProblem]
-    seed: int = 0
 
     @property
     def bar(self) -> float:
         """The residual to be reached."""
         return 1e-10 if any(word in self.name for word in SIX_DIGITS) else 1e-12
-
-    @property
-    def hyperstatic(self) -> bool:
-        """A packing of grains, whose forces are far from unique."""
-        return self.name.startswith(tuple(GRAINS.values()))
 
 
 def find_data_folder() -> Path | None:
@@ -183,7 +177,7 @@ def list_other_packings() -> list[NamedProblem]:
     return [
         NamedProblem(
             f"{GRAINS[dim]}{count}_mu{mu:g}_seed{seed}", f"other packings {dim}D",
-            partial(_make_packing, count, dim, mu, seed), seed,
+            partial(_make_packing, count, dim, mu, seed),
         )
         for count, dim, mu, seed in (*beds, *HARD)
     ]  # fmt: skip
@@ -194,7 +188,7 @@ def list_frictionless() -> list[NamedProblem]:
     return [
         NamedProblem(
             f"{GRAINS[dim]}{count}_lcp" + f"_seed{seed}" * (seed > 1), "frictionless",
-            partial(_make_frictionless, count, dim, seed), seed,
+            partial(_make_frictionless, count, dim, seed),
         )
         for count, dim, seed in FRICTIONLESS
     ]  # fmt: skip
