@@ -142,7 +142,7 @@ def list_generated() -> list[NamedProblem]:
     problems += [
         NamedProblem(
             f"{GRAINS[dim]}{count}_mu{mu:g}", f"packings {dim}D",
-            partial(_make_packing, count, dim, mu), 1,
+            partial(_make_packing, count, dim, mu),
         )
         for count, dim in grains
         for mu in ((0.5,) if count > 1000 else (0.3, 0.8))
