@@ -19,6 +19,7 @@ VERBS = {
     "doctor": (START, "engines and libraries: versions, what is missing, how to get it"),
     "new": (START, "write a commented example scene into a folder"),
     "adopt": ("adapters.cli.adopt", "take a deck or a YADE script of your own for cycle jumps"),
+    "stone": ("adapters.cli.stone", "a form for stones from a mesh, by packing spheres into it"),
     "run": (RUN, "the whole procedure of a scene: prepare, compute, jump, relax, repeat"),
     "resume": (RUN, "go on with an interrupted run"),
     "sweep": ("adapters.cli.sweep", "several seeds and values of a scene's keys, side by side"),

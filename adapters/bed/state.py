@@ -61,6 +61,9 @@ class State:
     piston_height: float = np.nan  # height of the piston's lower face [m]; nan without a piston
     cycle: int = 0  # load cycles done, jumped ones included
     time_step: int = 0  # the engine's own step count
+    orientation: FloatArray | None = None
+    """Of stones (`adapters.bed.stones`): quaternions, real part first, (n, 4); radii are those then
+    of spheres of the same volume.  None for spheres."""
 
     def move_to(self, position: FloatArray, **change: object) -> State:
         """The same grains at other positions [m], shape (n, 3)."""
@@ -72,6 +75,8 @@ def save_state(state: State, path: Path) -> None:
     arrays = {name: getattr(state, name) for name in GRAIN_ARRAYS}
     arrays |= {f"contact_{name}": value for name, value in vars(state.contacts).items()}
     arrays |= {f"wall_{name}": value for name, value in state.wall_force.items()}
+    if state.orientation is not None:
+        arrays["orientation"] = state.orientation
     scalars = np.array([state.piston_height, state.cycle, state.time_step])
     with replace_file(path) as temporary, temporary.open("wb") as stream:
         np.savez(stream, scalars=scalars, **arrays)
@@ -98,5 +103,5 @@ def load_state(path: Path) -> State:
         ) from error
     return State(
         **grains, contacts=contacts, wall_force=walls, piston_height=height, cycle=cycle,
-        time_step=step,
+        time_step=step, orientation=data.get("orientation"),
     )  # fmt: skip

@@ -61,6 +61,11 @@ def run_relax(arguments: argparse.Namespace) -> int:
     check_state_name(arguments.out)
     given = arguments.scene
     scene = load_scene(given) if given else load_scene(*find_scene_of_state(arguments.state))
+    if scene.stones:
+        raise UsageError(
+            "stones are relaxed in jumps alone", where=str(arguments.state),
+            remedy="trackbed run does it; give a state of spheres",
+        )  # fmt: skip
     density = scene.material.grain.density
     state = read_state_file(arguments.state, density)
     walls = scene.walls(state.piston_height)

@@ -25,12 +25,12 @@ from adapters.decks.detect import find_obstacles
 from adapters.decks.engine import Adopted, format_run, run_deck
 from adapters.decks.jump import jump, keep_held
 from adapters.decks.record import make_state
-from adapters.decks.restart import find_mesh, move_grains, move_stones
 from adapters.decks.scene import load_deck_scene
 from adapters.decks.states import States, find_overlap, load_states, read_states, save_states
 from adapters.engines import allow_interrupts, get_engine
 from adapters.errors import EngineFailed, NotCredible, SceneError
 from adapters.files import Outcome, RunFolder, explain_full_disk
+from adapters.files import restart as kept
 from adapters.jumps import SLOPES
 from adapters.procedure import (
     CONTROL,
@@ -177,12 +177,12 @@ def write_start(run: DeckRun, place: Place, states: States, folder: Path) -> Sta
         if bed.deck.is_script:
             np.savez(folder / "moved.npz", identifier=number, move=move, drop=drop)
         elif bed.stones:
-            move_stones(restart, bed.stones, number, shift)
+            kept.move_stones(restart, bed.stones, number, shift)
         else:
             x, v = states.last[:, 1:4], states.last[:, 4:]
-            move_grains(restart, number, x, v, shift, states.period)
+            kept.move_grains(restart, number, x, v, shift, states.period)
         if bed.loaded and not bed.deck.is_script:
-            for height in find_mesh(restart, *bed.loaded):
+            for height in kept.find_mesh(restart, *bed.loaded):
                 height -= drop / metre
     (folder / "cycle_0.restart").write_bytes(restart)
     return replace(states, position=states.position + move, height=states.height - drop)

@@ -9,10 +9,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from adapters.bed import FloatArray, IntArray
-from adapters.decks import restart as kept
 from adapters.decks.engine import Adopted
 from adapters.errors import NotCredible
 from adapters.files import read_frames
+from adapters.files import restart as kept
 from trackbed.memory import read_arrays
 from trackbed.run_files import replace_file
 

@@ -12,9 +12,11 @@ import hashlib
 import re
 import shutil
 from abc import abstractmethod
+from collections.abc import Mapping
 from dataclasses import asdict
 from importlib.resources import files
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -34,13 +36,19 @@ STATE_COLUMNS = "id x y z vx vy vz omegax omegay omegaz radius mass"
 """Columns of ``states.dump`` before the forces of the walls."""
 
 Parameters = dict[str, float | int | str]
+NOTHING: Mapping[bytes, bytes] = MappingProxyType({})
 
 
-def copy_deck(folder: Path, parts: tuple[str, ...], package: str) -> dict[str, str]:
-    """Copy the named static decks of a package into ``folder``; returns the SHA-256 of each."""
+def copy_deck(
+    folder: Path, parts: tuple[str, ...], package: str, changes: Mapping[bytes, bytes] = NOTHING
+) -> dict[str, str]:
+    """Copy the named static decks of a package into ``folder``, with ``changes`` of their words;
+    returns the SHA-256 of each."""
     digests = {}
     for name in parts:
         text = files(package).joinpath(name).read_bytes()
+        for old, new in changes.items():
+            text = text.replace(old, new)
         (folder / name).write_bytes(text)
         digests[name] = hashlib.sha256(text).hexdigest()
     return digests
@@ -64,6 +72,7 @@ class DeckEngine(ProcessEngine):
 
     package: str  # where the static decks are
     loop_time = LOOP_TIME
+    stone_words = NOTHING  # what stones need in place of words of the static decks
 
     @abstractmethod
     def format_scene(self, scene: Scene, piston: bool) -> dict[str, str]:
@@ -72,6 +81,9 @@ class DeckEngine(ProcessEngine):
     @abstractmethod
     def write_start(self, scene: Scene, start: EngineStart, folder: Path) -> Parameters:
         """Files of a window's start besides the restart file; the engine's own parameters."""
+
+    def write_rain(self, scene: Scene, radius: FloatArray, height: float, folder: Path) -> None:
+        """Files of the rain besides ``grains.data``."""
 
     @abstractmethod
     def name_parts(self, scene: Scene) -> Parameters:
@@ -83,6 +95,8 @@ class DeckEngine(ProcessEngine):
         """Write the rain of grains; see `adapters.engines.contract.Engine`."""
         piston_mass = None if scene.loading is None else scene.loading.piston_mass
         density = scene.material.grain.density
+        if scene.stones:  # the engine itself puts them in, and wants an atom before
+            position, piston_mass = position[:0], piston_mass or 1.0
         text = format_grains_data(position, radius, density, scene.container, height, piston_mass)
         (folder / "grains.data").write_text(text)
         parameters: Parameters = {
@@ -90,6 +104,7 @@ class DeckEngine(ProcessEngine):
             "equilibrium_ratio": PLAN.equilibrium_ratio,
             "steps_per_cycle": count_cycle_steps(scene),
         }
+        self.write_rain(scene, radius, height, folder)
         return self._write(scene, folder, PARTS_PREPARE, parameters, piston=False)
 
     def write_cycles(
@@ -116,7 +131,8 @@ class DeckEngine(ProcessEngine):
         for name, text in texts.items():
             (folder / name).write_text(text)
         named = (str(value) for name, value in parameters.items() if name.endswith("_part"))
-        return copy_deck(folder, (*parts, *named), self.package)
+        changes = self.stone_words if scene.stones else NOTHING
+        return copy_deck(folder, (*parts, *named), self.package, changes)
 
 
 def format_grains_data(
@@ -125,20 +141,21 @@ def format_grains_data(
 ) -> str:  # fmt: skip
     """``grains.data``: centres (n, 3) and radii (n,) [m], density [kg/m^3], box to ``height`` [m].
 
+    No centres where the engine itself puts the grains in.
     With a piston, one more atom of mass ``piston_mass`` [kg] is parked outside the container;
     it touches nothing and gives the piston face its inertia.
     """
     low, high = bound_box(container, radius, height)
     rows = [
         f"{i} {GRAIN} {2 * r:.17g} {density:.17g} {x[0]:.17g} {x[1]:.17g} {x[2]:.17g}"
-        for i, (x, r) in enumerate(zip(position, radius, strict=True), 1)
+        for i, (x, r) in enumerate(zip(position, radius, strict=False), 1)
     ]
     if piston_mass is not None:
         r = float(radius.min())
         x = (*place_piston_atom(container, radius), height)
         piston_density = piston_mass / (4 / 3 * np.pi * r**3)
         rows.append(
-            f"{len(radius) + 1} {WALL} {2 * r:.17g} {piston_density:.17g} "
+            f"{len(position) + 1} {WALL} {2 * r:.17g} {piston_density:.17g} "
             f"{x[0]:.17g} {x[1]:.17g} {x[2]:.17g}"
         )
     types = MIRROR if container.symmetry else WALL
@@ -220,7 +237,7 @@ def gather_cycle_parameters(
         "start_part": f"start_{start.kind}.in",
         "seat_part": f"seat_{'first' if start.first else 'none'}.in", "steps_per_cycle": steps,
         "run_steps": cycles * steps, "track_steps": steps // scene.samples_per_cycle,
-        "piston_atom": scene.grain_count + 1, **own,
+        "piston_atom": 1 if scene.stones else scene.grain_count + 1, **own,
     }  # fmt: skip
     if start.kind == "perturbed":
         parameters["perturbation"] = start.perturbation

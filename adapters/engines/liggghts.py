@@ -6,7 +6,8 @@ import re
 import shutil
 from pathlib import Path
 
-from adapters.engines import liggghts_decks
+from adapters.bed import FloatArray
+from adapters.engines import liggghts_decks, liggghts_stones
 from adapters.engines.contract import EngineStart
 from adapters.engines.decks import PISTON_MARGIN, DeckEngine, Parameters
 from adapters.engines.plan import has_friction, has_rolling
@@ -31,6 +32,7 @@ class LiggghtsEngine(DeckEngine):
     remedy = "sudo apt-get install liggghts"
     begun = BANNER
     launch = "launch it by the MPI it is linked to: Debian's by mpirun of Open MPI"
+    stone_words = liggghts_stones.WORDS
     ended_early = "SIGINT/SIGTERM caught"
 
     def command(self, scene: Scene, deck: str) -> list[str]:
@@ -46,7 +48,14 @@ class LiggghtsEngine(DeckEngine):
     def format_scene(self, scene: Scene, piston: bool) -> dict[str, str]:
         """``scene.in`` and ``dump_states.in``."""
         states = liggghts_decks.format_dump_states(self.wall_names(scene, piston))
+        states += "include ${bodies_part}\n" * scene.stones
         return {"scene.in": liggghts_decks.format_scene(scene), "dump_states.in": states}
+
+    def write_rain(self, scene: Scene, radius: FloatArray, height: float, folder: Path) -> None:
+        """``stones.in``, where grains are stones."""
+        if scene.stones:
+            text = liggghts_stones.format_rain(scene, radius, height)
+            (folder / "stones.in").write_text(text)
 
     def write_start(self, scene: Scene, start: EngineStart, folder: Path) -> Parameters:
         """The piston's mesh, and the moved grains."""
@@ -57,16 +66,22 @@ class LiggghtsEngine(DeckEngine):
         own: Parameters = {
             "piston_mesh": f"piston_{start.piston_mesh}", "piston_height": start.piston_height
         }  # fmt: skip
-        if start.moved is not None:
+        if scene.stones:
+            own |= liggghts_stones.write_start(start, folder)
+        elif start.moved is not None:
             own["start_step"] = start.time_step
             liggghts_decks.write_moved(scene.container, start, folder)
         return own
 
     def name_parts(self, scene: Scene) -> Parameters:
-        """Contact law and output, with or without friction and resistance to rolling."""
+        """Contact law and output, with or without friction and resistance to rolling; stones."""
         kind = "frictional" if has_friction(scene) else "frictionless"
         kind = "rolling" if has_rolling(scene) else kind
-        return {"contact_part": f"contact_{kind}.in", "output_part": f"output_{kind}.in"}
+        own: Parameters = {"contact_part": f"contact_{kind}.in", "output_part": f"output_{kind}.in"}
+        if scene.stones:
+            own |= {"motion_part": "motion_stones.in", "bodies_part": "dump_stones.in"}
+            own["spheres"] = len(scene.form.radius)
+        return own
 
 
 ENGINE = LiggghtsEngine()

@@ -1,5 +1,6 @@
 """Files that are read and written: dumps, windows, states, settlement tables, run folders."""
 
+from adapters.files import restart
 from adapters.files.dump import Frame, Kind, write_dump
 from adapters.files.dump_reader import read_frames
 from adapters.files.full_disk import explain_full_disk
@@ -14,5 +15,5 @@ __all__ = [
     "COLUMNS", "EVENTS", "UNKNOWN", "Frame", "Kind", "LoadSeries", "Outcome", "RunFolder", "Series",
     "Window", "check_state_name", "explain_full_disk", "load_window", "make_too_few_error",
     "place_stage", "read_frames", "read_load_series", "read_series", "read_state",
-    "read_state_file", "read_window", "save_window", "write_dump", "write_state_file",
+    "read_state_file", "read_window", "restart", "save_window", "write_dump", "write_state_file",
 ]  # fmt: skip

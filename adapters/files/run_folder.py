@@ -31,7 +31,7 @@ COLUMNS = {
     "elastic_deflection": "elastic_deflection", "mean_grain_settlement": "settlement",
     **{name: name for name in (
         "kind", "coordination_number", "relative_density", "piston_height", "force_error",
-        "maximum_overlap", "kinetic_translational", "kinetic_rotational",
+        "maximum_overlap", "kinetic_translational", "kinetic_rotational", "mean_rotation",
     )},
 }  # fmt: skip
 """Columns of ``settlement.csv`` and their names in `Outcome.rows`: SI units, settlement since the

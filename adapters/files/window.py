@@ -10,9 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from adapters.bed import Contacts, FloatArray, IntArray, State
+from adapters.bed.stones import SPHERE, Form
 from adapters.errors import EngineFailed
 from adapters.files.dump import Frame
 from adapters.files.dump_reader import read_frames
+from adapters.files.stones import gather_all_stones
 from trackbed.memory import read_arrays
 from trackbed.run_files import replace_file
 
@@ -75,6 +77,8 @@ class Window:
     contacts: tuple[Contacts, ...]  # contacts at each of the c + 1 instants
     piston: PistonTrack
     piston_start: float  # height of the piston's face before the first cycle [m]
+    orientation: FloatArray | None = None
+    """Of stones, as in `State`, shape (c + 1, n, 4)."""
 
     def __len__(self) -> int:
         """Number of load cycles."""
@@ -94,6 +98,7 @@ class Window:
             self.spin[index], self.contacts[index],
             {name: force[index] for name, force in self.wall_force.items()}, float(heights[index]),
             cycle=self.first_cycle + index, time_step=int(self.time_step[index]),
+            orientation=None if self.orientation is None else self.orientation[index],
         )  # fmt: skip
 
     def piston_heights(self) -> FloatArray:
@@ -145,11 +150,13 @@ def _check_files(folder: Path, *names: str) -> None:
 
 
 def read_window(
-    folder: Path, first_cycle: int, wall_names: tuple[str, ...], piston_start: float
-) -> Window:
+    folder: Path, first_cycle: int, wall_names: tuple[str, ...], piston_start: float,
+    form: Form = SPHERE,
+) -> Window:  # fmt: skip
     """Read the dumps an engine left in ``folder``; the piston started at ``piston_start`` [m].
 
-    Raises `DumpError` for a malformed dump and `EngineFailed` for missing files.
+    With a ``form`` the grains are stones.  Raises `DumpError` for a malformed dump, `EngineFailed`
+    for missing files and `NotCredible` for stones that lost their shape.
     """
     _check_files(folder, "states.dump", "contacts.dump", "piston.txt")
     frames = list(read_frames(folder / "states.dump"))
@@ -161,6 +168,8 @@ def read_window(
             remedy="the engine did not end properly; look at screen.txt there",
         )
     states = [_read_grains(*pair, wall_names) for pair in zip(frames, contact_frames, strict=True)]
+    if form is not SPHERE:
+        states = gather_all_stones(form, states, folder)
     first = states[0]
     return Window(
         first_cycle, np.array([state.time_step for state in states], np.int64), first.identifier,
@@ -169,16 +178,18 @@ def read_window(
         {name: np.array([state.wall_force[name] for state in states]) for name in wall_names},
         tuple(state.contacts for state in states), read_piston_track(folder / "piston.txt"),
         piston_start,
+        None if first.orientation is None else np.array([one.orientation for one in states]),
     )  # fmt: skip
 
 
-def read_state(folder: Path, wall_names: tuple[str, ...]) -> State:
+def read_state(folder: Path, wall_names: tuple[str, ...], form: Form = SPHERE) -> State:
     """The settled bed that a preparation left in ``folder``; raises as `read_window`."""
     _check_files(folder, "states.dump", "contacts.dump")
     grains, contacts = (
         deque(read_frames(folder / f"{name}.dump"), 1).pop() for name in ("states", "contacts")
     )
-    return _read_grains(grains, contacts, wall_names)
+    state = _read_grains(grains, contacts, wall_names)
+    return state if form is SPHERE else gather_all_stones(form, [state], folder)[0]
 
 
 def _read_grains(grains: Frame, contacts: Frame, wall_names: tuple[str, ...]) -> State:
@@ -200,6 +211,8 @@ def save_window(window: Window, path: Path) -> None:
     arrays = {name: getattr(window, name) for name in (*ARRAYS, "first_cycle", "piston_start")}
     arrays |= {f"wall_{name}": force for name, force in window.wall_force.items()}
     arrays |= {f"piston_{name}": values for name, values in vars(window.piston).items()}
+    if window.orientation is not None:
+        arrays["orientation"] = window.orientation
     arrays["contact_count"] = np.array([len(contacts) for contacts in window.contacts])
     for column in fields(Contacts):
         rows = [getattr(contacts, column.name) for contacts in window.contacts]
@@ -230,4 +243,5 @@ def load_window(path: Path) -> Window:
         contacts=contacts,
         piston=PistonTrack(*(arrays[f"piston_{c.name}"] for c in fields(PistonTrack))),
         piston_start=float(arrays["piston_start"]),
+        orientation=arrays.get("orientation"),
     )

@@ -6,7 +6,8 @@ from dataclasses import asdict, dataclass, fields
 
 import numpy as np
 
-from adapters.bed import GRAVITY, OVERLAP_BOUND, FloatArray, State, find_pairs, find_sample_mass
+from adapters.bed import GRAVITY, OVERLAP_BOUND, FloatArray, State, find_sample_mass
+from adapters.bed.stones import find_kinetic_energies, find_touching
 from adapters.errors import EngineFailed, NotCredible
 from adapters.files import Window
 from adapters.scene import Scene
@@ -87,7 +88,8 @@ def check_state(scene: Scene, state: State) -> None:
         raise NotCredible(
             f"{lost} of {scene.grain_count} grains are lost",
             where="preparation",
-            remedy="a shorter time step; look whether the container holds them",
+            remedy="a shorter time step, a looser start (sample.relative_density_start); look "
+            "whether the container holds them",
         )
     if not np.isfinite(state.position).all():
         raise NotCredible(
@@ -95,8 +97,9 @@ def check_state(scene: Scene, state: State) -> None:
             where="preparation",
             remedy="a shorter time step",
         )
-    touching = find_pairs(state.position, state.radius, scene.container.walls())
-    share = float(touching.overlap.max(initial=0.0)) / float(state.radius.min())
+    touching = find_touching(scene.form, state, scene.container.walls())
+    radius = float(state.radius.min()) * scene.form.usual
+    share = float(touching.overlap.max(initial=0.0)) / radius
     if not share <= OVERLAP_BOUND:
         raise NotCredible(
             f"the greatest overlap of the settled bed is {share:.3g} of the smallest radius",
@@ -109,21 +112,15 @@ def measure(scene: Scene, window: Window) -> WindowFigures:
     """The figures of `check_bounds`."""
     walls = scene.container.walls()
     # From the positions, not from the engine's list of contacts: it cannot hide one.
-    overlaps = [
-        float(find_pairs(position, window.radius, walls).overlap.max(initial=0.0))
-        for position in window.position[1:]
-    ]
-    inertia = 0.4 * window.mass * window.radius**2
-    kinetic = 0.5 * (
-        np.einsum("n,cni,cni->c", window.mass, window.velocity, window.velocity)
-        + np.einsum("n,cni,cni->c", inertia, window.spin, window.spin)
-    )
+    states = [window.state(index) for index in range(1, len(window.position))]
+    overlaps = [find_touching(scene.form, one, walls).overlap.max(initial=0.0) for one in states]
+    kinetic = [sum(find_kinetic_energies(scene.form, one)) for one in states]
     # The first state after a jump is at rest and not the engine's work: it is not judged.
     move = np.linalg.norm(np.diff(window.position, axis=0), axis=2).mean(axis=1)
     force_error = window.piston.force_error(scene.steps_per_cycle)[BOUNDS.force_start_cycles :]
     return WindowFigures(
-        max(overlaps) / float(window.radius.min()),
-        float(kinetic[1:].max() / (GRAVITY * np.sum(window.mass) * window.radius.mean())),
+        float(max(overlaps)) / (float(window.radius.min()) * scene.form.usual),
+        float(max(kinetic) / (GRAVITY * np.sum(window.mass) * window.radius.mean())),
         float(move.max() / window.radius.mean()),
         float(force_error.max()) if len(force_error) else float("nan"),
     )

@@ -117,7 +117,7 @@ def describe_plan(scene: Scene, height: float) -> Iterator[str]:
     computed, every = (shared + members * (cycles - shared) for cycles in (to_compute, total))
     pace = get_engine(scene.engine.name).grain_steps_per_s
     rain, cycle = (
-        scene.grain_count * steps / pace
+        scene.grain_count * len(scene.form.radius) * steps / pace
         for steps in (plan_settling(scene, height).minimum_steps, scene.steps_per_cycle)
     )
     parts = [f"at least {_format_time(rain)} for the rain of grains"]

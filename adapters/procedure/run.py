@@ -13,7 +13,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from adapters.bed import draw_radii, draw_sample_start
 from adapters.engines import allow_interrupts, find_engine, get_engine, list_real_engines
 from adapters.errors import EngineMissing, SceneError, UsageError
 from adapters.files import RunFolder, explain_full_disk
@@ -23,11 +22,11 @@ from adapters.procedure.fixed import settle_fixed
 from adapters.procedure.progress import Progress, describe_plan, warn_without_jumps
 from adapters.procedure.record import MEMBERS, read_members, refuse_other_member
 from adapters.procedure.stages import Bed, Clock, Run, Variant
-from adapters.scene import Scene, bound_friction, list_stages, load_scene
+from adapters.scene import Scene, bound_friction, draw_start, list_stages, load_scene
 from trackbed.memory import refuse_more_memory
 from trackbed.run_files import list_differences, record_provenance, refuse_writing, write_whole
 
-OWN_FILES = ("lock", "scene.toml", "load_series.csv", "dry_run")
+OWN_FILES = ("lock", "scene.toml", "load_series.csv", "form.toml", "dry_run")
 """What may be in a run folder before its manifest is written."""
 STATE_BYTES = 500
 """Memory that a grain takes at each cycle end of a window, contacts and wall forces too [bytes]."""
@@ -206,7 +205,7 @@ def open_member(folder: RunFolder, scene: Scene, number: int) -> Iterator[RunFol
             refuse_other_member(whole, inner, number)
         else:
             refuse_strangers(inner)
-            for name in {"scene.toml", "load_series.csv"} & {*os.listdir(folder.path)}:
+            for name in {"scene.toml", "load_series.csv", "form.toml"} & {*os.listdir(folder.path)}:
                 shutil.copyfile(folder.path / name, inner.path / name)
         own = whole | {"members": 1, "member": number}
         write_whole(manifest, json.dumps(own, indent=1) + "\n")
@@ -269,6 +268,10 @@ def record_scene(scene: Scene) -> dict[str, Any]:
         record["loading"]["series"] = {
             name: values.tolist() for name, values in vars(scene.loading.samples).items()
         }
+    if str(scene.sample.form).endswith(".toml"):
+        record["sample"]["form"] = {
+            name: getattr(scene.form, name).tolist() for name in ("place", "radius", "inertia")
+        }
     return record
 
 
@@ -301,6 +304,9 @@ def prepare_manifest(
     if scene.loading is not None and scene.loading.series is not None:
         shutil.copyfile(scene.loading.series, folder.path / "load_series.csv")
         kept.append('loading.series="load_series.csv"')
+    if (form := str(scene.sample.form)).endswith(".toml"):
+        shutil.copyfile(form, folder.path / "form.toml")
+        kept.append('sample.form="form.toml"')
     manifest = {
         "scene": record_scene(scene), "overrides": kept, "control": control, "members": members,
         "provenance": record_provenance(sys.argv),
@@ -339,10 +345,7 @@ def _write_dry_run(scene: Scene, run_path: Path) -> None:
     folder = run_path / "dry_run"
     with refuse_writing(run_path):
         folder.mkdir(parents=True, exist_ok=True)
-    radius = draw_radii(scene.sample.radii, scene.grain_count, scene.sample.seed)
-    position, height = draw_sample_start(
-        radius, scene.container, scene.sample.relative_density_start, scene.sample.seed
-    )
+    position, radius, height = draw_start(scene)
     engine.write_preparation(bound_friction(scene), position, radius, height, folder)
     for sentence in describe_plan(scene, height):
         print(f"# {sentence}")

@@ -18,9 +18,6 @@ from adapters.bed import (
     SURFACE_SHARE,
     FloatArray,
     State,
-    draw_radii,
-    draw_sample_start,
-    find_pairs,
     find_top_under,
     load_state,
     measure_bed,
@@ -28,6 +25,12 @@ from adapters.bed import (
     measure_relative_density,
     measure_sample,
     save_state,
+)
+from adapters.bed.stones import (
+    find_kinetic_energies,
+    find_rotation,
+    find_touching,
+    spread_spheres,
 )
 from adapters.engines import Engine, EngineRun, EngineStart
 from adapters.files import (
@@ -44,7 +47,7 @@ from adapters.moves import Jump, get_move
 from adapters.procedure import checks
 from adapters.procedure.progress import Progress
 from adapters.procedure.room import find_room
-from adapters.scene import Procedure, Scene, bound_friction
+from adapters.scene import Procedure, Scene, bound_friction, draw_start
 
 
 @dataclass(frozen=True)
@@ -106,6 +109,8 @@ class Run:
     computed_here: int = 0
     loaded_start: float = np.nan
     """Height of the loaded body before the first cycle [m]."""
+    start_orientation: FloatArray | None = None
+    """Of stones, before the first cycle, shape (n, 4): rotations count from there."""
     computed_before: int | None = None
     """Cycles that earlier processes computed; None before they are counted."""
 
@@ -136,18 +141,14 @@ def prepare(run: Run) -> Bed:
     """Rain of grains under gravity until equilibrium (section 2.3)."""
     scene, name = run.scene, "preparation"
     if run.folder.outcome(name) is None:
-        sample = scene.sample
         run.progress.print_line(f"rain of {scene.grain_count} grains")
-        radius = draw_radii(sample.radii, scene.grain_count, sample.seed)
-        position, height = draw_sample_start(
-            radius, scene.container, sample.relative_density_start, sample.seed
-        )
+        position, radius, height = draw_start(scene)
         folder = _begin(run, name)
         rain = bound_friction(scene)
         decks = run.engine.write_preparation(rain, position, radius, height, folder)
         done = run.engine.run(scene, "in.prepare", folder, lambda: None, decks)
         with run.clock.time_part("parse"):
-            state = read_state(folder, run.engine.wall_names(scene, piston=False))
+            state = read_state(folder, run.engine.wall_names(scene, piston=False), scene.form)
             checks.check_state(scene, state)
             save_state(state, folder / "state.npz")
         bed = measure_bed_height(state.position, state.radius)
@@ -161,8 +162,9 @@ def prepare(run: Run) -> Bed:
         cost = run.clock.end_lap(done.cpu_s, done.start_up_s)
         _finish(run, folder, Outcome(name, 0, 0, [], cost, notes=notes))
     state = load_state(run.folder.path / name / "state.npz")
-    edges, reach = scene.piston_edges, scene.piston_reach
-    run.loaded_start = top = find_top_under(state.position, state.radius, edges, reach)
+    spheres, edges = spread_spheres(scene.form, state), scene.piston_edges
+    run.loaded_start = top = find_top_under(*spheres, edges, scene.piston_reach)
+    run.start_orientation = state.orientation
     restart = run.folder.path / name / "end.restart"
     return Bed(0, EngineStart(restart, state.time_step, 0, top, first=True))
 
@@ -176,12 +178,8 @@ def compute(run: Run, bed: Bed, cycles: int, healing: int = 0) -> Bed:
         decks = run.engine.write_cycles(run.scene, bed.start, cycles, folder)
         done = run.engine.run(run.scene, "in.cycles", folder, _watch(run, bed, folder), decks)
         with run.clock.time_part("parse"):
-            window = read_window(
-                folder,
-                bed.cycle,
-                run.engine.wall_names(run.scene, piston=True),
-                bed.start.piston_height,
-            )
+            walls = run.engine.wall_names(run.scene, piston=True)
+            window = read_window(folder, bed.cycle, walls, bed.start.piston_height, run.scene.form)
             figures = checks.check_window(run.scene, window, cycles)
             save_window(window, folder / "states.npz")
             for text in ("states.dump", "contacts.dump"):
@@ -199,12 +197,8 @@ def compute(run: Run, bed: Bed, cycles: int, healing: int = 0) -> Bed:
             "window", bed.cycle, bed.cycle + cycles, rows, cost, checks=figures, notes=notes
         )
         _finish(run, folder, outcome)
-    start = EngineStart(
-        run.folder.path / name / "end.restart",
-        outcome.notes["time_step"],
-        outcome.notes["piston_mesh"],
-        outcome.notes["piston_height"],
-    )
+    kept = (outcome.notes[one] for one in ("time_step", "piston_mesh", "piston_height"))
+    start = EngineStart(run.folder.path / name / "end.restart", *kept)
     return Bed(outcome.last_cycle, start, name, healing)
 
 
@@ -233,11 +227,11 @@ def jump(
             if get_move(run.procedure.move).moves_piston:
                 piston_height = before.piston_height - share * gains.loaded_body
         with run.clock.time_part("relax"):
-            position, record, piston_height = find_room(
+            moved, record, piston_height = find_room(
                 run.scene, before, target, piston_height, may_wait=gains is not None
             )
-        after = before.move_to(
-            position, velocity=np.zeros_like(target), spin=np.zeros_like(target),
+        after = moved.move_to(
+            moved.position, velocity=np.zeros_like(target), spin=np.zeros_like(target),
             piston_height=piston_height, cycle=bed.cycle + h,
         )  # fmt: skip
         save_state(before.move_to(target), folder / "estimated.npz")
@@ -312,11 +306,10 @@ def make_settlement_rows(run: Run, window: Window, healing: int) -> list[dict[st
 
 
 def _make_row(run: Run, state: State, kind: str) -> dict[str, Any]:
-    preparation = run.outcome("preparation")
-    container = run.scene.container
-    walls = run.scene.walls(state.piston_height)
-    bed = measure_bed(state.position, find_pairs(state.position, state.radius, walls))
-    inertia = 0.4 * state.mass * state.radius**2
+    preparation, walls = run.outcome("preparation"), run.scene.walls(state.piston_height)
+    start, end = run.start_orientation, state.orientation
+    bed = measure_bed(state.position, find_touching(run.scene.form, state, walls))
+    translational, rotational = find_kinetic_energies(run.scene.form, state)
     return {
         "cycle": state.cycle,
         "loaded_body": run.loaded_start - state.piston_height,
@@ -324,12 +317,15 @@ def _make_row(run: Run, state: State, kind: str) -> dict[str, Any]:
         "kind": kind,
         "coordination_number": bed.coordination_number,
         "relative_density": measure_relative_density(
-            state.position, state.radius, container, preparation.notes["density_height"]
+            state.position, state.radius, run.scene.container, preparation.notes["density_height"]
         ),
         "piston_height": state.piston_height,
         "maximum_overlap": bed.max_penetration,
-        "kinetic_translational": 0.5 * float(state.mass @ (state.velocity**2).sum(axis=1)),
-        "kinetic_rotational": 0.5 * float(inertia @ (state.spin**2).sum(axis=1)),
+        "kinetic_translational": translational,
+        "kinetic_rotational": rotational,
+        "mean_rotation": None
+        if start is None or end is None
+        else float(np.linalg.norm(find_rotation(start, end), axis=1).mean()),
     }
 
 

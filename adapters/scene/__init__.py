@@ -3,10 +3,11 @@
 from adapters.scene.file import expand_schedule, load_scene
 from adapters.scene.model import list_omissions
 from adapters.scene.procedures import fill_procedure
-from adapters.scene.stages import bound_friction, list_stages
-from adapters.scene.tables import MEMBERS_MOST, Procedure, Scene, flatten_keys
+from adapters.scene.stages import bound_friction, draw_start, list_stages
+from adapters.scene.tables import MEMBERS_MOST, Procedure, Scene
+from adapters.scene.values import flatten_keys
 
 __all__ = [
-    "MEMBERS_MOST", "Procedure", "Scene", "bound_friction", "expand_schedule", "fill_procedure",
-    "flatten_keys", "list_omissions", "list_stages", "load_scene",
+    "MEMBERS_MOST", "Procedure", "Scene", "bound_friction", "draw_start", "expand_schedule",
+    "fill_procedure", "flatten_keys", "list_omissions", "list_stages", "load_scene",
 ]  # fmt: skip

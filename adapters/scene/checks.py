@@ -16,12 +16,13 @@ from typing import Any
 import numpy as np
 
 from adapters.bed import RadiusDistribution
+from adapters.bed.stones import SPHERE, find_form
 from adapters.errors import SceneError
 from adapters.files import read_load_series
 from adapters.scene import mechanics
 from adapters.scene.values import Check, NotValid, Values, find_radii
 from trackbed.choices import explain_retired, find_choices
-from trackbed.scene_files import Problem, suggest_word
+from trackbed.scene_files import Problem, describe_error, suggest_word
 
 ALTERNATIVES = (
     ("sample.count", "sample.fill_height"),
@@ -51,6 +52,8 @@ OWNED = (
 )
 """A key, keys of its table that only one of its words has, what to say where they miss or are."""
 
+STONE_ENGINES = ("liggghts",)
+"""Engines whose grains may be stones of several spheres."""
 MPI_STARTERS = {"mpirun", "mpiexec", "mpiexec.hydra", "orterun", "srun"}
 """Programs that start the program behind them several times."""
 
@@ -189,6 +192,23 @@ def _check_seating(scene: Values) -> Iterator[Problem]:
         yield Problem(key, "with no fewer than total_cycles a run that waits never jumps")
 
 
+def _check_form(scene: Values) -> Iterator[Problem]:
+    """Stones want an engine that carries them, and what is known to be right for them in a jump."""
+    try:
+        if find_form(scene.get("sample.form")) is SPHERE:
+            return
+    except SceneError as error:
+        yield Problem("sample.form", describe_error(error), error.where)
+    engine = scene.need("engine.name")
+    if engine not in ("auto", *STONE_ENGINES):
+        yield Problem("engine.name", f"{engine} carries no stones yet: {STONE_ENGINES[0]} does")
+    for key in ("material.grain.rolling_friction", "material.wall.rolling_friction"):
+        if scene.has(key):
+            yield Problem(key, "it stands for the form of stones, which these have: leave it out")
+    if scene.has_table("procedure") and scene.need("procedure.relaxation") == "karrech2007":
+        yield Problem("procedure.relaxation", 'eq. 29 is for spheres: leave it out, or "none"')
+
+
 def _check_launcher(scene: Values) -> Iterator[Problem]:
     words = [Path(word).name for word in scene.get("engine.launcher") or ()]
     if scene.need("engine.name") == "yade" and set(words) & MPI_STARTERS:
@@ -235,10 +255,10 @@ def _check_relaxation(scene: Values) -> Iterator[Problem]:
 
 CHECKS: tuple[Check, ...] = (
     _check_alternatives, *(partial(_check_owned_keys, *row) for row in OWNED), _check_symmetry,
-    _check_grain_radius, _check_grading_scale, _check_rain, _check_rolling, _check_series,
-    _check_partial_piston, _check_stages, _check_procedure, _check_jumps, _check_settlement,
-    _check_seating, _check_launcher, _check_engine, _check_law, _check_move, _check_relaxation,
-    *mechanics.CHECKS,
+    _check_grain_radius, _check_grading_scale, _check_rain, _check_rolling, _check_form,
+    _check_series, _check_partial_piston, _check_stages, _check_procedure, _check_jumps,
+    _check_settlement, _check_seating, _check_launcher, _check_engine, _check_law, _check_move,
+    _check_relaxation, *mechanics.CHECKS,
 )  # fmt: skip
 
 

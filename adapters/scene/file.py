@@ -12,7 +12,8 @@ from pydantic import BaseModel
 from adapters.scene.checks import ALTERNATIVES, JUMP_KEYS, TOLERANCE_KEY, find_problems
 from adapters.scene.mechanics import DOUBTFUL
 from adapters.scene.procedures import fill_procedure, schedule_jumps
-from adapters.scene.tables import Procedure, Scene, flatten_keys
+from adapters.scene.tables import Procedure, Scene
+from adapters.scene.values import flatten_keys
 from trackbed.scene_files import Guide, Problem, find_model, read_scene
 
 GUIDE = Guide("karrech", "procedure.k=10")
@@ -36,6 +37,9 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
     loading = data.get("loading")
     if isinstance(loading, dict) and isinstance(loading.get("series"), str):
         loading["series"] = str(text.path.parent.absolute() / loading["series"])
+    sample = data.get("sample")
+    if isinstance(sample, dict) and str(sample.get("form")).endswith(".toml"):
+        sample["form"] = str(text.path.parent.absolute() / str(sample["form"]))
     if isinstance(data.get("procedure"), dict):
         data["procedure"] = fill_procedure(data["procedure"])
     engine = data.get("engine")

@@ -16,6 +16,7 @@ from adapters.scene.values import (
     NotValid,
     Values,
     find_geometry,
+    find_named_form,
     find_radii,
     name_radii,
 )
@@ -42,7 +43,7 @@ DOUBTFUL = DoubtfulNumbers()
 
 
 def _check_room(scene: Values) -> Iterator[Problem]:
-    largest_grain = find_radii(scene).greatest
+    largest_grain = find_radii(scene).greatest * find_named_form(scene).reach
     room = bed.find_radius_that_fits(find_geometry(scene))
     if largest_grain > room:
         yield Problem(
@@ -73,7 +74,7 @@ def _find_rayleigh_time(scene: Values) -> float:
     if radii.smallest <= 0:
         raise NotValid
     named = (scene.need(f"material.grain.{one}") for one in ("density", "young", "poisson"))
-    return bed.find_rayleigh_time(radii.smallest, *named)
+    return bed.find_rayleigh_time(find_named_form(scene).least * radii.smallest, *named)
 
 
 def _find_rayleigh_share(scene: Values) -> float:
@@ -119,8 +120,9 @@ def _find_overlap_share(scene: Values) -> tuple[str, float, float]:
         raise NotValid
     young, poisson = scene.need(grain + "young"), scene.need(grain + "poisson")
     modulus = bed.combine_moduli(young, poisson, young, poisson)
-    overlap = bed.find_overlap_under_force(stress * (2 * radii.mean) ** 2, modulus, radii.mean / 2)
-    return key, stress, float(overlap) / radii.smallest
+    usual, force = find_named_form(scene).usual, stress * (2 * radii.mean) ** 2
+    overlap = bed.find_overlap_under_force(force, modulus, usual * radii.mean / 2)
+    return key, stress, float(overlap) / (usual * radii.smallest)
 
 
 def _check_load(scene: Values) -> Iterator[Problem]:

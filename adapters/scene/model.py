@@ -26,7 +26,13 @@ def list_omissions(scene: Scene) -> tuple[str, ...]:
 def _list_grains(scene: Scene) -> Iterator[str]:
     if scene.engine.name == "fake":
         yield "Mechanics: the engine is the fake one of the tests, and no figure here is a result."
-    yield "Stones: grains are spheres, without edges that interlock."
+    if not scene.stones:
+        yield "Stones: grains are spheres, without edges that interlock."
+    else:
+        yield (
+            f"Edges and faces of stones: each is {len(scene.form.radius)} spheres that keep their "
+            f"places, of the form {scene.form.name}, with its mass and inertia; ten sizes at most."
+        )
     yield "Breakage, abrasion and wear of grains."
     law = scene.sample.grain_radius
     if law is None:
@@ -105,6 +111,8 @@ def _list_jumps(scene: Scene) -> Iterator[str]:
         or not (scene.procedure.tolerance or any(scene.procedure.h or ()))
     ):
         return
+    if scene.stones:
+        yield "Rotations of jumped cycles: stones are moved whole, and turn as they are relaxed."
     yield (
         "The dynamics of jumped cycles: positions follow the law "
         f"'{scene.procedure.law}', moved '{scene.procedure.move}', grains restart at rest, and "

@@ -1,11 +1,23 @@
-"""The scene while the bed rains, and of each stage of its load."""
+"""The bed before it rains, the scene while it does, and of each stage of its load."""
 
 from __future__ import annotations
 
 from itertools import pairwise
 
+from adapters.bed import FloatArray, draw_radii, draw_sample_start
 from adapters.scene.procedures import fill_procedure
 from adapters.scene.tables import Scene
+
+
+def draw_start(scene: Scene) -> tuple[FloatArray, FloatArray, float]:
+    """Centres (n, 3) and radii (n,) of a random start, and the height it fills [m]; of stones the
+    spheres around them find room."""
+    sample, reach = scene.sample, scene.form.reach
+    radius = draw_radii(sample.radii, scene.grain_count, sample.seed)
+    position, height = draw_sample_start(
+        reach * radius, scene.container, sample.relative_density_start, sample.seed
+    )
+    return position, radius, height
 
 
 def bound_friction(scene: Scene) -> Scene:

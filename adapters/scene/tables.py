@@ -31,13 +31,15 @@ from adapters.bed import (
     count_sides,
     expect_grains,
 )
+from adapters.bed.stones import SPHERE, Form, find_form
 from adapters.files import LoadSeries, read_load_series
 from adapters.laws.fit import FIRST_WINDOW
 from adapters.moves import DEFAULT as MOVE_DEFAULT
 from adapters.scene.ballast import GradingKey, Stage, make_radii
 from adapters.scene.checks import find_problems, find_warnings
 from adapters.scene.mechanics import COUNT_GREATEST
-from trackbed.scene_files import NonNegative, Positive, Table
+from adapters.scene.values import flatten_keys
+from trackbed.scene_files import NonNegative, Positive, Table, Text
 
 TRACK_SAMPLES = 100
 """Least number of samples of the piston's record in a cycle."""
@@ -91,6 +93,9 @@ class Sample(Table):
     grading: GradingKey | None = None
     """Grading by a standard's name, or sieves [mm] with the mass that passes [%], instead."""
     grading_scale: Positive | None = None  # factor on all sieves of ``grading`` [-]; 1
+    form: Text | None = None
+    """Form of the grains, a name or a file (`adapters.bed.stones.find_form`); radii and sieves are
+    those of the sphere of the same volume.  None: spheres."""
 
     @property
     def radii(self) -> Radii:
@@ -271,6 +276,16 @@ class Scene(Table):
             for problem in find_warnings(flatten_keys(self.model_dump(exclude_none=True)))
         )
 
+    @cached_property
+    def form(self) -> Form:
+        """Form of the grains."""
+        return find_form(self.sample.form)
+
+    @property
+    def stones(self) -> bool:
+        """Whether grains are no spheres but bodies of several."""
+        return self.form is not SPHERE
+
     @property
     def container(self) -> Container:
         """The container's geometry, as the scene's engine has it."""
@@ -326,10 +341,10 @@ class Scene(Table):
 
     @property
     def rayleigh_time(self) -> float:
-        """Rayleigh time [s] of the smallest grain the radius distribution allows."""
+        """Rayleigh time [s] of the smallest sphere that the radius distribution allows."""
         grain = self.material.grain
         return contact_law.find_rayleigh_time(
-            self.sample.radii.smallest, grain.density, grain.young, grain.poisson
+            self.form.least * self.sample.radii.smallest, grain.density, grain.young, grain.poisson
         )
 
     @property
@@ -377,14 +392,3 @@ class Scene(Table):
         if self.loading is None:
             return np.zeros_like(np.asarray(phase, float))
         return self.loading.stress_at(phase)
-
-
-def flatten_keys(table: dict[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Values of nested tables by dotted key."""
-    flat: dict[str, Any] = {}
-    for key, value in table.items():
-        if isinstance(value, dict):
-            flat |= flatten_keys(value, f"{prefix}{key}.")
-        else:
-            flat[prefix + key] = value
-    return flat

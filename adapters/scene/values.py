@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 from adapters.bed import Container, Radii, RadiusDistribution
+from adapters.bed.stones import Form, find_form
+from adapters.errors import SceneError
 from adapters.scene.ballast import make_radii
 from trackbed.scene_files import Problem
 
@@ -51,6 +53,17 @@ Check = Callable[[Values], Iterator[Problem]]
 """What a check yields of a scene: nothing where all is well."""
 
 
+def flatten_keys(table: dict[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Values of nested tables by dotted key."""
+    flat: dict[str, Any] = {}
+    for key, value in table.items():
+        if isinstance(value, dict):
+            flat |= flatten_keys(value, f"{prefix}{key}.")
+        else:
+            flat[prefix + key] = value
+    return flat
+
+
 def name_radii(scene: Values) -> str:
     """The key that says how large grains are."""
     return "sample.grading" if scene.has("sample.grading") else "sample.grain_radius.mean"
@@ -67,6 +80,14 @@ def find_radii(scene: Values) -> Radii:
         scene.get(table + "standard_deviation") or 0.0,
         scene.get(table + "truncation") or 2.0,
     )
+
+
+def find_named_form(scene: Values) -> Form:
+    """The form of the grains, of a valid name or file."""
+    try:
+        return find_form(scene.get("sample.form"))
+    except SceneError as error:
+        raise NotValid from error
 
 
 def find_geometry(scene: Values) -> Container:

@@ -11,13 +11,13 @@ import pytest
 from adapters.decks.adopt import adopt
 from adapters.decks.engine import Adopted, run_deck
 from adapters.decks.parse import BEGIN
-from adapters.decks.restart import find_mesh, move_grains, move_stones
 from adapters.decks.run import run_deck_scene
 from adapters.decks.scene import load_deck_scene
 from adapters.decks.split import format_prepare, format_whole, format_window
 from adapters.decks.states import States, load_states, read_states
 from adapters.errors import SceneError
 from adapters.files import RunFolder, read_frames
+from adapters.files.restart import find_mesh, move_grains, move_stones
 from tests import own_decks
 from tests.unit.test_own_decks import write_deck
 from trackbed import command

@@ -39,7 +39,18 @@ def test_help_names_every_verb_and_exit_code(capsys: pytest.CaptureFixture[str])
     assert stop.value.code == 0
     text = capsys.readouterr().out
     shipped = {"doctor", "new", "run", "resume", "status", "report", "export", "fit", "relax"}
-    others = {"adopt", "sweep", "qdem", "grains", "train", "rigid", "line", "validate", "cite"}
+    others = {
+        "adopt",
+        "stone",
+        "sweep",
+        "qdem",
+        "grains",
+        "train",
+        "rigid",
+        "line",
+        "validate",
+        "cite",
+    }
     assert shipped | others == set(VERBS)
     for verb in VERBS:
         assert f"\n    {verb}" in text

@@ -17,13 +17,13 @@ from adapters.decks.detect import find_obstacles
 from adapters.decks.engine import Adopted, explain_failure, list_inputs, list_output_folders
 from adapters.decks.jump import keep_held
 from adapters.decks.parse import BEGIN, Deck, join_lines, read_deck
-from adapters.decks.restart import find_mesh, find_record, move_grains, move_stones
 from adapters.decks.run import Place, write_start
 from adapters.decks.scene import load_deck_scene
 from adapters.decks.split import format_window, list_live
 from adapters.decks.states import States, find_overlap, read_states
 from adapters.errors import EngineFailed, SceneError, UsageError
 from adapters.files import Frame, write_dump
+from adapters.files.restart import find_mesh, find_record, move_grains, move_stones
 from tests import own_decks
 from trackbed import command
 

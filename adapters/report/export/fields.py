@@ -16,13 +16,16 @@ Array = NDArray[np.float64] | NDArray[np.int64]
 def gather_grains(run: ExportedRun, instant: Instant) -> dict[str, Array]:
     """Fields of the grains by name, shape (n,) or (n, 3).
 
-    ``id``; ``radius`` [m]; ``displacement`` since cycle 0 [m], where there are load cycles;
+    ``id``; ``radius`` [m]; ``displacement`` since cycle 0 [m], where there are load cycles, and of
+    stones their ``rotation`` [rad], a vector;
     ``velocity`` [m/s]; ``coordination``, contacts with other grains.
     """
     state = instant.state
     fields: dict[str, Array] = {"id": state.identifier, "radius": state.radius}
     if run.loaded:
         fields["displacement"] = instant.displacement
+        if instant.rotation is not None:
+            fields["rotation"] = instant.rotation
     fields["velocity"] = state.velocity
     return fields | ({"coordination": instant.coordination} if run.own else {})
 

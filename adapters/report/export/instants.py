@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from adapters.bed import FloatArray, IntArray, State, find_pairs
+from adapters.bed import FloatArray, IntArray, State
+from adapters.bed.stones import find_rotation, find_touching
 from adapters.errors import UsageError
 from adapters.procedure import CONTROL, Record, Track, read_run_record
 from adapters.scene import Scene
@@ -20,6 +21,7 @@ class Instant:
 
     state: State
     displacement: FloatArray  # of every grain since cycle 0 [m], shape (n, 3)
+    rotation: FloatArray | None  # of every stone since cycle 0 [rad], shape (n, 3)
     coordination: IntArray
     """Contacts of every grain with other grains, shape (n,); their mean is the run's table's."""
 
@@ -67,15 +69,20 @@ class ExportedRun:
         A jump's end is the first state of the window after it: forces and contacts are then the
         engine's own.  A jump that no window follows yet is left out.
         """
-        start = self.track.start().position
+        start = self.track.start()
         for state in self._states(every):
             both = np.empty(0, np.int64)
             if self.own:  # only pairs of grains are counted
-                touching = find_pairs(state.position, state.radius, self.scene.container.walls())
+                form, walls = self.scene.form, self.scene.container.walls()
+                touching = find_touching(form, state, walls)
                 grains = touching.second >= 0
                 both = np.concatenate([touching.first[grains], touching.second[grains]])
+                both //= len(form.radius)
             coordination = np.bincount(both, minlength=len(state.radius))
-            yield Instant(state, state.position - start, coordination)
+            rotation = None
+            if start.orientation is not None and state.orientation is not None:
+                rotation = find_rotation(start.orientation, state.orientation)
+            yield Instant(state, state.position - start.position, rotation, coordination)
 
     @property
     def last_cycle(self) -> int:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import struct
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from adapters.bed import FloatArray, IntArray
 from adapters.errors import EngineFailed
@@ -17,10 +18,9 @@ from adapters.errors import EngineFailed
 STONE_ID, MASS = 4, 24
 BOUND, CENTRE, VELOCITY = slice(1, 4), slice(5, 8), slice(8, 11)
 MOMENTUM, SPIN = slice(11, 14), slice(14, 17)
+QUATERNION, AXES = slice(17, 21), slice(28, 37)
 """Columns of a body of several spheres: centre of the sphere around it [m], its own centre [m],
-velocity [m/s], angular momentum, angular velocity [rad/s]."""
-
-
+velocity [m/s], angular momentum, angular velocity [rad/s], quaternion, principal axes."""
 IMAGE, TURN = 6, np.array([1, 1 << 10, 1 << 20])
 """Where a sphere's periods are counted, and what one of each axis adds there."""
 
@@ -59,11 +59,14 @@ def find_stones(restart: bytearray, fix: str) -> FloatArray:
     return record[1:].reshape(int(record[0]), -1)
 
 
-def move_stones(restart: bytearray, fix: str, identifier: IntArray, shift: FloatArray) -> None:
-    """Move whole bodies by ``shift`` (s, 3) [m], rotations left alone, and bring them to rest.
+def move_stones(
+    restart: bytearray, fix: str, identifier: IntArray, shift: FloatArray,
+    orientation: FloatArray | None = None,
+) -> None:  # fmt: skip
+    """Move whole bodies by ``shift`` (s, 3) [m] and bring them to rest; turn those that have
+    another ``orientation``, quaternions (s, 4) with the real part first.
 
-    ``identifier`` (s,), ascending, says whose each shift is.  The engine sets the spheres from the
-    bodies.
+    ``identifier`` (s,), ascending, says whose each is.  The engine sets spheres from the bodies.
     """
     stones = find_stones(restart, fix)
     rows = np.searchsorted(identifier, stones[:, STONE_ID])
@@ -71,6 +74,11 @@ def move_stones(restart: bytearray, fix: str, identifier: IntArray, shift: Float
         stones[:, place] += shift[rows]
     for still in (VELOCITY, MOMENTUM, SPIN):
         stones[:, still] = 0.0
+    if orientation is not None:
+        turned = np.flatnonzero((stones[:, QUATERNION] != orientation[rows]).any(axis=1))
+        stones[turned, QUATERNION] = new = orientation[rows[turned]]
+        axes = Rotation.from_quat(np.roll(new, -1, axis=1)).as_matrix().transpose(0, 2, 1)
+        stones[turned, AXES] = axes.reshape(-1, 9)
 
 
 def move_grains(
