@@ -16,7 +16,6 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from importlib.resources import files
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 
@@ -36,18 +35,17 @@ STATE_COLUMNS = "id x y z vx vy vz omegax omegay omegaz radius mass"
 """Columns of ``states.dump`` before the forces of the walls."""
 
 Parameters = dict[str, float | int | str]
-NOTHING: Mapping[bytes, bytes] = MappingProxyType({})
 
 
 def copy_deck(
-    folder: Path, parts: tuple[str, ...], package: str, changes: Mapping[bytes, bytes] = NOTHING
+    folder: Path, parts: tuple[str, ...], package: str, changes: Mapping[bytes, bytes] | None = None
 ) -> dict[str, str]:
     """Copy the named static decks of a package into ``folder``, with ``changes`` of their words;
     returns the SHA-256 of each."""
     digests = {}
     for name in parts:
         text = files(package).joinpath(name).read_bytes()
-        for old, new in changes.items():
+        for old, new in (changes or {}).items():
             text = text.replace(old, new)
         (folder / name).write_bytes(text)
         digests[name] = hashlib.sha256(text).hexdigest()
@@ -72,7 +70,7 @@ class DeckEngine(ProcessEngine):
 
     package: str  # where the static decks are
     loop_time = LOOP_TIME
-    stone_words = NOTHING  # what stones need in place of words of the static decks
+    stone_words: Mapping[bytes, bytes]  # what stones need in place of words of the static decks
 
     @abstractmethod
     def format_scene(self, scene: Scene, piston: bool) -> dict[str, str]:
@@ -81,9 +79,6 @@ class DeckEngine(ProcessEngine):
     @abstractmethod
     def write_start(self, scene: Scene, start: EngineStart, folder: Path) -> Parameters:
         """Files of a window's start besides the restart file; the engine's own parameters."""
-
-    def write_rain(self, scene: Scene, radius: FloatArray, height: float, folder: Path) -> None:
-        """Files of the rain besides ``grains.data``."""
 
     @abstractmethod
     def name_parts(self, scene: Scene) -> Parameters:
@@ -104,7 +99,6 @@ class DeckEngine(ProcessEngine):
             "equilibrium_ratio": PLAN.equilibrium_ratio,
             "steps_per_cycle": count_cycle_steps(scene),
         }
-        self.write_rain(scene, radius, height, folder)
         return self._write(scene, folder, PARTS_PREPARE, parameters, piston=False)
 
     def write_cycles(
@@ -131,7 +125,7 @@ class DeckEngine(ProcessEngine):
         for name, text in texts.items():
             (folder / name).write_text(text)
         named = (str(value) for name, value in parameters.items() if name.endswith("_part"))
-        changes = self.stone_words if scene.stones else NOTHING
+        changes = self.stone_words if scene.stones else None
         return copy_deck(folder, (*parts, *named), self.package, changes)
 
 

@@ -51,11 +51,13 @@ class LiggghtsEngine(DeckEngine):
         states += "include ${bodies_part}\n" * scene.stones
         return {"scene.in": liggghts_decks.format_scene(scene), "dump_states.in": states}
 
-    def write_rain(self, scene: Scene, radius: FloatArray, height: float, folder: Path) -> None:
-        """``stones.in``, where grains are stones."""
+    def write_preparation(
+        self, scene: Scene, position: FloatArray, radius: FloatArray, height: float, folder: Path
+    ) -> dict[str, str]:
+        """As of all engines, and ``stones.in`` where grains are stones."""
         if scene.stones:
-            text = liggghts_stones.format_rain(scene, radius, height)
-            (folder / "stones.in").write_text(text)
+            (folder / "stones.in").write_text(liggghts_stones.format_rain(scene, radius, height))
+        return super().write_preparation(scene, position, radius, height, folder)
 
     def write_start(self, scene: Scene, start: EngineStart, folder: Path) -> Parameters:
         """The piston's mesh, and the moved grains."""

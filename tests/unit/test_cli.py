@@ -39,19 +39,8 @@ def test_help_names_every_verb_and_exit_code(capsys: pytest.CaptureFixture[str])
     assert stop.value.code == 0
     text = capsys.readouterr().out
     shipped = {"doctor", "new", "run", "resume", "status", "report", "export", "fit", "relax"}
-    others = {
-        "adopt",
-        "stone",
-        "sweep",
-        "qdem",
-        "grains",
-        "train",
-        "rigid",
-        "line",
-        "validate",
-        "cite",
-    }
-    assert shipped | others == set(VERBS)
+    others = {"adopt", "sweep", "qdem", "grains", "train", "rigid", "line", "validate", "cite"}
+    assert shipped | others | {"stone"} == set(VERBS)
     for verb in VERBS:
         assert f"\n    {verb}" in text
     codes = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -16,13 +17,16 @@ from adapters.bed.stones.catalogue import CATALOGUE, find_form
 from adapters.bed.stones.form import Form, spread_spheres
 from adapters.bed.stones.solid import integrate_mesh, integrate_union
 from adapters.bed.stones.toml import read_form, write_form
+from adapters.engines.liggghts_stones import format_rain
 from adapters.errors import NotConverged, NotCredible, SceneError, UsageError
 from adapters.files import Frame
 from adapters.files.stones import gather_stones
 from adapters.relaxation.stones import encode, relax_stones
-from adapters.scene.file import load_scene
+from adapters.scene import draw_start, load_scene
 from tests.small_bed import small_bed
 from trackbed import command
+from trackbed.scene_files import GRADINGS, refuse_outside_limits
+from trackbed.scenes import read_template
 
 SAMPLES = 100_000
 CORNER = np.array([*product((0, 1), repeat=3)], float)
@@ -194,13 +198,9 @@ def test_open_meshes_and_wrong_numbers_are_refused() -> None:
     """A cube without a triangle, one turned round, no mesh at all."""
     around = TRIANGLE.copy()
     around[0] = around[0, ::-1]
-    for triangle, what in (
-        (TRIANGLE[1:], "not closed"),
-        (around, "face"),
-        (TRIANGLE[:0], "no tri"),
-    ):
+    for mesh, what in ((TRIANGLE[1:], "not closed"), (around, "face"), (TRIANGLE[:0], "no tri")):
         with pytest.raises(UsageError, match=what):
-            pack_spheres("cube", CORNER, triangle, 2)
+            pack_spheres("cube", CORNER, mesh, 2)
 
 
 @pytest.mark.parametrize(
@@ -257,6 +257,8 @@ def test_spheres_that_left_their_stone_are_seen() -> None:
         (['sample.form="pair"', 'procedure.relaxation="karrech2007"'], "procedure.relaxation",
          "for spheres"),
         (['sample.form="pair"', "sample.radius=0.006"], "sample.grain_radius", "do not fit"),
+        (['sample.form="pair"', "material.wall.rolling_friction=0.1"],
+         "material.wall.rolling_friction", "stands for the form of stones"),
     ],
 )  # fmt: skip
 def test_scenes_of_stones_that_are_refused(
@@ -272,13 +274,33 @@ def test_scenes_of_stones_that_are_refused(
 
 
 def test_a_stone_s_time_step_is_that_of_its_smallest_sphere(tmp_path: Path) -> None:
-    """Rayleigh time over radius is the same; the record of a bed of spheres has no form."""
+    """Rayleigh time over radius is the same; a scene that names no form is of spheres."""
     scene = tmp_path / "scene.toml"
     scene.write_text(small_bed(k=10, h=8, total_cycles=50))
     spheres = load_scene(scene, ['engine.name="liggghts"'])
     stones = load_scene(scene, ['engine.name="liggghts"', 'sample.form="wedge"'])
     assert stones.rayleigh_time == pytest.approx(find_form("wedge").least * spheres.rayleigh_time)
-    assert spheres.sample.form is None  # in karrech.toml's words "sphere"
+    assert load_scene(scene, ['sample.form="sphere"']).form is spheres.form
+
+
+@pytest.mark.parametrize("name", GRADINGS)
+def test_gradings_of_stones_keep_the_limits_of_their_standard(name: str, tmp_path: Path) -> None:
+    """Ten sizes, with their masses and numbers as LIGGGHTS is given them: the mass of all stones is
+    that of the spheres drawn, and each sieve is passed by what the standard allows."""
+    text = re.sub("rolling_friction.*", "", read_template("ballast"))
+    (tmp_path / "scene.toml").write_text(text)
+    words = ['engine.name="liggghts"', 'sample.form="cube"', f'sample.grading="{name}"']
+    scene = load_scene(tmp_path / "scene.toml", words)
+    _, radius, height = draw_start(scene)
+    rain = format_rain(scene, radius, height)
+    mass, share = (np.array(re.findall(pattern, rain), float) for pattern in (
+        r"mass (\S+)", r"stone_\d+ (0\S+)",
+    ))  # fmt: skip
+    size = np.cbrt(6 * mass / (np.pi * scene.material.grain.density))
+    count = np.round(share * len(radius)).astype(int)
+    assert (len(size), count.sum()) == (10, len(radius))
+    assert count @ size**3 == pytest.approx(8 * (radius**3).sum(), rel=1e-9)
+    refuse_outside_limits(GRADINGS[name], np.repeat(size, count))
 
 
 def test_stone_is_a_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -14,15 +14,10 @@ from adapters.errors import SceneError
 from trackbed.run_files import write_whole
 from trackbed.scene_files import Positive, Real, Table
 
-TEXT = """\
-# A stone of {count} spheres for sample.form; written by trackbed stone.  Lengths in m, about the
-# centre of mass along the principal axes; volume and inertia are the stone's, not the spheres'.
-name = "{name}"
-volume = {volume!r}  # m^3
-inertia = {inertia!r}  # principal moments over the mass [m^2]
-spheres = [  # x, y, z, radius
-{rows}
-]
+HEAD = """\
+# A stone for sample.form; written by trackbed stone.  Lengths in m, about the centre of mass along
+# the principal axes; volume [m^3] and inertia, principal moments over the mass [m^2], are the
+# stone's, not the spheres': x, y, z, radius of each.
 """
 
 
@@ -37,13 +32,11 @@ class Stone(Table):
 
 def write_form(form: Form, size: float, path: Path) -> None:
     """Write a form of a stone whose volume is that of a sphere of radius ``size`` [m]."""
-    spheres = size * np.column_stack([form.place, form.radius])
-    text = TEXT.format(
-        count=len(spheres), name=form.name, volume=float(4 / 3 * np.pi * size**3),
-        inertia=(form.inertia * size**2).tolist(),
-        rows="\n".join(f"    {row!r}," for row in spheres.tolist()),
-    )  # fmt: skip
-    write_whole(path, text)
+    spheres, moments = np.column_stack([form.place, form.radius]), form.inertia * size**2
+    text = f'name = "{form.name}"\nvolume = {4 / 3 * np.pi * float(size) ** 3!r}\n'
+    text += f"inertia = {moments.tolist()!r}\nspheres = [\n"
+    rows = (f"    {row!r},\n" for row in (size * spheres).tolist())
+    write_whole(path, HEAD + text + "".join(rows) + "]\n")
 
 
 def read_form(path: str) -> Form:
