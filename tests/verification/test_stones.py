@@ -293,9 +293,8 @@ def test_gradings_of_stones_keep_the_limits_of_their_standard(name: str, tmp_pat
     scene = load_scene(tmp_path / "scene.toml", words)
     _, radius, height = draw_start(scene)
     rain = format_rain(scene, radius, height)
-    mass, share = (np.array(re.findall(pattern, rain), float) for pattern in (
-        r"mass (\S+)", r"stone_\d+ (0\S+)",
-    ))  # fmt: skip
+    patterns = r"mass (\S+)", r"stone_\d+ (0\S+)"
+    mass, share = (np.array(re.findall(one, rain), float) for one in patterns)
     size = np.cbrt(6 * mass / (np.pi * scene.material.grain.density))
     count = np.round(share * len(radius)).astype(int)
     assert (len(size), count.sum()) == (10, len(radius))
