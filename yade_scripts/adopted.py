@@ -21,7 +21,7 @@ import numpy as np
 import yade
 from yade import Omega, plot, wrapper
 
-from yade_scripts.record import load_scene, split_vector, write_scene
+from .record import load_scene, split_vector, write_scene
 
 O = Omega()
 DECLARED = (ast.Import, ast.ImportFrom, ast.FunctionDef, ast.ClassDef)

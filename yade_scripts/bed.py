@@ -27,8 +27,8 @@ velocities, which the law divides by the step, keep their digits."""
 
 
 def read_parameters():
-    """The JSON file named on the command line."""
-    with open(sys.argv[1], encoding="utf-8") as stream:
+    """The JSON file named on the command line, else the one that the engine writes."""
+    with open([*sys.argv, "params.json"][1], encoding="utf-8") as stream:
         return json.load(stream)
 
 

@@ -214,12 +214,16 @@ def test_move_is_the_smallest(bed: Bed) -> None:
 
 
 def test_equilibrium_does_not_move(settled: Bed) -> None:
-    """A bed whose forces balance moves by less than 1 um (by nothing)."""
+    """A bed whose forces balance stays as it is beside its own contacts.
+
+    Without them known it moves by less than 1 um: a contact that wedges carries more than the
+    weight, of which the bound of overlaps knows nothing, and is brought down to that.
+    """
     state, walls = settled
     found = relax(state.position, state, walls, STIFFNESS)
     assert found.largest_move < 1e-12
     assert found.coordination_change == 0
-    assert relax_bare(state, walls, STIFFNESS).largest_move < 1e-12
+    assert relax_bare(state, walls, STIFFNESS).largest_move < 1e-6
 
 
 def test_printed_functional_holds_its_own_equilibrium(settled: Bed) -> None:

@@ -19,7 +19,6 @@ from adapters.bed.sample import GRAVITY
 from adapters.bed.state import FloatArray, load_state
 from adapters.engines.contract import get_engine
 from adapters.engines.process import explain_engine_failure, run_process
-from adapters.engines.yade import PARAMETERS
 from adapters.errors import NotCredible
 from adapters.files.dump_reader import read_frames
 from adapters.procedure.progress import Progress
@@ -43,7 +42,6 @@ write_dump grains custom end.dump {columns} modify sort id {precise}
 """
 
 SCRIPT = """\
-import json
 import os
 import sys
 
@@ -53,8 +51,7 @@ import record
 from yade import Omega
 
 O = Omega()
-with open("{parameters}") as stream:
-    parameters = json.load(stream)
+parameters = bed.read_parameters()
 bed.add_materials(parameters)
 bed.add_grains(parameters)
 bed.add_walls(parameters)
@@ -164,7 +161,7 @@ def mirror_tiles(
 def write_deck(engine: str, steps: int) -> str:
     """Deck or script that runs a settled bed for ``steps``."""
     if engine == "yade":
-        return SCRIPT.format(steps=steps, columns=COLUMNS, parameters=PARAMETERS)
+        return SCRIPT.format(steps=steps, columns=COLUMNS)
     precise = "format float %.17g" if engine == "lammps" else 'format "%d' + " %.17g" * 8 + '"'
     return DECK.format(steps=steps, columns=COLUMNS, precise=precise)
 
