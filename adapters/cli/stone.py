@@ -7,8 +7,8 @@ from pathlib import Path
 
 from adapters.errors import UsageError
 
-UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
-"""Length of a unit [m]."""
+UNITS = ("m", "cm", "mm")
+"""Of lengths in meshes."""
 SPHERES_MOST = 200
 """Spheres of a stone at most: a bed of such stones costs as much as one of meshes."""
 
@@ -35,6 +35,7 @@ def run_stone(arguments: argparse.Namespace) -> int:
 
     from adapters.bed.stones import pack_spheres, write_form
     from trackbed.mesh_file import read_mesh_file
+    from trackbed.series_file import SI
 
     out = arguments.out or Path(arguments.mesh.stem + ".toml")
     if out.suffix != ".toml" or out.exists() or not 1 <= arguments.spheres <= SPHERES_MOST:
@@ -42,7 +43,7 @@ def run_stone(arguments: argparse.Namespace) -> int:
         raise UsageError(what, where=str(out), remedy="name another file, or other spheres")
     mesh = read_mesh_file(arguments.mesh, str(arguments.mesh))
     triangles = mesh.cells_dict.get("triangle", np.empty((0, 3), np.int64))
-    points = UNITS[arguments.unit] * mesh.points.astype(float)
+    points = SI[arguments.unit] * mesh.points.astype(float)
     try:
         form, size, fits = pack_spheres(
             arguments.mesh.stem, points, triangles.astype(np.int64), arguments.spheres

@@ -11,13 +11,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import liggghts_inputs
 from adapters.bed import Contacts, Container, State
 from adapters.bed.stones import find_kinetic_energies, find_rotation, find_touching, pack_spheres
 from adapters.bed.stones.catalogue import CATALOGUE, find_form
 from adapters.bed.stones.form import Form, spread_spheres
 from adapters.bed.stones.solid import integrate_mesh, integrate_union
 from adapters.bed.stones.toml import read_form, write_form
-from adapters.engines.liggghts_stones import format_rain
+from adapters.engines.liggghts_stones import WORDS, format_rain
 from adapters.errors import NotConverged, NotCredible, SceneError, UsageError
 from adapters.files import Frame
 from adapters.files.stones import gather_stones
@@ -315,3 +316,9 @@ def test_stone_is_a_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     assert read_form(str(out)).place.shape == (1, 3)
     assert command.main(words) == 2
     assert "not there yet" in capsys.readouterr().err
+
+
+def test_words_that_stones_replace_stand_in_the_decks_of_spheres() -> None:
+    """A word that a deck has no longer would leave a bed of spheres, and nobody would say so."""
+    decks = b"".join(path.read_bytes() for path in Path(liggghts_inputs.__path__[0]).glob("*in*"))
+    assert [old for old in WORDS if old not in decks] == []
