@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, PlainValidator
+from pydantic import BeforeValidator, Field
 
 from adapters.bed import GradedRadii
 from adapters.errors import SceneError
@@ -41,7 +41,7 @@ def read_grading(key: Any) -> str | Sieves:
     return key
 
 
-GradingKey = Annotated[str | Sieves, PlainValidator(read_grading)]
+GradingKey = Annotated[str | Sieves, BeforeValidator(read_grading)]
 
 
 class Stage(Table):
