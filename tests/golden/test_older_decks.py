@@ -1,11 +1,9 @@
-"""What a scene does not name is not in its deck: generated input of older scenes, byte for byte.
-
-The digests were made before scenes could name gradings, rolling friction, blocks and stages.
-"""
+"""What a scene does not name is not in its deck: generated input of older scenes, byte for byte."""
 
 from __future__ import annotations
 
 import hashlib
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -13,17 +11,41 @@ import pytest
 
 from adapters.bed.state import State
 from adapters.engines.contract import EngineStart, get_engine
+from adapters.scene.file import load_scene
+from adapters.scene.stages import draw_start
 from adapters.scene.tables import Scene
+from tests.golden.digests import DECKS, RAIN
 from tests.unit.test_decks import KINDS, STARTS, scene
+from trackbed.scenes import find_scene_file
 
-DIGESTS = {"liggghts": "2eed4c670540c883", "lammps": "3ebdcb7838600de6", "yade": "bb207c2191750d79"}
-"""SHA-256 of names and texts of all files but restarts and YADE's scripts, which read the rest."""
+SCENES = ("karrech", "karrech-coarse", "karrech-partial")
+SEEDS = (1, 101)
 
 
-@pytest.mark.parametrize("name", DIGESTS)
+def digest_files(home: Path) -> str:
+    """Sixteen digits of the names and texts in a folder that `tests.golden.digests` is about."""
+    digest = hashlib.sha256()
+    for path in sorted(home.rglob("*.*")):
+        if path.suffix not in (".py", ".restart"):
+            digest.update(str(path.relative_to(home)).encode() + path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+@pytest.mark.parametrize("name", RAIN)
+def test_older_scenes_rain_as_they_did(name: str, tmp_path: Path) -> None:
+    """Radii, places and decks of the rain, of every seed."""
+    for kind, seed in product(SCENES, SEEDS):
+        (home := tmp_path / f"{kind}-{seed}").mkdir()
+        settings = [f'engine.name="{name}"', f"sample.seed={seed}"]
+        one = load_scene(find_scene_file(kind), settings)
+        get_engine(name).write_preparation(one, *draw_start(one), home)
+    assert digest_files(tmp_path) == RAIN[name]
+
+
+@pytest.mark.parametrize("name", DECKS)
 def test_older_scenes_have_their_decks(name: str, tmp_path: Path) -> None:
     """Rain and all starts of a window, in all kinds of scenes of the decks' test."""
-    digest, engine = hashlib.sha256(), get_engine(name)
+    engine = get_engine(name)
     for kind in KINDS:
         given = scene(tmp_path, kind).model_dump(exclude_none=True)
         one = Scene.model_validate(given | {"engine": given["engine"] | {"name": name}})
@@ -42,7 +64,4 @@ def test_older_scenes_have_their_decks(name: str, tmp_path: Path) -> None:
             )  # fmt: skip
             (home / start).mkdir()
             engine.write_cycles(one, begin, 3, home / start)
-        for path in sorted(home.rglob("*.*")):
-            if path.suffix not in (".py", ".restart"):
-                digest.update(str(path.relative_to(tmp_path)).encode() + path.read_bytes())
-    assert digest.hexdigest()[:16] == DIGESTS[name]
+    assert digest_files(tmp_path) == DECKS[name]

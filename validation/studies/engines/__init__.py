@@ -26,4 +26,4 @@ step; the cost of a step is the difference of two runs of different length, so t
 not count; a run is refused unless all grains are left, finite and at rest at its end.
 """
 
-ROOMS = "adapters: bed engines procedure.stages"
+ROOMS = "adapters: bed.overlaps engines.process files.window; tests: golden.digests"

@@ -36,4 +36,6 @@ Restart files and states are not kept in the record: ``python -m validation.stud
 TRACKBED_VALIDATION names; a run that was killed goes on there.
 """
 
-ROOMS = "adapters: bed engines jumps moves procedure.forecast procedure.stages relaxation"
+ROOMS = (
+    "adapters: jumps moves procedure.forecast procedure.stages relaxation; tests: golden.digests"
+)
