@@ -37,6 +37,7 @@ class Settled:
     asked: int  # members in all
     cycle: int
     loaded_body: Mean  # permanent settlement of the loaded body since the preparation [m]
+    first_cycle: Mean  # of it in the first cycle, which the body finds its seat in [m]
     stiffness: Mean  # secant stiffness under it in the last cycles computed [N/m]
     mean_grain: Mean
     """Settlement of the mean grain [m]; of one run with a tolerance its band is that of a full run
@@ -87,9 +88,9 @@ def judge_members(record: Record) -> Settled | None:
         if one.control is not None and at and find_comparable_cycle(one) == at
     ]
     jumps = [span[0] for one in runs for span in list_jumped_spans(one.run.outcomes)]
-    sunk, grain = (
-        average_members([one.run.history.gain(0, cycle, of) for one in runs])
-        for of in ("loaded_body", "settlement")
+    sunk, seated, grain = (
+        average_members([one.run.history.gain(0, last, of) for one in runs])
+        for last, of in ((cycle, "loaded_body"), (1, "loaded_body"), (cycle, "settlement"))
     )
     band = estimate_band_of_run(record.run)
     if len(runs) == 1 and band is not None:
@@ -99,7 +100,7 @@ def judge_members(record: Record) -> Settled | None:
     )
     spent, spent_by_full = (sum(pair[i].gain(0, at, "cpu_s") for pair in pairs) for i in (0, 1))
     return Settled(
-        members=len(runs), asked=record.asked, cycle=cycle, loaded_body=sunk,
+        members=len(runs), asked=record.asked, cycle=cycle, loaded_body=sunk, first_cycle=seated,
         stiffness=average_members([one.run.history.late_mean("stiffness", cycle) for one in runs]),
         mean_grain=grain, cost=sum_members_cost(record), pairs=len(pairs), compared_at=at,
         error=error, mean_grain_error=grain_error, speed_up=find_speed_up(spent_by_full, spent),
@@ -147,6 +148,8 @@ def describe_sleeper(settled: Settled) -> str:
     members = f"{settled.members} of {settled.asked}" if settled.members < settled.asked else ""
     body = format_length(settled.loaded_body, members or f"{settled.members}")
     said = f"sleeper settles {body} by cycle {settled.cycle:,}"
+    if settled.cycle > 1 and isfinite(first := settled.first_cycle.value) and first:
+        said += f", {format_length(Mean(first))} of it in the first"
     if isfinite(settled.stiffness.value):
         said += f"; stiffness {1e-6 * settled.stiffness.value:.3g} kN/mm"
     if isfinite(settled.speed_up):
