@@ -3,17 +3,34 @@
 from __future__ import annotations
 
 import csv
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from adapters.engines.contract import Engine, get_engine, list_engines, list_real_engines
-from adapters.errors import EngineMissing
+from adapters.errors import EngineMissing, SceneError
 from adapters.files.run_folder import RunFolder
 from adapters.files.window import load_window
+from adapters.scene.file import load_scene
+from adapters.scene.stages import draw_start
 from tests.contracts.protocols import list_missing
 from tests.engine_sample import AFTER, FIRST, JUMP, SECOND, Sample
+from trackbed.scenes import find_scene_file
 
+BALLAST_PAGE = Path(__file__).parents[2] / "docs" / "ballast.md"
+
+SCENES = {
+    "spheres, gradings": ("ballast", ()),
+    "cylinders, boxes, mirror planes": ("karrech", ()),
+    "resistance to rolling": ("karrech", ("material.grain.rolling_friction=0.2",)),
+    "a block on its footprint, a piston on a share of the section": ("karrech-partial", ()),
+    "loads in stages, series of stress": ("ballast", (
+        "loading.stage=[{from_cycle=9,amplitude=1e5,mean=6e4,frequency=9.0}]",)),
+    "less friction while it rains": ("ballast", ("sample.rain_friction=0.1",)),
+    "stones of several spheres": ("karrech-coarse", ('sample.form="tetrahedron"',)),
+}  # fmt: skip
+"""Scene and keys of each row of the page's table; decks of the user's own are no scene of these."""
 every_engine = pytest.mark.parametrize("name", list_engines())
 
 
@@ -41,6 +58,23 @@ def test_places_in_auto_differ() -> None:
     """No two engines have one place among those that ``auto`` tries."""
     places = [get_engine(name).auto_order for name in list_real_engines()]
     assert len(set(places)) == len(places)
+
+
+@pytest.mark.parametrize("row", SCENES)
+def test_the_page_says_what_each_engine_takes(row: str, tmp_path: Path) -> None:
+    """An engine takes a scene when it writes the rain of it."""
+    kind, keys = SCENES[row]
+    words = []
+    for name in sorted(list_real_engines()):
+        try:
+            scene = load_scene(find_scene_file(kind), [f'engine.name="{name}"', *keys])
+        except SceneError:
+            words.append("no")
+            continue
+        (tmp_path / name).mkdir()
+        get_engine(name).write_preparation(scene, *draw_start(scene), tmp_path / name)
+        words.append("yes")
+    assert f"| {row} | {' | '.join(words)} |" in BALLAST_PAGE.read_text(encoding="utf-8")
 
 
 @pytest.mark.long
