@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, fields
+from math import nan, pi, sqrt
 
 import numpy as np
 
@@ -19,6 +20,7 @@ class BoundNumbers:
 
     force_error: float = 0.25  # greatest rms of force minus target in a cycle over its peak [-]
     force_error_goal: float = 0.03  # the same, as the report's goal [-]
+    own_frequency: float = 4.0  # of a piston on its bed over the load's: below, inertia is felt [-]
     force_start_cycles: int = 3  # in which the piston finds the bed: its force is not judged
     rise_floor: float = 1e-3  # less of the mean radius hurts nothing, whatever the window shows [-]
 
@@ -36,6 +38,7 @@ class WindowFigures:
     move_share: float  # greatest mean move of the grains in one cycle over their mean radius
     force_error: float
     """Greatest rms force error of the piston after the first cycles; nan in a short window."""
+    own_frequency: float  # sqrt(k/m) of the piston on its bed over the load's; nan where unknown
 
 
 def check_complete(scene: Scene, window: Window, cycles: int) -> None:
@@ -122,8 +125,20 @@ def measure(scene: Scene, window: Window) -> WindowFigures:
         float(max(overlaps)) / (float(window.radius.min()) * scene.form.usual),
         float(max(kinetic) / (GRAVITY * np.sum(window.mass) * window.radius.mean())),
         float(move.max() / window.radius.mean()),
-        float(force_error.max()) if len(force_error) else float("nan"),
+        float(force_error.max()) if len(force_error) else nan,
+        find_own_frequency(scene, window),
     )
+
+
+def find_own_frequency(scene: Scene, window: Window) -> float:
+    """Frequency sqrt(k/m)/2 pi of the piston on its bed over the load's [-]: undamped it misses its
+    load by 1 in that number squared, less one.  nan where the bed never gave way."""
+    assert scene.loading is not None  # it would have no piston
+    known = window.piston.stiffness(scene.steps_per_cycle)
+    known = known[np.isfinite(known)]
+    if not len(known):
+        return nan
+    return sqrt(np.median(known) / scene.loading.piston_mass) * scene.loading.period / (2 * pi)
 
 
 def check_bounds(scene: Scene, figures: WindowFigures) -> None:
@@ -133,7 +148,7 @@ def check_bounds(scene: Scene, figures: WindowFigures) -> None:
         "shorten it below 0.2" if share > 0.2 else "look at the scene's load and stiffness"
     )
     if figures.force_error > BOUNDS.force_error:
-        remedy += f"; {advise_heavier_piston(scene)}"
+        remedy += f"; {advise_other_piston(scene, figures.own_frequency)}"
     bounds = (
         ("the greatest overlap over the smallest radius", figures.overlap_share, OVERLAP_BOUND),
         ("kinetic energy over weight times radius at a cycle end", figures.energy_share, 1.0),
@@ -145,11 +160,19 @@ def check_bounds(scene: Scene, figures: WindowFigures) -> None:
             raise NotCredible(f"{what} is {value:.3g}, above {bound:g}", remedy=remedy)
 
 
-def advise_heavier_piston(scene: Scene) -> str:
-    """What to do with a piston that does not follow its load; a light one bounces."""
+def advise_other_piston(scene: Scene, own_frequency: float) -> str:
+    """What to do with a piston that does not follow its load: a light one bounces from grain to
+    grain, a heavy one swings on its bed, ``own_frequency`` times as fast as the load."""
     assert scene.loading is not None  # it would have no piston
+    mass = scene.loading.piston_mass
+    if own_frequency < BOUNDS.own_frequency:
+        return (
+            f"the piston of {mass:g} kg swings on this bed {own_frequency:.2g} times as fast as "
+            "its load and does not follow it: a lighter one (loading.piston_mass), or a lower "
+            "loading.frequency"
+        )
     radius = np.array([scene.sample.radii.mean])
-    grains = scene.loading.piston_mass / find_sample_mass(radius, scene.material.grain.density)[0]
+    grains = mass / find_sample_mass(radius, scene.material.grain.density)[0]
     return (
         f"the piston, as heavy as {grains:.2g} mean grains, does not follow its load: a heavier "
         "one (loading.piston_mass), or a lower loading.frequency"

@@ -96,6 +96,7 @@ def test_a_whole_window_passes() -> None:
         "energy_share": 0.0,
         "move_share": 0.0,
         "force_error": 0.0,
+        "own_frequency": pytest.approx(np.nan, nan_ok=True),
     }
 
 
@@ -201,7 +202,7 @@ def test_a_spring_under_the_piston_has_its_own_stiffness() -> None:
 @pytest.mark.parametrize("excess", [1 + 1e-9, 10.0, np.inf])
 def test_bounds(name: str, bound: float, words: str, excess: float) -> None:
     """At a bound a window passes, above it the figure and the time step are named."""
-    still = WindowFigures(0.0, 0.0, 0.0, 0.0)
+    still = WindowFigures(0.0, 0.0, 0.0, 0.0, 9.0)
     check_bounds(SCENE, replace(still, **{name: bound}))
     with pytest.raises(NotCredible, match=words) as caught:
         check_bounds(SCENE, replace(still, **{name: bound * excess}))
@@ -209,6 +210,20 @@ def test_bounds(name: str, bound: float, words: str, excess: float) -> None:
     assert "of the Rayleigh time" in caught.value.remedy
     # 10 g over 4/3 pi (3 mm)^3 at 2710 kg/m^3
     assert ("as heavy as 33 mean grains" in caught.value.remedy) == (name == "force_error")
+
+
+@pytest.mark.parametrize(("times", "word"), [(3.9, "lighter"), (4.1, "heavier")])
+def test_a_piston_that_swings_is_to_be_lighter(times: float, word: str) -> None:
+    """On a spring k = m (2 pi f times)^2, f of the load, the piston's own frequency is ``times``
+    the load's, and below four the remedy for a force that it misses is less mass."""
+    assert SCENE.loading is not None
+    stiffness = SCENE.loading.piston_mass * (2 * np.pi * times / SCENE.loading.period) ** 2
+    plain = window().piston
+    figures = measure(SCENE, tracked(height=0.01 - plain.target_force / stiffness))
+    assert figures.own_frequency == pytest.approx(times, rel=1e-9)
+    with pytest.raises(NotCredible) as caught:
+        check_bounds(SCENE, replace(figures, force_error=0.3))
+    assert f"a {word} one (loading.piston_mass)" in caught.value.remedy
 
 
 def test_missing_cycles() -> None:

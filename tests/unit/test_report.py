@@ -129,7 +129,8 @@ def test_status_ends_with_what_came_out(
     first = read_run_record(finished).run.history.gain(0, 1, "loaded_body")
     assert sleeper == (
         f"sleeper settles {1e6 * numbers['loaded_body']:.3g} um (one member, so no band) by cycle "
-        f"40, {1e6 * first:.3g} um of it in the first; stiffness {1e-6 * numbers['stiffness']:.3g} kN/mm; {ratio}; error "
+        f"40, {1e6 * first:.3g} um of it in the first; "
+        f"stiffness {1e-6 * numbers['stiffness']:.3g} kN/mm; {ratio}; error "
         f"{100 * run['loaded_body_error']:+.1f} %"
     )
     assert main(["status", str(finished), "--json"]) == 0

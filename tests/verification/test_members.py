@@ -217,8 +217,8 @@ def test_a_damaged_member_is_named_with_its_remedy(copy: Path, capsys) -> None:
     ("changes", "said"),
     [
         ({}, "sleeper settles 3.41 mm (2.9 ... 3.9; 5 members; chaos 0.52) by cycle 10,000, "
-         "2.5 mm of it in the first; stiffness 41 kN/mm; 9.6 times cheaper; error +3.0 % (-2.0 ... +8.0), chaos of the full "
-         "runs 15.0 %"),
+         "2.5 mm of it in the first; stiffness 41 kN/mm; 9.6 times cheaper; error "
+         "+3.0 % (-2.0 ... +8.0), chaos of the full runs 15.0 %"),
         ({"members": 1, "asked": 1, "loaded_body": Mean(3.41e-4), "first_cycle": Mean(0.0),
           "stiffness": Mean(nan), "speed_up": 0.5, "error": Mean(-0.25), "compared_at": 1000},
          "sleeper settles 341 um (one member, so no band) by cycle 10,000; 2.0 times dearer; error "
@@ -229,7 +229,8 @@ def test_the_sentence_says_what_is_known(changes: dict[str, Any], said: str) -> 
     """Millimetres from one on; of one member no band."""
     settled = Settled(
         members=5, asked=5, cycle=10_000, loaded_body=Mean(3.41e-3, (2.9e-3, 3.9e-3), 5.2e-4),
-        first_cycle=Mean(2.5e-3), stiffness=Mean(41e6), mean_grain=Mean(nan), cost=1.0, pairs=5, compared_at=10_000,
+        first_cycle=Mean(2.5e-3), stiffness=Mean(41e6), mean_grain=Mean(nan), cost=1.0, pairs=5,
+        compared_at=10_000,
         error=Mean(0.03, (-0.02, 0.08), 0.15), mean_grain_error=Mean(nan), speed_up=9.6,
     )  # fmt: skip
     assert describe_sleeper(replace(settled, **changes)) == said
