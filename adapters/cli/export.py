@@ -12,6 +12,7 @@ OPENED_BY = {
     "vtu": "ParaView; colour grains by displacement, glyph: sphere, scale: radius, factor 2",
     "ovito": "OVITO; contacts by its modifier Load trajectory",
     "csv": "a spreadsheet, pandas or R",
+    "vtkhdf": "ParaView, which takes numbered files as one series, or a code that reads ON-DEM",
 }
 """Format -> what opens it."""
 
@@ -46,7 +47,7 @@ def run_export(arguments: argparse.Namespace) -> int:
         size = sum(path.stat().st_size for path in files)
         print_json({"to": arguments.to, "bytes": size, "files": [str(path) for path in files]})
     else:
-        for path in (path for path in files if path.parent == into):
+        for path in [path for path in files if path.parent == into] or files[:1]:
             print(path)
         print(f"open it in {OPENED_BY[arguments.to]}")
     return 0

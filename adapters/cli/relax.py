@@ -12,10 +12,12 @@ from adapters.errors import UsageError
 
 def register(verb: str, parser: argparse.ArgumentParser) -> None:
     """Arguments of ``relax``."""
-    parser.add_argument("state", metavar="STATE", type=Path, help="a .npz of trackbed or a dump")
+    parser.add_argument(
+        "state", metavar="STATE", type=Path, help="a .npz of trackbed, .vtkhdf of ON-DEM or a dump"
+    )
     parser.add_argument(
         "--out", metavar="STATE", type=Path, required=True,
-        help=".npz; or .dump, .lammpstrj, .liggghts for a dump, also with .gz, .bz2, .xz behind",
+        help=".npz, .vtkhdf; or .dump, .lammpstrj, .liggghts, also with .gz, .bz2, .xz behind",
     )  # fmt: skip
     parser.add_argument(
         "--scene", type=Path, help="for walls and stiffness; default: that of the run STATE is in"

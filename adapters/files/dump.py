@@ -26,6 +26,7 @@ OTHER_FORMATS = {
     b"BZh": "bzip2 data: give the file a name that ends in .bz2",
     b"\xfd7zXZ": "xz data: give the file a name that ends in .xz",
     b"\x28\xb5\x2f\xfd": "zstd data: unpack it first (zstd -d FILE)",
+    b"\x89HDF": "HDF5 data: give an ON-DEM state a name that ends in .vtkhdf",
     b"PK\x03\x04": "a zip or npz archive: give the text dump, or a table named .xlsx",
     b"\xd0\xcf\x11\xe0": "an old spreadsheet: save it as .xlsx or .csv",
     b"\x89PNG": "a PNG image: give the text dump",

@@ -16,6 +16,7 @@ import numpy as np
 from adapters.bed import FloatArray, IntArray
 from adapters.errors import DumpError, UsageError
 from adapters.files.dump import OTHER_FORMATS, PACKED, Frame, Header, Kind, list_grains
+from adapters.files.ondem import ENDING, read_bodies
 
 TEXT_BLOCK = 1 << 20
 """Bytes read at once; also the longest line that is taken for text."""
@@ -38,22 +39,23 @@ def read_frames(path: str | Path, whole: bool = True) -> Iterator[Frame]:
     left out, as of a run that went on in the same file.  Where the ``whole`` series counts, a grain
     that was in a frame must be in all later ones.  Raises `DumpError` at the first fault, after the
     whole frames before it; `UsageError` when the file cannot be opened.
-    Not for ``.bin``, VTK or image dumps, nor for text columns such as ``element``.
+    A ``.vtkhdf`` is one frame (`ondem`).  Not for ``.bin``, VTK or image dumps, nor text columns.
     """
     path = Path(path)
     if path.suffix == ".toml":
         do = f"run it, then give what came out: trackbed run {path}"
         raise UsageError("this is a scene, no series and no state", where=str(path), remedy=do)
     try:
-        packed = PACKED.get(path.suffix)
-        stream = packed(path) if packed else path.open("rb", buffering=0)
+        stream = PACKED.get(path.suffix, open)(path, "rb")
     except OSError as error:
         raise UsageError(
-            f"the dump cannot be opened ({error.strerror})",
-            where=str(path),
+            f"the dump cannot be opened ({error.strerror})", where=str(path),
             remedy="give a file: check its name, and that the engine's dump came to its first step",
-        ) from error
+        ) from error  # fmt: skip
     with stream:
+        if path.suffix == ENDING:
+            yield Frame(*read_bodies(path))
+            return
         reader = Reader(path, stream)
         while (frame := reader.read_frame()) is not None:
             if not reader.repeated:

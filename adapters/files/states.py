@@ -1,4 +1,4 @@
-"""States as users have them in files: ``.npz`` of trackbed, or a text dump of an engine."""
+"""States in files: ``.npz`` of trackbed, ``.vtkhdf`` of ON-DEM, or a text dump of an engine."""
 
 from __future__ import annotations
 
@@ -10,10 +10,12 @@ from adapters.bed import FloatArray, State, load_state, save_state
 from adapters.errors import DumpError, UsageError
 from adapters.files.dump import EXTENSIONS, PACKED, Frame, write_dump
 from adapters.files.dump_reader import read_last_frame
+from adapters.files.ondem import ENDING, write_bodies
 
 
 def read_state_file(path: Path, density: float) -> State:
-    """A state from ``path``: ``.npz`` as `adapters.bed.load_state`, else a dump's last frame.
+    """A state from ``path``: ``.npz`` as `adapters.bed.load_state`, else a dump's last frame,
+    or the spheres of ``.vtkhdf``.
 
     A dump needs the columns id, radius and places.  Without its own columns, a mass is that of a
     sphere of ``density`` [kg/m^3] and a velocity is zero; contacts and piston it has none.
@@ -42,21 +44,27 @@ def read_state_file(path: Path, density: float) -> State:
 def check_state_name(path: Path) -> None:
     """Raise `UsageError` for the name of another kind of file."""
     kept = path.with_suffix("") if path.suffix in PACKED else path
-    if not (kept.suffix in (*EXTENSIONS, ".npz", "") or kept.suffix[1:].isdecimal()):
+    if path.suffix != ENDING and not (
+        kept.suffix in (*EXTENSIONS, ".npz", "") or kept.suffix[1:].isdecimal()
+    ):
         raise UsageError(
             f"a state is no {path.suffix} file", where=str(path),
-            remedy=f"name it .npz, or {', '.join(EXTENSIONS)} for a dump",
+            remedy=f"name it .npz, or {', '.join(EXTENSIONS)} for a dump, or {ENDING}",
         )  # fmt: skip
 
 
 def write_state_file(state: State, path: Path) -> None:
-    """Write a state to ``path``: ``.npz`` whole and without loss, else its grains as a dump.
+    """Write a state to ``path``: ``.npz`` whole and without loss, else its grains as a dump or,
+    ``.vtkhdf``, with their contacts.
 
     Raises `UsageError` as `check_state_name`.
     """
     check_state_name(path)
     if path.suffix == ".npz":
         save_state(state, path)
+        return
+    if path.suffix == ENDING:
+        write_bodies(path, state, {"iteration": state.time_step}, {})
         return
     columns = ("id", *"xyz", "vx", "vy", "vz", "omegax", "omegay", "omegaz", "radius", "mass")
     values = np.column_stack(

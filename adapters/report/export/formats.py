@@ -1,4 +1,4 @@
-"""A run in the formats of other tools: VTU for ParaView, dumps for OVITO, CSV for everything else.
+"""A run in the formats of other tools: VTU for ParaView, dumps for OVITO, ON-DEM's VTKHDF, CSV.
 
 A file holds what the scene names: without friction there is no tangential force, without load
 cycles no displacement and no piston.  Cycles inside a jump have no state, only its end has.
@@ -15,6 +15,7 @@ from adapters.bed import FloatArray, IntArray
 from adapters.engines import bound_section
 from adapters.errors import UsageError
 from adapters.files import Frame, Kind, explain_full_disk, write_dump
+from adapters.files.ondem import write_bodies
 from adapters.report.export.fields import (
     Array,
     gather_contacts,
@@ -166,7 +167,28 @@ def write_csv_rows(path: Path, parts: Iterable[Mapping[str, Array]]) -> None:
             stream.writelines(",".join(map(repr, row)) + "\n" for row in rows)
 
 
-FORMATS = {"vtu": export_vtu, "ovito": export_ovito, "csv": export_csv}
+def export_vtkhdf(run: ExportedRun, into: Path, every: int) -> list[Path]:
+    """``vtkhdf/grains_000000.vtkhdf`` and on: a state of `write_bodies` an instant, of any engine.
+
+    The time is that under load, jumped cycles included; not known of a deck, nor where stages of a
+    load have other frequencies.
+    """
+    (into / "vtkhdf").mkdir(exist_ok=True)
+    loading, material, written = None, {}, []
+    if run.own:
+        grain, loading = run.scene.material.grain, run.scene.loading
+        material = {name: getattr(grain, name) for name in ("density", "young", "poisson")}
+        material["friction_coefficient"] = grain.friction
+    for instant in run.instants(every):
+        scene: dict[str, float] = {"cycle": instant.cycle}
+        if loading is not None and not loading.stage:
+            scene |= {"time": instant.cycle * loading.period, "timestep": run.scene.time_step}
+        written.append(into / f"vtkhdf/grains_{instant.cycle:06d}.vtkhdf")
+        write_bodies(written[-1], instant.state, scene, material)
+    return written
+
+
+FORMATS = {"vtu": export_vtu, "ovito": export_ovito, "csv": export_csv, "vtkhdf": export_vtkhdf}
 """Name of a format -> function of the run, a folder and the cycles between two instants."""
 
 
