@@ -12,9 +12,7 @@ from adapters.errors import UsageError
 
 def register(verb: str, parser: argparse.ArgumentParser) -> None:
     """Arguments of ``relax``."""
-    parser.add_argument(
-        "state", metavar="STATE", type=Path, help="a .npz of trackbed, .vtkhdf of ON-DEM or a dump"
-    )
+    parser.add_argument("state", metavar="STATE", type=Path, help="a .npz, .vtkhdf or a dump")
     parser.add_argument(
         "--out", metavar="STATE", type=Path, required=True,
         help=".npz, .vtkhdf; or .dump, .lammpstrj, .liggghts, also with .gz, .bz2, .xz behind",
@@ -41,10 +39,9 @@ def find_scene_of_state(state: Path) -> tuple[Path, list[str]]:
         if (folder / "manifest.json").exists():
             return folder / "scene.toml", RunFolder(folder).manifest()["overrides"]
     raise UsageError(
-        "the walls and the stiffness of the grains are not known",
-        where=str(state),
+        "the walls and the stiffness of the grains are not known", where=str(state),
         remedy="name the scene: --scene scene.toml",
-    )
+    )  # fmt: skip
 
 
 def run_relax(arguments: argparse.Namespace) -> int:

@@ -63,9 +63,8 @@ class Frame:
         if missing:
             raise DumpError(
                 f"there is no column {', '.join(missing)}; there are {' '.join(self.columns)}",
-                where=f"time step {self.time_step}",
-                remedy="name it in the engine's dump command",
-            )
+                where=f"time step {self.time_step}", remedy="name it in the engine's dump command",
+            )  # fmt: skip
         index = [self.columns.index(name) for name in names]
         return np.ascontiguousarray(self.values[:, index])
 

@@ -26,10 +26,9 @@ def make_too_few_error(
     back = ", or leave fewer rows out (--from-cycle, --load-change)" if left_out else ""
     given = "1 cycle is" if count == 1 else f"{count} cycles are"
     return UsageError(
-        f"{given} too few {purpose}{gone}",
-        where=where,
+        f"{given} too few {purpose}{gone}", where=where,
         remedy=f"give at least {fewest} computed cycles{back}{else_do}",
-    )
+    )  # fmt: skip
 
 
 def read_series(
@@ -57,10 +56,9 @@ def read_series(
     tables = [path for path in paths if path.is_dir() or _is_table(path)]
     if tables and len(paths) > 1:
         raise UsageError(
-            "only dumps can be joined to one series",
-            where=str(tables[0]),
+            "only dumps can be joined to one series", where=str(tables[0]),
             remedy="give one CSV file, or one run folder, or dumps",
-        )
+        )  # fmt: skip
     path = paths[0]
     if unit not in (None, "m") and (path.is_dir() or not tables):
         whose = "a run's settlement is" if tables else "dumps are"
@@ -105,18 +103,16 @@ def read_dump_series(paths: Sequence[Path], steps_per_cycle: float | None = None
                 grains = identifiers
             elif not np.array_equal(grains, identifiers):
                 raise UsageError(
-                    "the grains are not those of the first frame",
-                    where=where,
+                    "the grains are not those of the first frame", where=where,
                     remedy="give dumps of one sample, from the start of its loading on",
-                )
+                )  # fmt: skip
             if steps and frame.time_step == steps[-1]:
                 continue
             if steps and frame.time_step < steps[-1]:
                 raise UsageError(
-                    f"the time step falls from {steps[-1]}",
-                    where=where,
+                    f"the time step falls from {steps[-1]}", where=where,
                     remedy="name the files so that their numbers ascend with time",
-                )
+                )  # fmt: skip
             steps.append(frame.time_step)
             plain = "z" in frame.columns and not {"iz", "zu"} & set(frame.columns)
             height = frame.column("z") if plain else frame.find_centres()[:, 2]

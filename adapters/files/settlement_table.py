@@ -224,10 +224,9 @@ def _select_computed(table: Table, place: int) -> Table:
     for row, kind in enumerate(kinds):
         if kind not in KINDS:
             raise UsageError(
-                f"'{kind}' is no kind of row",
-                where=table.where(row, "kind"),
+                f"'{kind}' is no kind of row", where=table.where(row, "kind"),
                 remedy=f"the kinds are {', '.join(KINDS)}",
-            )
+            )  # fmt: skip
     kept = [row for row, kind in enumerate(kinds) if kind == "computed"]
     lines, rows = [table.lines[row] for row in kept], [table.rows[row] for row in kept]
     return replace(table, lines=lines, rows=rows)

@@ -14,8 +14,7 @@ from adapters.files.ondem import ENDING, write_bodies
 
 
 def read_state_file(path: Path, density: float) -> State:
-    """A state from ``path``: ``.npz`` as `adapters.bed.load_state`, else a dump's last frame,
-    or the spheres of ``.vtkhdf``.
+    """A state from ``path``: ``.npz`` as `adapters.bed.load_state`, else by `read_last_frame`.
 
     A dump needs the columns id, radius and places.  Without its own columns, a mass is that of a
     sphere of ``density`` [kg/m^3] and a velocity is zero; contacts and piston it has none.
@@ -44,9 +43,8 @@ def read_state_file(path: Path, density: float) -> State:
 def check_state_name(path: Path) -> None:
     """Raise `UsageError` for the name of another kind of file."""
     kept = path.with_suffix("") if path.suffix in PACKED else path
-    if path.suffix != ENDING and not (
-        kept.suffix in (*EXTENSIONS, ".npz", "") or kept.suffix[1:].isdecimal()
-    ):
+    known = kept.suffix in (*EXTENSIONS, ".npz", "") or kept.suffix[1:].isdecimal()
+    if not known and path.suffix != ENDING:
         raise UsageError(
             f"a state is no {path.suffix} file", where=str(path),
             remedy=f"name it .npz, or {', '.join(EXTENSIONS)} for a dump, or {ENDING}",
@@ -54,8 +52,7 @@ def check_state_name(path: Path) -> None:
 
 
 def write_state_file(state: State, path: Path) -> None:
-    """Write a state to ``path``: ``.npz`` whole and without loss, else its grains as a dump or,
-    ``.vtkhdf``, with their contacts.
+    """Write a state to ``path``: ``.npz`` whole and without loss, else its grains alone.
 
     Raises `UsageError` as `check_state_name`.
     """
@@ -64,7 +61,7 @@ def write_state_file(state: State, path: Path) -> None:
         save_state(state, path)
         return
     if path.suffix == ENDING:
-        write_bodies(path, state, {"iteration": state.time_step}, {})
+        write_bodies(path, state, {"iteration": state.time_step}, {}, {})
         return
     columns = ("id", *"xyz", "vx", "vy", "vz", "omegax", "omegay", "omegaz", "radius", "mass")
     values = np.column_stack(

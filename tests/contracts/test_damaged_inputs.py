@@ -9,6 +9,7 @@ import resource
 import shutil
 import time
 from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -134,6 +135,8 @@ def write_inputs(folder: Path) -> None:
     state = State(np.arange(1, 9), place, radius, 2710 * 4 / 3 * np.pi * radius**3, zero, zero)
     save_state(state, folder / "state.npz")
     write_state_file(state, folder / "state.dump")
+    if find_spec("h5py"):
+        write_state_file(state, folder / "state.vtkhdf")
     frame = (folder / "state.dump").read_text()
     frames = [frame.replace("TIMESTEP\n0", f"TIMESTEP\n{k}") for k in range(5)]
     (folder / "frames.dump").write_text("".join(frames))
@@ -178,6 +181,8 @@ READERS: dict[str, tuple[str, Callable[[Path], int]]] = {
     "dump": ("state.dump", run_words("relax", "@", "--scene", "@/../bed.toml", "--out", "@.npz")),
     "dumps": ("frames.dump", run_words("fit", "@", "--to-cycle", "9")),
     "state": ("state.npz", run_words("relax", "@", "--scene", "@/../bed.toml", "--out", "@.dump")),
+    "exchange": ("state.vtkhdf", run_words(
+        "relax", "@", "--scene", "@/../bed.toml", "--out", "@/../out.vtkhdf")),
     "grains": ("grains.npz", read_by(load_grains)),
     "track bed": ("track.npz", read_by(lambda path: read_bed(path, RECIPE))),
     **{name: (name, read_by(read_mesh)) for name in
@@ -205,7 +210,10 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.long
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize("name", READERS)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=[pytest.mark.peer("h5py")] * (n == "exchange")) for n in READERS],
+)
 def test_a_damaged_file_ends_with_a_sentence(inputs, tmp_path, capsys, name):
     """No exit code 1, no gigabyte more than before, no more than ten seconds of the processor."""
     source, read = READERS[name]

@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters.bed.state import load_state
+from adapters.bed.state import GRAIN_ARRAYS, load_state
+from adapters.files.states import read_state_file
 from adapters.report.export.formats import export_run
 from adapters.report.export.instants import read_exported_run
-from tests.engine_sample import SECOND, Sample
+from tests.engine_sample import AFTER, SECOND, Sample
 
 VECTORS = {"Particle Identifier", "Position", "Velocity", "Angular Velocity", "Radius", "Mass"}
 """Properties of OVITO that it makes of the columns of ``states.dump``."""
@@ -58,3 +59,12 @@ def test_export_opens(sample: Sample, tmp_path: Path) -> None:
         assert np.abs(lines["normal_force"]) == pytest.approx(push, rel=1e-9)
         assert np.mean(lines["normal_force"] > 0) > 0.8
         assert np.array_equal(lines["tangential_force"], state.contacts.tangential_force)
+
+
+@pytest.mark.peer("h5py")
+def test_states_are_exchanged(sample: Sample, tmp_path: Path) -> None:
+    """Written as ON-DEM VTKHDF and read back, a state of each engine has all its digits."""
+    *_, last = export_run(read_exported_run(sample.run), "vtkhdf", tmp_path, every=5)
+    state, again = sample.window(AFTER).state(-1), read_state_file(last, 1.0)
+    for name in GRAIN_ARRAYS:
+        assert np.array_equal(getattr(again, name), getattr(state, name)), name

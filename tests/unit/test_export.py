@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import resource
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -16,6 +17,8 @@ import pytest
 
 from adapters.bed.state import Contacts, State
 from adapters.errors import EngineFailed
+from adapters.files import read_series
+from adapters.files.states import read_state_file
 from adapters.files.window import PistonTrack, Window
 from adapters.procedure.progress import Progress
 from adapters.procedure.record import read_run_record
@@ -29,6 +32,7 @@ from trackbed.scenes import read_template
 
 CYCLES = [0, 1, 2, 3, 4, 5, 7, 8, 9, 10, 11]
 """Instants of the fixture's run, which jumps from 5 to 7."""
+TO = [pytest.param(to, marks=[pytest.mark.peer("h5py")] * (to == "vtkhdf")) for to in FORMATS]
 TINY = ('engine.name="fake"', *engine_sample.TINY)
 
 
@@ -224,10 +228,57 @@ def test_csv_reads_back(run: Path, tmp_path: Path) -> None:
     assert np.array_equal(piston["height"][ends], heights)
 
 
+# --- VTKHDF ---------------------------------------------------------------------------------
+
+
+@pytest.mark.peer("h5py")
+@pytest.mark.peer("pyvista")
+def test_vtk_and_we_read_states(run: Path, tmp_path: Path) -> None:
+    """VTK shows the bodies; the series of files has the settlement of the run, jump and all."""
+    import pyvista
+
+    exported = read_exported_run(run)
+    files = export_run(exported, "vtkhdf", tmp_path)
+    for path, instant in zip(files, exported.instants(), strict=True):
+        mesh, state = pyvista.read(path), instant.state
+        assert mesh.n_cells == mesh.n_points == 40
+        assert np.array_equal(mesh.points, state.position)
+        assert np.array_equal(mesh["radius"], state.radius)
+        assert read_state_file(path, 1.0).time_step == instant.cycle
+    series, rows = read_series(files, steps_per_cycle=1), table(run)
+    assert series.cycle.tolist() == CYCLES
+    settled = [rows[cycle]["mean_grain_settlement"] for cycle in CYCLES[1:]]
+    assert series.settlement[1:] == pytest.approx(settled, rel=1e-9)
+
+
+@pytest.mark.peer("h5py")
+def test_contacts_in_vtkhdf(scene_file: Path, tmp_path: Path) -> None:
+    """As YADE has them: positive where grains push apart, the tangential force on the second."""
+    import h5py
+
+    exported = bed(scene_file, 0.5)
+    with h5py.File(export_run(exported, "vtkhdf", tmp_path)[1]) as file:
+        contacts = file["ONDEM/Interactions"]
+        assert (contacts.attrs["count"], contacts["id2"][:].tolist()) == (2, [5, 9])
+        assert contacts["normal_force"][:] == pytest.approx([Bed.FORCE] * 2)
+        assert np.array_equal(contacts["shear_force"], [[0, -0.1, 0], [-0.03, -0.04, 0]])
+        assert file["ONDEM/Materials/0/friction_coefficient"][()] == 0.5
+        assert file["ONDEM/Scene"].attrs["time"] == exported.scene.loading.period
+
+
+def test_without_h5py(
+    run: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Exit code 4, and how to get it."""
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    assert command.main(["export", str(run), "--to", "vtkhdf"]) == 4
+    assert "-> pip install h5py" in capsys.readouterr().err
+
+
 # --- the verb -------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("to", FORMATS)
+@pytest.mark.parametrize("to", TO)
 def test_verb(run: Path, tmp_path: Path, to: str, capsys: pytest.CaptureFixture[str]) -> None:
     """Files and their size as JSON; again into the same folder gives the same bytes."""
     words = ["export", str(run), "--to", to, "--into", str(tmp_path / "out"), "--json"]
@@ -292,7 +343,7 @@ def test_unloaded_scene_has_no_piston(scene_file: Path, run: Path, tmp_path: Pat
     prepared = replace(read_exported_run(run), track=SimpleNamespace(
         windows=[], start=read_exported_run(run).track.start
     ))  # fmt: skip
-    for to in FORMATS:
+    for to in ("vtu", "ovito", "csv"):
         export_run(prepared, to, tmp_path)
     names = {path.name for path in tmp_path.rglob("*") if path.is_file()}
     assert not {name for name in names if "piston" in name}
@@ -311,7 +362,7 @@ def disk_of(size: int) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
-@pytest.mark.parametrize("to", FORMATS)
+@pytest.mark.parametrize("to", TO)
 def test_full_disk(run: Path, tmp_path: Path, to: str) -> None:
     """Exit code 5's error, no part of a file, and what was there before stays."""
     first = export_run(read_exported_run(run), to, tmp_path, every=100)

@@ -36,10 +36,12 @@ def state() -> State:
     )
 
 
-@pytest.mark.parametrize("name", ["state.npz", "state.dump", "state.dump.gz"])
+@pytest.mark.parametrize("name", ["state.npz", "state.dump", "state.dump.gz", "state.vtkhdf"])
 def test_round_trip(state: State, name: str, tmp_path: Path) -> None:
     """Every number of a grain comes back bit for bit."""
     path = tmp_path / name
+    if path.suffix == ".vtkhdf":
+        pytest.importorskip("h5py")
     write_state_file(state, path)
     again = read_state_file(path, density=1.0)
     for field in ("identifier", "position", "radius", "mass", "velocity", "spin", "time_step"):

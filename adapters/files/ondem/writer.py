@@ -8,46 +8,41 @@ from typing import Any
 
 import numpy as np
 
-from adapters.bed import GRAVITY, State
+from adapters.bed import GRAVITY, FloatArray, IntArray, State
 from adapters.errors import UsageError
-from adapters.files.ondem.layout import FORMAT, UNITS, VERSION, load_h5py
+from adapters.files.ondem.reader import UNITS, load_h5py
 from trackbed import __version__
 from trackbed.run_files import write_whole
 
-VTK_VERSION = (2, 0)
-"""Version of VTKHDF: the first with points."""
-
 
 def write_bodies(
-    path: Path, state: State, scene: Mapping[str, float], material: Mapping[str, float]
-) -> None:
-    """Write spheres and their contacts to ``path``, whole or not at all.
+    path: Path, state: State, scene: Mapping[str, float],
+    material: Mapping[str, float], contacts: Mapping[str, FloatArray | IntArray],
+) -> None:  # fmt: skip
+    """Write spheres to ``path``, whole or not at all, with what is known beside their state.
 
-    ``scene``: attributes, such as ``cycle``, ``time`` and ``timestep`` [s].  ``material``, where it
-    is known: ``density`` [kg/m^3], ``young`` [Pa], ``poisson``, ``friction_coefficient``.
-    Walls and their forces are left out.  Raises `UsageError` for stones, `LibraryMissing` without
-    h5py, and as `write_whole`.
+    ``scene``: ``iteration``, ``time`` and ``timestep`` [s].  ``material``: ``density`` [kg/m^3],
+    ``young`` [Pa], ``poisson``, ``friction_coefficient``.  ``contacts``: ``id1``, ``id2``,
+    ``overlap`` [m], ``normal_force`` [N], positive where it pushes apart, ``shear_force`` on
+    ``id2`` [N].  Raises `UsageError` for stones, `LibraryMissing`, and as `write_whole`.
     """
     if state.orientation is not None:
-        raise UsageError(
-            "ON-DEM's draft has no stones of several spheres", where=str(path),
-            remedy="trackbed export RUN --to vtu has their centres and rotations",
-        )  # fmt: skip
+        what, do = "ON-DEM's draft has no stones of several spheres", "take vtu, which has them"
+        raise UsageError(what, where=str(path), remedy=do)
     h5py = load_h5py(path)
     # In memory first: HDF5 does not recover from a disk that fills while it writes.
     with h5py.File("state", "w", driver="core", backing_store=False) as file:
-        file.attrs.update(
-            file_format=FORMAT, file_format_version=VERSION, source_code=f"trackbed {__version__}"
-        )
+        file.attrs.update(file_format="ON-DEM VTKHDF", file_format_version="0.1-draft")
+        file.attrs["source_code"] = f"trackbed {__version__}"
         _write_points(file.create_group("VTKHDF"), state, 0 if material else -1)
-        group = file.create_group("ONDEM/Scene")
-        group.attrs.update(scene)
-        group["units"] = np.array(UNITS, h5py.string_dtype())
-        group["gravity"] = (0.0, 0.0, -GRAVITY)
-        group = file.create_group("ONDEM/Materials")
-        for name, value in ({"id": 0} | dict(material) if material else {}).items():
-            group[f"0/{name}"] = value
-        _write_contacts(file.create_group("ONDEM/Interactions"), state)
+        file.create_group("ONDEM/Scene").attrs.update(scene)
+        file["ONDEM/Scene/units"] = np.array(UNITS, h5py.string_dtype())
+        file["ONDEM/Scene/gravity"] = (0.0, 0.0, -GRAVITY)
+        file.create_group("ONDEM/Materials")
+        file.create_group("ONDEM/Interactions").attrs["count"] = len(contacts.get("id1", ()))
+        for group, values in (("Materials/0", material), ("Interactions", contacts)):
+            for name, value in values.items():
+                file[f"ONDEM/{group}/{name}"] = value
         file.flush()
         image = file.id.get_file_image()
     write_whole(path, image)
@@ -55,39 +50,20 @@ def write_bodies(
 
 def _write_points(group: Any, state: State, material_id: int) -> None:
     """The bodies as VTK's PolyData: a point and a vertex each, and their fields."""
-    count, volume = len(state.radius), 4 / 3 * np.pi * state.radius**3
-    group.attrs["Type"], group.attrs["Version"] = np.bytes_("PolyData"), VTK_VERSION
+    count, inertia = len(state.radius), 2 / 5 * state.mass * state.radius**2
+    group.attrs["Type"], group.attrs["Version"] = np.bytes_("PolyData"), (2, 0)
     group["NumberOfPoints"], group["Points"] = [count], state.position
     for kind in ("Vertices", "Lines", "Polygons", "Strips"):
         cells = count if kind == "Vertices" else 0
         group[f"{kind}/NumberOfCells"] = group[f"{kind}/NumberOfConnectivityIds"] = [cells]
         group[f"{kind}/Connectivity"] = np.arange(cells)
         group[f"{kind}/Offsets"] = np.arange(cells + 1)
-    inertia = 2 / 5 * state.mass * state.radius**2
     data = group.create_group("PointData")
     data.attrs["Scalars"] = "radius"
     for name, values in {
         "body_id": state.identifier, "position": state.position, "radius": state.radius,
         "velocity": state.velocity, "angular_velocity": state.spin, "mass": state.mass,
-        "volume": volume, "inertia": inertia[:, None] * np.eye(3).ravel(),
+        "volume": 4 / 3 * np.pi * state.radius**3, "inertia": inertia[:, None] * np.eye(3).ravel(),
         "material_id": np.full(count, material_id), "clump_id": np.full(count, -1),
     }.items():  # fmt: skip
         data[name] = values
-
-
-def _write_contacts(group: Any, state: State) -> None:
-    """Contacts between spheres: the normal from ``id1`` to ``id2``, forces on ``id2`` [N]."""
-    contacts = state.contacts
-    first, second = np.searchsorted(state.identifier, contacts.pair).T
-    apart = state.position[second] - state.position[first]
-    normal = apart / np.linalg.norm(apart, axis=1, keepdims=True)
-    reach = state.radius[first] - contacts.overlap / 2
-    group.attrs["count"] = len(contacts)
-    for name, values in {
-        "id1": contacts.pair[:, 0], "id2": contacts.pair[:, 1], "normal": normal,
-        "overlap": contacts.overlap,
-        "contact_point": state.position[first] + reach[:, None] * normal,
-        "normal_force": -np.einsum("ma,ma->m", contacts.normal_force, normal),
-        "shear_force": -contacts.tangential_force,
-    }.items():  # fmt: skip
-        group[name] = values

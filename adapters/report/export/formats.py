@@ -168,23 +168,28 @@ def write_csv_rows(path: Path, parts: Iterable[Mapping[str, Array]]) -> None:
 
 
 def export_vtkhdf(run: ExportedRun, into: Path, every: int) -> list[Path]:
-    """``vtkhdf/grains_000000.vtkhdf`` and on: a state of `write_bodies` an instant, of any engine.
+    """``vtkhdf/grains_000000.vtkhdf`` and on: a state an instant, of any engine, by `write_bodies`.
 
-    The time is that under load, jumped cycles included; not known of a deck, nor where stages of a
-    load have other frequencies.
+    Its iteration is the cycle, its time that under load, jumped cycles included: not known of a
+    deck, nor of a load in stages.
     """
     (into / "vtkhdf").mkdir(exist_ok=True)
     loading, material, written = None, {}, []
     if run.own:
         grain, loading = run.scene.material.grain, run.scene.loading
         material = {name: getattr(grain, name) for name in ("density", "young", "poisson")}
-        material["friction_coefficient"] = grain.friction
+        material |= {"id": 0, "friction_coefficient": grain.friction}
     for instant in run.instants(every):
-        scene: dict[str, float] = {"cycle": instant.cycle}
+        scene: dict[str, float] = {"iteration": instant.cycle}
         if loading is not None and not loading.stage:
             scene |= {"time": instant.cycle * loading.period, "timestep": run.scene.time_step}
         written.append(into / f"vtkhdf/grains_{instant.cycle:06d}.vtkhdf")
-        write_bodies(written[-1], instant.state, scene, material)
+        touching, forces = instant.state.contacts, gather_contacts(run, instant)
+        contacts = {
+            "id1": touching.pair[:, 0], "id2": touching.pair[:, 1], "overlap": touching.overlap,
+            "normal_force": forces["normal_force"], "shear_force": -touching.tangential_force,
+        }  # fmt: skip
+        write_bodies(written[-1], instant.state, scene, material, contacts)
     return written
 
 

@@ -114,14 +114,12 @@ def read_exported_run(
     if track is None:
         known = "none" if record.control is None else CONTROL
         raise UsageError(
-            f"there is no run {variant} beside this one; there are: {known}",
-            where=str(run_folder),
+            f"there is no run {variant} beside this one; there are: {known}", where=str(run_folder),
             remedy="trackbed run SCENE --control makes the control",
-        )
+        )  # fmt: skip
     if track.preparation is None:
         raise UsageError(
-            "the bed is not prepared yet, so there is nothing to export",
-            where=str(run_folder),
+            "the bed is not prepared yet, so there is nothing to export", where=str(run_folder),
             remedy="wait for it, or go on with: trackbed resume RUN",
-        )
+        )  # fmt: skip
     return ExportedRun(record.scene, track)
