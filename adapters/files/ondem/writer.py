@@ -21,10 +21,10 @@ def write_bodies(
 ) -> None:  # fmt: skip
     """Write spheres to ``path``, whole or not at all, with what is known beside their state.
 
-    ``scene``: ``iteration``, ``time`` and ``timestep`` [s].  ``material``: ``density`` [kg/m^3],
-    ``young`` [Pa], ``poisson``, ``friction_coefficient``.  ``contacts``: ``id1``, ``id2``,
-    ``overlap`` [m], ``normal_force`` [N], positive where it pushes apart, ``shear_force`` on
-    ``id2`` [N].  Raises `UsageError` for stones, `LibraryMissing`, and as `write_whole`.
+    ``scene``: ``iteration``, ``time``, ``timestep`` [s].  ``material``: ``density`` [kg/m^3],
+    ``young`` [Pa] and the like.  ``contacts``: ``id1``, ``id2``, ``overlap`` [m], ``normal_force``
+    [N], positive where it pushes apart, ``shear_force`` on ``id2`` [N].  Raises `UsageError` for
+    stones, `LibraryMissing`, and as `write_whole`.
     """
     if state.orientation is not None:
         what, do = "ON-DEM's draft has no stones of several spheres", "take vtu, which has them"

@@ -168,11 +168,8 @@ def write_csv_rows(path: Path, parts: Iterable[Mapping[str, Array]]) -> None:
 
 
 def export_vtkhdf(run: ExportedRun, into: Path, every: int) -> list[Path]:
-    """``vtkhdf/grains_000000.vtkhdf`` and on: a state an instant, of any engine, by `write_bodies`.
-
-    Its iteration is the cycle, its time that under load, jumped cycles included: not known of a
-    deck, nor of a load in stages.
-    """
+    """``vtkhdf/grains_000000.vtkhdf`` and on: a state an instant by `write_bodies`; its iteration is
+    the cycle, its time that under load, jumped cycles too, and not given of stages."""
     (into / "vtkhdf").mkdir(exist_ok=True)
     loading, material, written = None, {}, []
     if run.own:
