@@ -168,7 +168,7 @@ def write_csv_rows(path: Path, parts: Iterable[Mapping[str, Array]]) -> None:
 
 
 def export_vtkhdf(run: ExportedRun, into: Path, every: int) -> list[Path]:
-    """``vtkhdf/grains_000000.vtkhdf`` and on: a state an instant by `write_bodies`; its iteration is
+    """``vtkhdf/grains_000000.vtkhdf`` and on: an instant a file by `write_bodies`; its iteration is
     the cycle, its time that under load, jumped cycles too, and not given of stages."""
     (into / "vtkhdf").mkdir(exist_ok=True)
     loading, material, written = None, {}, []
