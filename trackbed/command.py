@@ -25,7 +25,7 @@ VERBS = {
     "sweep": ("adapters.cli.sweep", "several seeds and values of a scene's keys, side by side"),
     "status": (RUN, "how far a run is, its settlement and speed-up"),
     "report": (RUN, "write report.html and the figures of a run"),
-    "export": ("adapters.cli.export", "a run as files of ParaView, OVITO or CSV"),
+    "export": ("adapters.cli.export", "a run as files of ParaView, OVITO, ON-DEM or CSV"),
     "fit": (
         "adapters.cli.fit",
         "fit a residual law to a run, dumps or a CSV series and extrapolate it",
