@@ -164,18 +164,14 @@ def advise_other_piston(scene: Scene, own_frequency: float) -> str:
     """What to do with a piston that does not follow its load: a light one bounces from grain to
     grain, a heavy one swings on its bed, ``own_frequency`` times as fast as the load."""
     assert scene.loading is not None  # it would have no piston
-    mass = scene.loading.piston_mass
-    if own_frequency < BOUNDS.own_frequency:
-        return (
-            f"the piston of {mass:g} kg swings on this bed {own_frequency:.2g} times as fast as "
-            "its load and does not follow it: a lighter one (loading.piston_mass), or a lower "
-            "loading.frequency"
-        )
     radius = np.array([scene.sample.radii.mean])
-    grains = mass / find_sample_mass(radius, scene.material.grain.density)[0]
+    grains = scene.loading.piston_mass / find_sample_mass(radius, scene.material.grain.density)[0]
+    why, other = f"as heavy as {grains:.2g} mean grains", "heavier"
+    if own_frequency < BOUNDS.own_frequency:
+        why, other = f"swinging on its bed {own_frequency:.2g} times as fast as the load", "lighter"
     return (
-        f"the piston, as heavy as {grains:.2g} mean grains, does not follow its load: a heavier "
-        "one (loading.piston_mass), or a lower loading.frequency"
+        f"the piston, {why}, does not follow its load: a {other} one (loading.piston_mass), or a "
+        "lower loading.frequency"
     )
 
 
