@@ -240,6 +240,19 @@ def test_a_logarithm_gives_no_law_and_beds_that_stop_no_memory(tmp_path, capsys)
     assert "settles more by this law than was read in all" in capsys.readouterr().out
 
 
+def test_beds_that_quicken_have_an_exponent_without_an_interval(tmp_path, capsys):
+    """s = N^1.3 at three uneven readings: b is held at 1, and its jackknife would have no width."""
+    table = np.column_stack([[1, 500, 1000], np.outer(1e-6 * np.array([1, 500, 1000]) ** 1.3,
+                                                      draw_factors(5))])  # fmt: skip
+    path, head = tmp_path / "beds.csv", ",".join(["cycle", *(f"s{i}" for i in range(5))])
+    np.savetxt(path, table, delimiter=",", header=head, comments="")
+    assert main(["line", "--beds", str(path), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["b"] == pytest.approx(1, abs=1e-4)
+    assert found["b_low"] is found["b_high"] is None
+    assert any("b is held at 1" in one for one in found["doubts"])
+
+
 def test_few_packings_count_once_and_windows_in_their_order(tmp_path):
     """Four packings under three loads leave one degree of freedom for a correlation and three for a
     variation, of 12 - 3 numbers; the memory is that of windows that were read; the

@@ -28,8 +28,9 @@ LEVEL = 0.9
 EXPONENTS = (0.01, 1.0)
 """Between which b is looked for: about a logarithm, a constant rate [-]."""
 
-SLOWEST = 0.0101
-"""b that is at the lower end of `EXPONENTS`: N^b has no curve so flat, and `a` means nothing."""
+SLOWEST, FASTEST = 0.0101, 0.9999
+"""b at an end of `EXPONENTS`: where N^b has no curve so flat, and `a` means nothing, or is straight
+where beds quicken; the scatter of a b that is held shows nothing."""
 ONE = 1 - 1e-12
 """Greatest correlation that has an interval [-]."""
 SMALL = 1e-6
@@ -107,6 +108,8 @@ def fit_beds(ensemble: Ensemble) -> BedFit:
     interval = bound_exponent(cycle[read], settled[here][:, read])
     if b < SLOWEST:
         seated, a, b, interval = np.nan, np.nan, np.nan, (np.nan, np.nan)
+    elif b > FASTEST:
+        interval = np.nan, np.nan
     stiff, uneven = (centre(np.log(of), load) for of in (ensemble.bedding, gain))
 
     logs = [centre(np.log(np.where(one > 0, one, np.nan)), load) for one in gains]

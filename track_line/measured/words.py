@@ -11,7 +11,7 @@ import numpy as np
 from track_line.beds import SHORTEST_MEMORY
 from track_line.laws import get_law
 from track_line.measured.ensemble import Ensemble
-from track_line.measured.fit import BedFit, Estimate
+from track_line.measured.fit import FASTEST, BedFit, Estimate
 from trackbed.plausible import describe_implausible
 
 FOREVER = 1e3
@@ -92,6 +92,8 @@ def list_doubts(ensemble: Ensemble, fit: BedFit) -> Iterator[str]:
             "the beds settle as the logarithm of cycles or slower, as no power law does: the "
             "scene's own law remains"
         )
+    elif fit.b.value > FASTEST:
+        yield "the beds settle ever faster, so b is held at 1: they fail, or were not read in order"
     elif (ensemble.cycle[-1] / ensemble.cycle[0]) ** fit.b.value < 2:
         yield (
             f"before its first reading at cycle {ensemble.cycle[0]:.3g} a bed settles more by this "
