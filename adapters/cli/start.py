@@ -70,9 +70,8 @@ def run_new(arguments: argparse.Namespace) -> int:
 
 def run_cite(arguments: argparse.Namespace) -> int:
     """Print BibTeX entries, each under a comment saying what it is cited for."""
-    from adapters.cli.citations import CITATIONS
     from trackbed import __version__
 
-    entries = "\n\n".join(f"% {purpose}\n{entry}" for purpose, entry in CITATIONS)
-    print(entries.replace("VERSION", __version__))
+    entries = Path(__file__).with_name("citations.bib").read_text(encoding="utf-8")
+    print(entries.replace("VERSION", __version__), end="")
     return 0
