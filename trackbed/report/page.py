@@ -8,42 +8,8 @@ from html import escape
 from math import isfinite
 from pathlib import Path
 
-STYLE = """
-:root { color-scheme: light; }
-body { font: 16px/1.5 "Source Serif 4", Charter, Georgia, serif; color: #1a1a1a; background: #fff;
-  max-width: 56rem; margin: 2.5rem auto; padding: 0 1.25rem; }
-h1 { font-size: 1.7rem; line-height: 1.2; margin: 0 0 .3rem; }
-h2 { font-size: 1.2rem; margin: 2.6rem 0 .5rem; border-top: 1px solid #ccc; padding-top: .7rem; }
-p, ul { margin: .55rem 0; }
-.scene { color: #555; margin: 0 0 1.4rem; }
-.claim { font-size: 1.12rem; border-left: 4px solid #0b5fa5; padding: .1rem 0 .1rem 1rem; }
-.fails { border-left: 4px solid #e07b00; padding: .1rem 0 .1rem 1rem; }
-.fails p { margin-bottom: 0; } .fails ul { margin-top: .2rem; }
-figure { margin: 1.1rem 0; break-inside: avoid; }
-figure img { width: 100%; height: auto; display: block; }
-figcaption, caption { font-size: .87rem; color: #444; text-align: left; line-height: 1.4; }
-caption { padding-bottom: .4rem; }
-.scroll { overflow-x: auto; margin: 1.1rem 0; }
-table { border-collapse: collapse; font: .84rem/1.35 "Source Sans 3", Helvetica, Arial, sans-serif;
-  font-variant-numeric: tabular-nums; break-inside: avoid; width: 100%; }
-th, td { padding: .28rem .5rem; text-align: right; vertical-align: top; }
-td { white-space: nowrap; }
-th { font-weight: 600; border-bottom: 1px solid #888; vertical-align: bottom; }
-tbody tr { border-bottom: 1px solid #e4e4e4; }
-th:first-child, td:first-child { text-align: left; padding-left: 0; white-space: nowrap; }
-th.words, td.words { text-align: left; white-space: normal; }
-tr.this td { font-weight: 700; background: #f1f6fb; }
-td .error { display: inline-block; min-width: 4.4em; }
-sub, sup { line-height: 0; }
-.no { color: #b02020; font-weight: 600; } .yes { color: #1b6e3a; }
-code, pre { font: .82rem/1.4 "Source Code Pro", Menlo, Consolas, monospace; }
-pre { background: #f5f5f5; padding: .7rem .9rem; white-space: pre-wrap; overflow-wrap: anywhere; }
-td code { overflow-wrap: anywhere; }
-summary { cursor: pointer; color: #0b5fa5; }
-@media print { body { font-size: 11pt; max-width: none; margin: 0; } h2 { break-after: avoid; }
-  .scroll { overflow: visible; } table { font-size: 8.5pt; } }
-"""
-
+STYLE = Path(__file__).with_suffix(".css")
+"""Style sheet of every page, which is put into it."""
 TYPES = {".svg": "image/svg+xml", ".png": "image/png"}
 MINUS, TIMES, UNKNOWN = "\N{MINUS SIGN}", "\N{MULTIPLICATION SIGN}", "\N{EN DASH}"
 """Signs as in print, and what stands for a number that is not known."""
@@ -62,7 +28,7 @@ def make_page(title: str, body: Iterable[str]) -> str:
             '<meta name="viewport" content="width=device-width, initial-scale=1"/>',
             '<link rel="icon" href="data:,"/>',
             f"<title>{escape(title)}</title>",
-            f"<style>{STYLE}</style>",
+            f"<style>\n{STYLE.read_text(encoding='utf-8')}</style>",
             "</head>",
             "<body>",
             *body,
