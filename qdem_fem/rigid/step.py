@@ -26,44 +26,25 @@ FREE, STILL = 3, -1
 class Rigid(NamedTuple):
     """All rigid bodies: b of them, with v vertices that move with them, and L loads."""
 
-    node_first: Any
-    """(b + 1,) first vertex of every body, and the end."""
-    node_at: Any
-    """(v,) of its first component in the fields."""
-    force_at: Any
-    """(v,) of its first component in the windows of forces."""
-    arm: Any
-    """(v, 3) X - c [m]"""
-    inverse_mass: Any
-    """(b,) 1/M [1/kg]"""
-    axes: Any
-    """(b, 3, 3) principal axes in the reference configuration, by rows."""
-    inverse_inertia: Any
-    """(b, 3) 1/I_i [1/(kg m^2)]"""
-    shift: Any
-    """(b, 3) d [m]"""
-    velocity: Any
-    """(b, 3) V, half a step behind [m/s]"""
-    turn: Any
-    """(b, 4) q, scalar first."""
-    spin: Any
-    """(b, 3) L, half a step behind [kg m^2/s]"""
-    given: Any
-    """(b, 3) series of the table that a component of d follows; -1: free."""
-    given_weight: Any
-    """(b, 3)"""
-    turning: Any
-    """(b,) `FREE`, 0, 1, 2 or `STILL`."""
-    load_first: Any
-    """(b + 1,) first load of every body, and the end."""
-    load_component: Any
-    """(L,) 0, 1, 2"""
-    load_series: Any
-    """(L,)"""
-    load_weight: Any
-    """(L,)"""
-    load_arm: Any
-    """(L, 3) [m]"""
+    node_first: Any  # (b + 1,) first vertex of every body, and the end
+    node_at: Any  # (v,) of its first component in the fields
+    force_at: Any  # (v,) of its first component in the windows of forces
+    arm: Any  # (v, 3) X - c [m]
+    inverse_mass: Any  # (b,) 1/M [1/kg]
+    axes: Any  # (b, 3, 3) principal axes in the reference configuration, by rows
+    inverse_inertia: Any  # (b, 3) 1/I_i [1/(kg m^2)]
+    shift: Any  # (b, 3) d [m]
+    velocity: Any  # (b, 3) V, half a step behind [m/s]
+    turn: Any  # (b, 4) q, scalar first
+    spin: Any  # (b, 3) L, half a step behind [kg m^2/s]
+    given: Any  # (b, 3) series of the table that a component of d follows; -1: free
+    given_weight: Any  # (b, 3)
+    turning: Any  # (b,) `FREE`, 0, 1, 2 or `STILL`
+    load_first: Any  # (b + 1,) first load of every body, and the end
+    load_component: Any  # (L,) 0, 1, 2
+    load_series: Any  # (L,)
+    load_weight: Any  # (L,)
+    load_arm: Any  # (L, 3) [m]
 
 
 @inlined

@@ -24,20 +24,16 @@ NumberByBody = Annotated[
 class PlaneTable(Table):
     """A rigid wall that does not move."""
 
-    point: Vector
-    """[m]"""
-    normal: Vector
-    """To the side where bodies are."""
-    friction: NonNegative | None = None
-    """By default that between bodies."""
+    point: Vector  # [m]
+    normal: Vector  # to the side where bodies are
+    friction: NonNegative | None = None  # by default that between bodies
 
 
 class PeriodicTable(Table):
     """A layer that repeats along an axis; bodies touch across its sides."""
 
     axis: Literal["x", "y", "z"]
-    width: Positive
-    """[m]"""
+    width: Positive  # [m]
 
 
 class ContactTable(Table):
@@ -45,25 +41,21 @@ class ContactTable(Table):
 
     model: Literal["spheres", "surface"]
     """Spheres at the vertices of the surface, as in the paper, or the surfaces themselves."""
-    friction: NonNegative
-    """Coulomb's coefficient."""
+    friction: NonNegative  # Coulomb's coefficient
     contacts: Annotated[int, Field(ge=1, le=1000)] | Literal["near"] | None = None
     """Contacts of a vertex at once that the time step allows for, or those near it at first."""
     plane: Annotated[tuple[PlaneTable, ...], Field(strict=False)] = ()
     periodic: PeriodicTable | None = None
     """The width that contact repeats in; bodies have no sides to touch across when not given."""
-    radius: NumberByBody | None = None
-    """Of spheres [m]: a number, or by body."""
+    radius: NumberByBody | None = None  # of spheres [m]: a number, or by body
     normal_stiffness: NumberByBody | None = None
     """Of a pair of spheres of the body's material [N/m]: a number, or by body."""
-    skin: Positive | None = None
-    """Of the neighbour list of spheres [m]."""
+    skin: Positive | None = None  # of the neighbour list of spheres [m]
     modulus: NumberByBody | None = None
     """Of two surfaces of the body's material [Pa/m]: a number, or by body."""
     points: Annotated[int, Field(ge=1, le=20)] | None = None
     """A face of a surface has that many points squared."""
-    depth: Positive | None = None
-    """Greatest depth of a surface in another [m]."""
+    depth: Positive | None = None  # greatest depth of a surface in another [m]
 
 
 NEEDED = {"spheres": ("radius", "normal_stiffness"), "surface": ("modulus",)}

@@ -31,14 +31,11 @@ AUDIT = 1e-3
 class BoxMesh(Table):
     """A rectangular block with one corner at ``origin``, cut into tetrahedra."""
 
-    size: Size
-    """Edge lengths [m]."""
-    cells: Cells
-    """Hexahedral cells along each edge; each is cut into tetrahedra by the pattern."""
+    size: Size  # edge lengths [m]
+    cells: Cells  # hexahedral cells along each edge; each is cut into tetrahedra by the pattern
     pattern: Literal["kuhn", "five"] = "kuhn"
     """Tetrahedra in a cell: six around its diagonal (kuhn), or five, neighbours mirrored."""
-    origin: Vector = (0.0, 0.0, 0.0)
-    """Least corner [m]."""
+    origin: Vector = (0.0, 0.0, 0.0)  # least corner [m]
 
 
 class Mesh(Table):
@@ -46,24 +43,18 @@ class Mesh(Table):
 
     file: Text | None = None
     """Mesh file of any format of meshio; a relative path counts from the scene file."""
-    scale: Positive = 1.0
-    """Metres in one unit of the file: 0.001 where it is in millimetres."""
+    scale: Positive = 1.0  # metres in one unit of the file: 0.001 where it is in millimetres
     box: BoxMesh | None = None
 
 
 class MaterialTable(Table):
     """Isotropic linear viscoelastic material (eqs 7-8)."""
 
-    young: Positive
-    """Young's modulus [Pa]."""
-    poisson: Poisson
-    """Poisson's ratio."""
-    density: Positive
-    """Mass density [kg/m^3]."""
-    shear_viscosity: NonNegative = 0.0
-    """[Pa s]"""
-    bulk_viscosity: NonNegative = 0.0
-    """[Pa s]"""
+    young: Positive  # Young's modulus [Pa]
+    poisson: Poisson  # Poisson's ratio
+    density: Positive  # mass density [kg/m^3]
+    shear_viscosity: NonNegative = 0.0  # [Pa s]
+    bulk_viscosity: NonNegative = 0.0  # [Pa s]
 
 
 class Region(Table):
@@ -86,10 +77,8 @@ class BodyTable(Table):
     """Six freedoms and no element work; with the inertia of the solid, or of masses at nodes."""
     regions: dict[str, Region] = Field(default_factory=dict)
     """Material keys that differ, by the name of an element set."""
-    velocity: Vector | None = None
-    """Of its centre of mass at the start [m/s]; at rest by default."""
-    spin: Vector | None = None
-    """Angular velocity about its centre of mass at the start [1/s]."""
+    velocity: Vector | None = None  # of its centre of mass at the start [m/s]; at rest by default
+    spin: Vector | None = None  # angular velocity about its centre of mass at the start [1/s]
 
     @property
     def moves(self) -> bool:
@@ -109,8 +98,7 @@ class PlaneNodes(Table):
 
     point: Vector
     normal: Vector
-    tolerance: NonNegative = 1e-6
-    """Greatest distance from the plane [m]."""
+    tolerance: NonNegative = 1e-6  # greatest distance from the plane [m]
 
 
 class Nodes(Table):
@@ -120,8 +108,7 @@ class Nodes(Table):
     """A node set of the mesh; every mesh has x-min, x-max, y-min, y-max, z-min, z-max."""
     box: BoxNodes | None = None
     plane: PlaneNodes | None = None
-    nearest: Vector | None = None
-    """The one node nearest to a point [m]."""
+    nearest: Vector | None = None  # the one node nearest to a point [m]
     all: Literal[True] | None = None
 
 
@@ -138,8 +125,7 @@ class SeriesTable(Table):
     """Values at the ``times``."""
     csv: Text | None = None
     """CSV file with a header line; a relative path counts from the scene file."""
-    time: Text = "time"
-    """Column of the instants [s] in the CSV file."""
+    time: Text = "time"  # column of the instants [s] in the CSV file
     direction: Vector | None = None
     """Of a force whose values are numbers: the vector that they multiply."""
 
@@ -203,29 +189,24 @@ class Periodic(Table):
 class Probe(Nodes):
     """Nodes whose mean displacement is recorded."""
 
-    body: Name | None = None
-    """Needed when there are several bodies."""
+    body: Name | None = None  # needed when there are several bodies
 
 
 class SimulationTable(Table):
     """How to compute."""
 
     method: Literal["dynamic", "static"] = "dynamic"
-    duration: Positive | None = None
-    """Simulated time [s] of a dynamic run."""
+    duration: Positive | None = None  # simulated time [s] of a dynamic run
     tolerance: Annotated[float, Field(ge=1e-14, le=0.1, allow_inf_nan=False)] = 1e-8
     """Of a static answer: residual force over the load."""
     strain: Strain = "finger"
     precision: Literal["float64", "float32"] = "float64"
-    step: Positive | None = None
-    """Time step [s]; by default the critical one times ``safety``."""
+    step: Positive | None = None  # time step [s]; by default the critical one times ``safety``
     safety: Share = 0.9
     threads: Annotated[int, Field(ge=1, le=1024)] | None = None
     device: Literal["cpu", "cuda"] = "cpu"
-    gravity: Vector | None = None
-    """Acceleration [m/s^2]; left out of the kernel when not given."""
-    mass_scaling: Positive | None = None
-    """Time step [s] that elements are made heavier for."""
+    gravity: Vector | None = None  # acceleration [m/s^2]; left out of the kernel when not given
+    mass_scaling: Positive | None = None  # time step [s] that elements are made heavier for
 
 
 class Output(Table):
@@ -239,8 +220,7 @@ class Output(Table):
     """Between VTU files [s]; by default only the end is written."""
     magnification: Positive | None = None
     """Of displacements in the report's picture; by default a round one that lets them be seen."""
-    checkpoint_interval: NonNegative = 300.0
-    """Between checkpoints, by the clock on the wall [s]."""
+    checkpoint_interval: NonNegative = 300.0  # between checkpoints, by the clock on the wall [s]
     audit: Share | None = None
     """Share of the greatest energy that may be missing in the account of energies, what viscosity
     takes included; a run stops beyond it.  By default `AUDIT` where bodies touch, and not looked
@@ -262,8 +242,7 @@ class Scene(Table):
     load: Annotated[tuple[Load, ...], Field(strict=False)] = ()
     pressure: Annotated[tuple[Pressure, ...], Field(strict=False)] = ()
     periodic: Annotated[tuple[Periodic, ...], Field(strict=False)] = ()
-    contact: ContactTable | None = None
-    """Bodies touch; left out of the kernel when not given."""
+    contact: ContactTable | None = None  # bodies touch; left out of the kernel when not given
     output: Output = Output()
 
     @property

@@ -39,15 +39,12 @@ class Surface(Table):
 class Run(Table):
     """How long, and how."""
 
-    duration: Positive
-    """[s]"""
-    step: Positive = 1e-3
-    """Length of a step, the longest one at acceleration level [s]."""
+    duration: Positive  # [s]
+    step: Positive = 1e-3  # length of a step, the longest one at acceleration level [s]
     method: Literal["time-stepping", "acceleration"] = "time-stepping"
     tolerance: Annotated[Real, Field(ge=1e-14, le=1e-3)] = 1e-10
     """Scale-free residual of the contact forces [-]."""
-    frames: Annotated[int, Field(ge=1, le=100_000)] = 20
-    """States that are kept, at equal times."""
+    frames: Annotated[int, Field(ge=1, le=100_000)] = 20  # states that are kept, at equal times
 
     @model_validator(mode="after")
     def _check_steps(self) -> Run:
@@ -73,14 +70,10 @@ class BodyTable(Table):
     """One body; exactly one of the shapes."""
 
     name: Name
-    box: Vector | None = None
-    """Edge lengths [m]."""
-    radius: Positive | None = None
-    """Of a disc or a sphere [m]."""
-    vertices: list[Vector] | None = None
-    """Of a convex polygon (anticlockwise) or polyhedron [m]."""
-    density: Positive | None = None
-    """[kg/m^3]; in 2D [kg/m^2], or per metre of depth."""
+    box: Vector | None = None  # edge lengths [m]
+    radius: Positive | None = None  # of a disc or a sphere [m]
+    vertices: list[Vector] | None = None  # of a convex polygon (anticlockwise) or polyhedron [m]
+    density: Positive | None = None  # [kg/m^3]; in 2D [kg/m^2], or per metre of depth
     inertia: Positive | None = None
     """Moment of inertia in place of the shape's own, in 2D [kg m^2]; a huge one holds the body
     upright."""
@@ -138,12 +131,9 @@ class Load(Table):
     """A force on a named body, constant or cyclic between two values."""
 
     body: Name
-    force: Vector
-    """[N]; the greatest one of a cyclic load."""
-    least: Vector | None = None
-    """The smallest force of a cyclic load [N]; zero if not given."""
-    frequency: Positive | None = None
-    """[Hz]; without it the load is constant."""
+    force: Vector  # [N]; the greatest one of a cyclic load
+    least: Vector | None = None  # the smallest force of a cyclic load [N]; zero if not given
+    frequency: Positive | None = None  # [Hz]; without it the load is constant
     phase: Real = 0.0
     """Of a cyclic load at its begin [rad]; at zero it starts from the smallest force."""
     begin: NonNegative = 0.0
@@ -161,27 +151,19 @@ class Load(Table):
 class WearTable(Table):
     """Corners of polygons, corners and edges of polyhedra worn by the work of friction."""
 
-    coefficient: Positive
-    """Volume per work of friction [m^3/J]."""
-    every: Annotated[int, Field(ge=1)] = 20
-    """Steps between cuts."""
+    coefficient: Positive  # volume per work of friction [m^3/J]
+    every: Annotated[int, Field(ge=1)] = 20  # steps between cuts
 
 
 class StrengthTable(Table):
     """Grains that break under their contact forces."""
 
-    tension: Positive
-    """[Pa]"""
-    every: Annotated[int, Field(ge=1)] = 20
-    """Steps between judgements."""
-    smallest: NonNegative = 0.0
-    """Volume below which grains do not break [m^3], in 2D area [m^2]."""
-    modulus: Positive | None = None
-    """Weibull's modulus; with ``reference_volume``."""
-    reference_volume: Positive | None = None
-    """Volume (2D: area) of a grain that bears ``tension``."""
-    unique: bool = False
-    """Judge by the forces of elastic contacts; for piles at rest."""
+    tension: Positive  # [Pa]
+    every: Annotated[int, Field(ge=1)] = 20  # steps between judgements
+    smallest: NonNegative = 0.0  # volume below which grains do not break [m^3], in 2D area [m^2]
+    modulus: Positive | None = None  # Weibull's modulus; with ``reference_volume``
+    reference_volume: Positive | None = None  # volume (2D: area) of a grain that bears ``tension``
+    unique: bool = False  # judge by the forces of elastic contacts; for piles at rest
 
 
 class SceneTables(Table):

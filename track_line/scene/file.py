@@ -44,23 +44,19 @@ LEFT_OUT = (
 class LineTable(Table):
     """How long, how many axles, how many lines."""
 
-    length: Annotated[Real, Field(ge=60, le=20_000)]
-    """[m]"""
+    length: Annotated[Real, Field(ge=60, le=20_000)]  # [m]
     axles: Annotated[Real, Field(ge=1, le=1e9)]
-    speed: Positive
-    """[m/s]"""
+    speed: Positive  # [m/s]
     realisations: Annotated[int, Field(ge=1, le=10_000)] = 200
     seed: Annotated[int, Field(ge=0)] = 1
-    limit: Positive | None = None
-    """Standard deviation of D1 at which to tamp [m]."""
+    limit: Positive | None = None  # standard deviation of D1 at which to tamp [m]
 
 
 class LawTable(Table):
     """How beds settle."""
 
     name: Name
-    parameters: dict[Name, NonNegative] = Field({})
-    """In place of the law's own [SI]."""
+    parameters: dict[Name, NonNegative] = Field({})  # in place of the law's own [SI]
 
 
 class SceneTables(Table):
