@@ -63,25 +63,18 @@ def _refuse_no_scene(arguments: argparse.Namespace) -> None:
 
 def _fit_beds(arguments: argparse.Namespace) -> tuple[list[str], list[str]]:
     """Fit measured beds and say what they know; the keys of a scene that they give, and doubts."""
-    from track_line.measured import (
-        fit_beds,
-        format_figures,
-        format_settings,
-        list_doubts,
-        read_beds,
-        summarise_fit,
-    )
+    from track_line import measured
 
-    ensemble = read_beds(arguments.beds)
-    fit = fit_beds(ensemble)
-    settings, doubts = format_settings(fit), list(list_doubts(ensemble, fit))
+    ensemble = measured.read_beds(arguments.beds)
+    fit = measured.fit_beds(ensemble)
+    settings, doubts = measured.format_settings(fit), list(measured.list_doubts(ensemble, fit))
     if arguments.scene is None:
-        figures = summarise_fit(ensemble, fit)
+        figures = measured.summarise_fit(ensemble, fit)
         if arguments.json:
             print_fields(figures | {"settings": settings, "doubts": doubts}, True)
         else:
             keys = (f"--set {shlex.quote(one)}" for one in settings)
-            print(format_figures(figures), "", *keys, "", *doubts, sep="\n")
+            print(measured.format_figures(figures), "", *keys, "", *doubts, sep="\n")
     else:
         print(*(f"note: {one}" for one in (*settings, *doubts)), sep="\n", file=sys.stderr)
     return settings, doubts

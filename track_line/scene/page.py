@@ -14,15 +14,7 @@ from track_line.arrays import Floats
 from track_line.scene.file import LEFT_OUT
 from track_line.scene.run import PLAN, RunFolder, collect_records
 from track_line.settling import BANDS, Record
-from trackbed.report import (
-    make_list,
-    make_page,
-    make_paragraph,
-    make_picture,
-    make_section,
-    make_table,
-    save_figure,
-)
+from trackbed import report
 from trackbed.run_files import write_whole
 
 if TYPE_CHECKING:
@@ -67,7 +59,7 @@ def write_report(
     write_whole(folder.path / "geometry.csv", "\n".join(lines) + "\n")
     picture = None
     if draw:
-        picture = save_figure(
+        picture = report.save_figure(
             lambda: draw_geometry(table, summary["limit_m"], records, summary["length_m"]),
             folder.path / "geometry.svg",
         )
@@ -78,16 +70,18 @@ def write_report(
     ]  # fmt: skip
     parts = [
         f"<h1>{escape(title)}</h1>",
-        make_paragraph(escape(summary["sentence"]), "claim"),
-        make_picture(picture, CAPTION, escape(CAPTION)),
-        make_section("Figures", make_table("", (), rows)),
-        make_section(
-            "Left out", make_list(escape(text) for text in (*manifest["beds"], *LEFT_OUT))
+        report.make_paragraph(escape(summary["sentence"]), "claim"),
+        report.make_picture(picture, CAPTION, escape(CAPTION)),
+        report.make_section("Figures", report.make_table("", (), rows)),
+        report.make_section(
+            "Left out", report.make_list(escape(text) for text in (*manifest["beds"], *LEFT_OUT))
         ),
-        make_section("Again", f"<pre>{escape(json.dumps(manifest['provenance'], indent=1))}</pre>"),
+        report.make_section(
+            "Again", f"<pre>{escape(json.dumps(manifest['provenance'], indent=1))}</pre>"
+        ),
     ]
     path = folder.path / "report.html"
-    write_whole(path, make_page(title, parts))
+    write_whole(path, report.make_page(title, parts))
     return path
 
 
