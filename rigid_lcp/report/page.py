@@ -2,24 +2,14 @@
 
 from __future__ import annotations
 
-import json
-from html import escape
 from pathlib import Path
 from typing import Any
 
 from rigid_lcp.motion import Scene
 from rigid_lcp.report import pictures
-from rigid_lcp.scene import RunFolder, read_frame, read_history, rebuild_frame_scene, write_history
-from trackbed.report import (
-    encode_figure,
-    make_list,
-    make_page,
-    make_paragraph,
-    make_picture,
-    make_section,
-    make_table,
-)
-from trackbed.run_files import write_whole
+from rigid_lcp.scene import RunFolder, read_frame, read_history, rebuild_frame_scene
+from trackbed.report import encode_figure, write_run_page
+from trackbed.run_files import write_csv, write_whole
 
 ROWS = (
     ("bodies that move", "bodies", "{:,}"),
@@ -48,7 +38,8 @@ def write_report(
 ) -> Path:  # fmt: skip
     """Write the report of a finished run, with pictures of its frames if ``draw``; its path."""
     history = read_history(folder)
-    write_history(folder.path / "history.csv", history)
+    rows = zip(*(column.tolist() for column in history.values()), strict=True)
+    write_csv(folder.path / "history.csv", history, rows)
     figures = []
     if draw:
         title = summary["title"]
@@ -63,7 +54,6 @@ def write_report(
              "Energy (kinetic and potential), contacts that carry, and the greatest overlap, at "
              "the frames."),
         ]  # fmt: skip
-    title = summary["title"] or "Rigid grains"
     above = f" ({summary['steps_above']:,} steps above the tolerance)"
     claim = (
         f"{summary['bodies']:,} rigid bodies, {summary['time']:.4g} s in {summary['steps']:,} "
@@ -77,18 +67,11 @@ def write_report(
             f" In {summary['steps_cut_off']:,} steps collisions ran out of rounds, and their rest "
             "ended without restitution, which costs energy."
         )
-    rows = [(name, form.format(summary[key])) for name, key, form in ROWS if key in summary]
-    parts = [
-        f"<h1>{escape(title)}</h1>",
-        make_paragraph(escape(claim), "claim"),
-        *(make_picture(path, caption, escape(caption)) for path, caption in figures),
-        make_section("Figures", make_table("", (), rows)),
-        make_section("Left out", make_list(escape(text) for text in summary["left_out"])),
-        make_section("Again", f"<pre>{escape(json.dumps(manifest['provenance'], indent=1))}</pre>"),
-    ]
-    path = folder.path / "report.html"
-    write_whole(path, make_page(title, parts))
-    return path
+    said = [(name, form.format(summary[key])) for name, key, form in ROWS if key in summary]
+    return write_run_page(
+        folder.path, summary["title"] or "Rigid grains", claim, figures, said, summary["left_out"],
+        manifest["provenance"],
+    )  # fmt: skip
 
 
 def draw_movie(folder: RunFolder, scene: Scene, title: str) -> list[Path]:

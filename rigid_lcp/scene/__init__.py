@@ -12,12 +12,11 @@ from rigid_lcp.scene.run import (
     rebuild_frame_scene,
     run_scene,
     summarise_run,
-    write_history,
 )
 from rigid_lcp.scene.simulation import Simulation
 
 __all__ = [
     "RunFolder", "SceneFile", "Simulation", "count_unknowns", "list_doubts",
     "list_left_out", "load_scene", "make_simulation", "plan_steps", "read_frame", "read_history",
-    "rebuild_frame_scene", "run_scene", "summarise_run", "write_history",
+    "rebuild_frame_scene", "run_scene", "summarise_run",
 ]  # fmt: skip

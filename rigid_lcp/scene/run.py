@@ -236,13 +236,6 @@ def read_history(folder: RunFolder) -> dict[str, Floats]:
     return dict(zip(HISTORY, np.array(rows).reshape(-1, len(HISTORY)).T, strict=True))
 
 
-def write_history(path: Path, history: dict[str, Floats]) -> None:
-    """Write the history as CSV."""
-    rows = zip(*(column.tolist() for column in history.values()), strict=True)
-    lines = [",".join(map(str, row)) for row in (history, *rows)]
-    write_whole(path, "\n".join(lines) + "\n")
-
-
 def plan_steps(file: SceneFile) -> tuple[int, float]:
     """Number of the steps of a whole run and the length of each [s]: equal steps, not longer than
     the scene's, that end at every frame.  At acceleration level the fewest and the longest."""

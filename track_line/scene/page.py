@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,8 +12,8 @@ from track_line.arrays import Floats
 from track_line.scene.file import LEFT_OUT
 from track_line.scene.run import PLAN, RunFolder, collect_records
 from track_line.settling import BANDS, Record
-from trackbed import report
-from trackbed.run_files import write_whole
+from trackbed.report import save_figure, write_run_page
+from trackbed.run_files import write_csv
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -55,11 +53,10 @@ def write_report(
     """Write ``geometry.csv`` and the report of a finished run, with its picture if ``draw``; its
     path.  Raises as `write_whole`."""
     table = tabulate_records(records, summary["tonnage_mgt"], summary["limit_m"])
-    lines = [",".join(COLUMNS), *(",".join(map(repr, row)) for row in table.tolist())]
-    write_whole(folder.path / "geometry.csv", "\n".join(lines) + "\n")
+    write_csv(folder.path / "geometry.csv", COLUMNS, table.tolist())
     picture = None
     if draw:
-        picture = report.save_figure(
+        picture = save_figure(
             lambda: draw_geometry(table, summary["limit_m"], records, summary["length_m"]),
             folder.path / "geometry.svg",
         )
@@ -68,21 +65,10 @@ def write_report(
         (key.replace("_", " "), f"{value:.4g}" if isinstance(value, float) else str(value or "-"))
         for key, value in summary.items() if key not in ("title", "sentence")
     ]  # fmt: skip
-    parts = [
-        f"<h1>{escape(title)}</h1>",
-        report.make_paragraph(escape(summary["sentence"]), "claim"),
-        report.make_picture(picture, CAPTION, escape(CAPTION)),
-        report.make_section("Figures", report.make_table("", (), rows)),
-        report.make_section(
-            "Left out", report.make_list(escape(text) for text in (*manifest["beds"], *LEFT_OUT))
-        ),
-        report.make_section(
-            "Again", f"<pre>{escape(json.dumps(manifest['provenance'], indent=1))}</pre>"
-        ),
-    ]
-    path = folder.path / "report.html"
-    write_whole(path, report.make_page(title, parts))
-    return path
+    return write_run_page(
+        folder.path, title, summary["sentence"], [(picture, CAPTION)], rows,
+        (*manifest["beds"], *LEFT_OUT), manifest["provenance"],
+    )  # fmt: skip
 
 
 def draw_geometry(

@@ -16,10 +16,12 @@ from trackbed.report.page import (
     make_section,
     make_table,
     mark_number,
+    write_run_page,
 )
 
 __all__ = [
     "MINUS", "STYLE", "TIMES", "encode_figure", "format_number", "format_share", "format_um",
     "format_verdict", "make_folded", "make_list", "make_page", "make_paragraph", "make_picture",
     "make_section", "make_table", "mark_number", "save_figure",
+    "write_run_page",
 ]  # fmt: skip

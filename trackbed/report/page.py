@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import base64
+import json
 from collections.abc import Iterable, Sequence
 from html import escape
 from math import isfinite
 from pathlib import Path
+from typing import Any
+
+from trackbed.run_files import write_whole
 
 STYLE = Path(__file__).with_suffix(".css")
 """Style sheet of every page, which is put into it."""
@@ -36,6 +40,28 @@ def make_page(title: str, body: Iterable[str]) -> str:
             "</html>\n",
         ]
     )
+
+
+def write_run_page(
+    folder: Path, title: str, claim: str, pictures: Iterable[tuple[Path | None, str]],
+    rows: Iterable[Sequence[str]], left_out: Iterable[str], provenance: dict[str, Any],
+) -> Path:  # fmt: skip
+    """Write ``report.html`` in the folder of a run; its path.  Raises as `write_whole`.
+
+    A ``claim`` in sentences, ``pictures`` with their captions, ``rows`` of figures (HTML), physics
+    that is ``left_out``, and how to make the run again.
+    """
+    parts = [
+        f"<h1>{escape(title)}</h1>",
+        make_paragraph(escape(claim), "claim"),
+        *(make_picture(path, caption, escape(caption)) for path, caption in pictures),
+        make_section("Figures", make_table("", (), rows)),
+        make_section("Left out", make_list(map(escape, left_out))),
+        make_section("Again", f"<pre>{escape(json.dumps(provenance, indent=1))}</pre>"),
+    ]
+    path = folder / "report.html"
+    write_whole(path, make_page(title, parts))
+    return path
 
 
 def mark_number(value: float | None, text: str) -> str:
@@ -100,23 +126,21 @@ def make_table(
 
     ``words``: columns of text, set flush left.
     """
+
+    def join_cells(tag: str, cells: Sequence[str]) -> str:
+        kinds = (' class="words"' if place in words else "" for place in range(len(cells)))
+        pairs = zip(kinds, cells, strict=True)
+        return "".join(f"<{tag}{kind}>{cell}</{tag}>" for kind, cell in pairs)
+
     lines = ['<div class="scroll"><table>']
     if caption:
         lines.append(f"<caption>{caption}</caption>")
     if header:
-        cells = "".join(
-            f'<th class="words">{cell}</th>' if place in words else f"<th>{cell}</th>"
-            for place, cell in enumerate(header)
-        )
-        lines.append(f"<thead><tr>{cells}</tr></thead>")
+        lines.append(f"<thead><tr>{join_cells('th', header)}</tr></thead>")
     lines.append("<tbody>")
     for row in rows:
         kind = ' class="this"' if marked and row[0] == marked else ""
-        cells = "".join(
-            f'<td class="words">{cell}</td>' if place in words else f"<td>{cell}</td>"
-            for place, cell in enumerate(row)
-        )
-        lines.append(f"<tr{kind}>{cells}</tr>")
+        lines.append(f"<tr{kind}>{join_cells('td', row)}</tr>")
     lines.append("</tbody></table></div>")
     return "\n".join(lines)
 

@@ -31,6 +31,7 @@ from trackbed.run_files.whole import (
     replace_file,
     seal_file,
     sync_folder,
+    write_csv,
     write_pvd,
     write_whole,
 )
@@ -40,6 +41,6 @@ __all__ = [
     "folder", "is_written", "list_changed_tables", "list_differences", "lock_folder",
     "make_manifest", "note_interrupts", "note_signals", "open_run", "open_unlinked", "place_run",
     "raise_on_signals", "read_object", "record_provenance", "refuse_format", "refuse_links",
-    "refuse_writing", "replace_file", "seal_file", "sync_folder", "time_step", "write_pvd",
-    "write_result", "write_whole",
+    "refuse_writing", "replace_file", "seal_file", "sync_folder", "time_step", "write_csv",
+    "write_pvd", "write_result", "write_whole",
 ]  # fmt: skip

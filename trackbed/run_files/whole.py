@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from errno import EEXIST, ELOOP, ENOTDIR
 from pathlib import Path
@@ -70,6 +70,12 @@ def write_whole(path: Path, content: str | bytes) -> None:
     """Write a text or bytes as `replace_file` does."""
     with replace_file(path) as temporary, open_unlinked(temporary, "wb") as stream:
         stream.write(content.encode() if isinstance(content, str) else content)
+
+
+def write_csv(path: Path, names: Iterable[str], rows: Iterable[Iterable[object]]) -> None:
+    """Write a table whole, its numbers with digits enough to read the same ones back."""
+    lines = [",".join(map(str, row)) for row in (names, *rows)]
+    write_whole(path, "\n".join(lines) + "\n")
 
 
 def append_text(path: Path, text: str) -> None:
