@@ -167,7 +167,7 @@ class RunFolder:
                 same = all(_identify(path) == found for path, found in looked_at)
                 if same and verified >= verify:
                     return outcome
-            outcome = _read_outcome(folder)
+            outcome = Outcome(**_open_seal(json.loads(read_bounded(folder / "outcome.json"))))
             names = ("outcome.json", *outcome.notes.get("files", ()))
             files = [(path, _identify(path)) for path in (f"{folder}/{one}" for one in names)]
             found = _list_sizes(folder)
@@ -344,11 +344,6 @@ class RunFolder:
 def _digest(record: dict[str, Any]) -> str:
     """SHA-256 of an outcome as JSON, whatever the order of its keys."""
     return hashlib.sha256(json.dumps(record, sort_keys=True).encode()).hexdigest()
-
-
-def _read_outcome(folder: Path) -> Outcome:
-    """The record of a stage; raises `ValueError` and others for one that is none or was changed."""
-    return Outcome(**_open_seal(json.loads(read_bounded(folder / "outcome.json"))))
 
 
 def _open_seal(record: dict[str, Any]) -> dict[str, Any]:

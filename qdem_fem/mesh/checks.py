@@ -165,18 +165,15 @@ def find_repeated_elements(elements: Integers, usable: BoolArray) -> list[Proble
     """Usable elements of the same four nodes, in whatever order they name them."""
     numbers = np.flatnonzero(usable)
     rows = np.sort(elements[numbers], axis=1)
-    order = np.lexsort(rows.T)  # stable: of elements that agree the first one leads
-    agree = (rows[order[1:]] == rows[order[:-1]]).all(axis=1)
-    if not agree.any():
+    _, first, same = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    lead = first[same.reshape(-1)]
+    again = np.flatnonzero(lead != np.arange(len(rows)))
+    if not len(again):
         return []
-    first = np.concatenate([[True], ~agree])
-    lead = np.maximum.accumulate(np.where(first, np.arange(len(order)), 0))
-    again = np.flatnonzero(~first)
-    again = again[np.argsort(order[again])]
-    bad, same = numbers[order[again]], numbers[order[lead[again[0]]]]
+    bad = numbers[again]
     text = (
         f"the same four nodes as an earlier element: {name_some('element', bad)}; "
-        f"element {bad[0]} repeats element {same}"
+        f"element {bad[0]} repeats element {numbers[lead[again[0]]]}"
     )
     return [Problem(text, "keep one of the elements that repeat")]
 

@@ -10,8 +10,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from sys import float_info
 
 import numpy as np
+from scipy.optimize import brentq
 
 from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.contact import FEATURE_BITS, MOST_EDGES
@@ -181,20 +183,11 @@ def find_cut_depth(shape: Solid, normal: Floats, volume: float) -> float:
         )
         inside = area.integ() * float(below - above)
         if taken + float(inside(1.0)) >= volume:
-            return float(above + (below - above) * _find_root(inside, volume - taken))
+            missing = inside - (volume - taken)
+            share = brentq(missing, 0.0, 1.0, xtol=float_info.min)
+            return float(above + (below - above) * share)
         taken += float(inside(1.0))
     return float(depths[-1])
-
-
-def _find_root(rising: np.polynomial.Polynomial, value: float) -> float:
-    """Where in [0, 1] a rising polynomial has a value: bisection to the last digit."""
-    low, high = 0.0, 1.0
-    while high - low > 1e-16 * high:
-        middle = 0.5 * (low + high)
-        if middle in (low, high):
-            break
-        low, high = (middle, high) if float(rising(middle)) < value else (low, middle)
-    return high
 
 
 def measure_section(shape: Solid, normal: Floats, height: Floats) -> float:
