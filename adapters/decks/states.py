@@ -30,8 +30,7 @@ class States:
     """
 
     identifier: IntArray  # ascending, shape (n,)
-    radius: FloatArray
-    """Radii [m], shape (n,); of stones half of the distance to the nearest one."""
+    radius: FloatArray  # radii [m], shape (n,); of stones half of the distance to the nearest one
     mass: FloatArray  # masses [kg], shape (n,)
     position: FloatArray  # centres as they are without periods [m], shape (c, n, 3)
     velocity: FloatArray  # [m/s], shape (c, n, 3)

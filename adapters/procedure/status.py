@@ -30,10 +30,8 @@ class Status:
     """Permanent settlement of the loaded body since the preparation, at the load's trough."""
     stiffness_n_per_m: float | None
     """Secant stiffness under the whole loaded body in the last cycles computed."""
-    elastic_deflection_m: float | None
-    """Rise of the loaded body on unloading, in the same cycles."""
-    mean_grain_m: float | None
-    """Settlement of the mean grain since the preparation."""
+    elastic_deflection_m: float | None  # rise of the loaded body on unloading, in the same cycles
+    mean_grain_m: float | None  # settlement of the mean grain since the preparation
     speed_up_so_far: float | None
     """CPU time of the full run beside it over its own, as in the report; None without one."""
     cpu_s: float  # CPU time of all finished stages, preparation included, full runs not [s]

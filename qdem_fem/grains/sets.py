@@ -31,14 +31,11 @@ GRAINS_FORMAT = 1
 class GrainSet:
     """Grains one behind another; grain i has ``corners[i]`` = M corners."""
 
-    corners: Integers
-    """M of each grain, (g,)."""
-    nodes: Floats
-    """Nodes of all grains [m], (sum of 5 M - 5, 3), the centroid of each at zero."""
+    corners: Integers  # M of each grain, (g,)
+    nodes: Floats  # nodes of all grains [m], (sum of 5 M - 5, 3), the centroid of each at zero
     corner_faces: Integers
     """Triangles of their corners, (sum of 2 M - 4, 3), by the numbers within the grain."""
-    sizes: Floats
-    """`find_sieve_size` [m], (g,)."""
+    sizes: Floats  # `find_sieve_size` [m], (g,)
     sphericity: Floats
     roundness: Floats
 

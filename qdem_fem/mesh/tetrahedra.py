@@ -27,18 +27,15 @@ class TetMesh:
     Made by `read_mesh`, which checks it, or by `qdem_fem.mesh.generation`.
     """
 
-    nodes: Floats
-    """Coordinates X [m], (n, 3)."""
+    nodes: Floats  # coordinates X [m], (n, 3)
     elements: Integers
     """The nodes of each element, (m, 4), with (X1 - X0) x (X2 - X0) . (X3 - X0) > 0."""
     flipped: Integers = field(default_factory=lambda: np.zeros(0, np.int64))
     """Elements that were left-handed as given, and whose last two nodes were swapped, (k,)."""
     unused: Integers = field(default_factory=lambda: np.zeros(0, np.int64))
     """Nodes of no element, (j,); they have no mass and do not move."""
-    node_sets: dict[str, Integers] = field(default_factory=dict)
-    """Named nodes, each sorted."""
-    element_sets: dict[str, Integers] = field(default_factory=dict)
-    """Named elements, each sorted."""
+    node_sets: dict[str, Integers] = field(default_factory=dict)  # named nodes, each sorted
+    element_sets: dict[str, Integers] = field(default_factory=dict)  # named elements, each sorted
 
 
 def read_mesh(source: Any, *, where: str = "") -> TetMesh:

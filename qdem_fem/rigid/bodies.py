@@ -30,28 +30,20 @@ STATE = ("shift", "velocity", "turn", "spin")
 class RigidNow:
     """Motion of the rigid bodies at the time of the displacements."""
 
-    velocity: Floats
-    """Of the centres [m/s], (b, 3)."""
-    spin: Floats
-    """Angular momentum about the centres [kg m^2/s], (b, 3)."""
+    velocity: Floats  # of the centres [m/s], (b, 3)
+    spin: Floats  # angular momentum about the centres [kg m^2/s], (b, 3)
 
 
 @dataclass(frozen=True)
 class Acting:
     """What acts on the rigid bodies of a simulation now, and where its march is."""
 
-    behind: bool
-    """Whether velocities are half a step behind the displacements."""
-    step: float
-    """[s]"""
-    table: Floats
-    """(2, series) what loads and given displacements are times, now and a step later"""
-    gravity: Floats | None
-    """(3,) [m/s^2]"""
-    place: Integers
-    """(c,) the kernel's numbers of vertices that contact acts on"""
-    force: Floats
-    """(c, 3) of contact on them [N]"""
+    behind: bool  # whether velocities are half a step behind the displacements
+    step: float  # [s]
+    table: Floats  # (2, series) what loads and given displacements are times, now and a step later
+    gravity: Floats | None  # (3,) [m/s^2]
+    place: Integers  # (c,) the kernel's numbers of vertices that contact acts on
+    force: Floats  # (c, 3) of contact on them [N]
 
 
 class RigidBodies:

@@ -25,11 +25,9 @@ class Step:
     """One call that puts a condition on the simulation."""
 
     key: str
-    verb: str
-    """Method of `qdem_fem.Simulation`."""
+    verb: str  # method of `qdem_fem.Simulation`
     body: str
-    arguments: tuple[Any, ...]
-    """Behind the body; values over time are `qdem_fem.Series`."""
+    arguments: tuple[Any, ...]  # behind the body; values over time are `qdem_fem.Series`
 
 
 @dataclass(frozen=True)
@@ -40,10 +38,8 @@ class Prepared:
     text: SceneText
     meshes: dict[str, TetMesh]
     conditions: list[Step]
-    probes: dict[str, tuple[str, Integers]]
-    """Name -> body and nodes."""
-    files: dict[str, str]
-    """Each file that the scene names, as it is written there, and its SHA-256."""
+    probes: dict[str, tuple[str, Integers]]  # name -> body and nodes
+    files: dict[str, str]  # each file that the scene names, as it is written there, and its SHA-256
 
 
 def list_tables(text: SceneText, *kinds: Any) -> Iterator[tuple[str, Any]]:

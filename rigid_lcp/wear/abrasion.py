@@ -55,16 +55,11 @@ class Wear:
 class WearState:
     """What the corners and edges of all grains of a scene have lost; volumes are areas in 2D."""
 
-    grains: list[WornShape | None]
-    """None for a body that does not wear."""
-    volume: float = 0.0
-    """All that has been worn, cut off or not [m^3]."""
-    work: float = 0.0
-    """All work of friction, at features that wear and elsewhere [J]."""
-    mass: float = 0.0
-    """Mass cut off [kg]."""
-    energy: float = 0.0
-    """Kinetic and potential energy that went with it [J]."""
+    grains: list[WornShape | None]  # None for a body that does not wear
+    volume: float = 0.0  # all that has been worn, cut off or not [m^3]
+    work: float = 0.0  # all work of friction, at features that wear and elsewhere [J]
+    mass: float = 0.0  # mass cut off [kg]
+    energy: float = 0.0  # kinetic and potential energy that went with it [J]
 
     @property
     def pending(self) -> Floats:

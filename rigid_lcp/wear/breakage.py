@@ -50,14 +50,10 @@ effect parts under the stress that broke the whole break as well, and their numb
 class Break:
     """Where a grain shall be split, and why."""
 
-    point: Floats
-    """A point of the line or plane: in the middle between the two forces, (dim,) [m]."""
-    direction: Floats
-    """Unit vector along the line between the two forces, (dim,)."""
-    tension: float
-    """[Pa]"""
-    strength: float
-    """[Pa]"""
+    point: Floats  # a point of the line or plane: in the middle between the two forces, (dim,) [m]
+    direction: Floats  # unit vector along the line between the two forces, (dim,)
+    tension: float  # [Pa]
+    strength: float  # [Pa]
 
 
 def find_mean_stress(points: Floats, forces: Floats, centre: Floats, volume: float) -> Floats:
@@ -175,16 +171,11 @@ class Breakage:
 class Broken:
     """A grain that broke in a run."""
 
-    time: float
-    """[s]"""
-    body: int
-    """Number of the whole, and of its first part."""
-    part: int
-    """Number of the second part."""
-    tension: float
-    """[Pa]"""
-    strength: float
-    """[Pa]"""
+    time: float  # [s]
+    body: int  # number of the whole, and of its first part
+    part: int  # number of the second part
+    tension: float  # [Pa]
+    strength: float  # [Pa]
 
 
 def gather_forces(contacts: ContactForces, body: int) -> tuple[Floats, Floats]:

@@ -41,10 +41,8 @@ class WornShape:
     """A polygon or polyhedron, and the planes that wear cuts it by; all in its body frame."""
 
     shape: Solid
-    normal: Floats
-    """Outward directions of the planes (k, dim), unit."""
-    lost: Floats
-    """Volume cut off by each so far (k,) [m^3], in 2D area [m^2]."""
+    normal: Floats  # outward directions of the planes (k, dim), unit
+    lost: Floats  # volume cut off by each so far (k,) [m^3], in 2D area [m^2]
     pending: Floats
     """Volume worn there and not yet cut off (k,); within round-off of zero it may be less."""
 

@@ -28,10 +28,8 @@ SHORTEST = 10.0
 class Ensemble:
     """n beds at k cycles, evenly spaced in ln N from first to last."""
 
-    cycle: Floats
-    """N, shape (k,) [-]."""
-    settled: Floats
-    """Shape (n, k) [m]."""
+    cycle: Floats  # N, shape (k,) [-]
+    settled: Floats  # shape (n, k) [m]
     read: Bools
     """Cycles that all beds were read at, within half a step, shape (k,); between readings a
     straight line in ln N is taken, which knows nothing of a bed."""
@@ -41,10 +39,8 @@ class Ensemble:
     """Greatest pressure under the loaded body, shape (n,) [Pa]; nan where it is not known."""
     bedding: Floats
     """Pressure over elastic deflection, late, shape (n,) [Pa/m]; nan where it is not known."""
-    in_order: bool
-    """Whether neighbours in the table are neighbours in a track."""
-    notes: tuple[str, ...] = ()
-    """What of the table was not taken, and why."""
+    in_order: bool  # whether neighbours in the table are neighbours in a track
+    notes: tuple[str, ...] = ()  # what of the table was not taken, and why
 
     @property
     def packings(self) -> int:

@@ -50,38 +50,25 @@ class Estimate:
 class BedFit:
     """The law s = c + a (F/F0)^m N^b of a mean bed, and how beds scatter about it."""
 
-    force: float
-    """F0, on half a sleeper: the pressure under most beds times `SEAT_AREA` [N]."""
-    a: float
-    """[m]"""
-    b: Estimate
-    """[-]"""
-    m: Estimate
-    """[-]"""
-    seated: float
-    """c, which is no part of the law of a line [m]."""
-    bed: float
-    """Mean stiffness under half a sleeper [N/m]."""
-    stiffness: Estimate
-    """Its coefficient of variation [-]."""
-    total: Estimate
-    """Coefficient of variation of the gain over all cycles [-]."""
-    together: Estimate
-    """Correlation of gain with stiffness [-]."""
-    window: float
-    """Last cycle of a window over its first: a decade, or half of less than two [-]."""
+    force: float  # F0, on half a sleeper: the pressure under most beds times `SEAT_AREA` [N]
+    a: float  # [m]
+    b: Estimate  # [-]
+    m: Estimate  # [-]
+    seated: float  # c, which is no part of the law of a line [m]
+    bed: float  # mean stiffness under half a sleeper [N/m]
+    stiffness: Estimate  # its coefficient of variation [-]
+    total: Estimate  # coefficient of variation of the gain over all cycles [-]
+    together: Estimate  # correlation of gain with stiffness [-]
+    window: float  # last cycle of a window over its first: a decade, or half of less than two [-]
     persistence: tuple[Estimate, ...]
     """Correlation of the gains in two windows that follow one another, the latest first [-]."""
-    rose: int
-    """Beds that rose in a window, and are in no correlation of it."""
+    rose: int  # beds that rose in a window, and are in no correlation of it
     memory: Estimate
     """Mean settlement after which scatter is forgotten by e [m], by the latest persistence."""
-    settlement: float
-    """Coefficient of variation of ds/dN [-], of which ``total`` is what lasts."""
+    settlement: float  # coefficient of variation of ds/dN [-], of which ``total`` is what lasts
     length: Estimate
     """Along the line, over which beds are alike, where sleepers are `Track.spacing` apart [m]."""
-    unseen: float
-    """Constant rate that would make the whole of the last window's gain [m a cycle]."""
+    unseen: float  # constant rate that would make the whole of the last window's gain [m a cycle]
 
 
 def fit_beds(ensemble: Ensemble) -> BedFit:

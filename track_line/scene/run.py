@@ -26,10 +26,8 @@ KEPT = ("cycle", "settled", "hardened", "score")
 class RunPlan:
     """How a run is kept, checked and summed up."""
 
-    apart: float = 10.0
-    """Between states that are written [s]."""
-    checked: int = 10
-    """Lines that are computed again with half the blocks, for the error."""
+    apart: float = 10.0  # between states that are written [s]
+    checked: int = 10  # lines that are computed again with half the blocks, for the error
     doubtful: float = 0.05
     """Error of the last D1 by its blocks, over itself, from which a run warns [-]."""
     band: tuple[float, float, float] = (0.05, 0.5, 0.95)

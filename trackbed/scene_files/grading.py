@@ -19,10 +19,8 @@ class Grading:
     Raises `SceneError` for sieves that do not grow, or shares that do not grow from 0 to 1.
     """
 
-    sieves: Floats
-    """Sides of the square holes [m], (k,), growing."""
-    passing: Floats
-    """Share of the mass that passes [-], (k,), from 0 to 1."""
+    sieves: Floats  # sides of the square holes [m], (k,), growing
+    passing: Floats  # share of the mass that passes [-], (k,), from 0 to 1
     limits: tuple[Floats, Floats] | None = None
     """Least and greatest share that a standard lets pass each sieve [-], (k,) each."""
 
