@@ -28,10 +28,8 @@ EDGE = 1e-6
 class Scatter(Table):
     """How beds differ.  Published numbers of lines are few: vary these."""
 
-    stiffness: Variation = 0.2
-    """Coefficient of variation of the stiffness [-]."""
-    settlement: Variation = 0.2
-    """Coefficient of variation of the settlement under equal load [-]."""
+    stiffness: Variation = 0.2  # coefficient of variation of the stiffness [-]
+    settlement: Variation = 0.2  # coefficient of variation of the settlement under equal load [-]
     length: NonNegative = 0.0
     """Over which beds are alike: their correlation is e^(-x/length) [m]; 0 where each is drawn by
     itself."""
@@ -41,22 +39,18 @@ class Scatter(Table):
     memory: Annotated[Real, Field(ge=SHORTEST_MEMORY)] | None = None
     """Mean settlement after which the scatter of settlement is forgotten by e [m]; None where it
     stays for ever."""
-    unevenness: NonNegative = 0.0
-    """Standard deviation of the level of the beds behind tamping [m]."""
+    unevenness: NonNegative = 0.0  # standard deviation of the level of the beds behind tamping [m]
 
 
 class Zone(Table):
     """A part of the line, such as the end of a bridge."""
 
     begin: Real
-    end: Real
-    """[m]; a zone that reaches an end of the line goes on through its margin."""
+    end: Real  # [m]; a zone that reaches an end of the line goes on through its margin
     stiffness: Annotated[Real, Field(ge=1e-3, le=1e3)] = 1.0
     """By which the beds' stiffness is multiplied [-]."""
-    settlement: NonNegative = 1.0
-    """By which their settlement is multiplied [-]."""
-    void: Annotated[Real, Field(ge=0, le=0.1)] = 0.0
-    """How much deeper they lie at first [m]."""
+    settlement: NonNegative = 1.0  # by which their settlement is multiplied [-]
+    void: Annotated[Real, Field(ge=0, le=0.1)] = 0.0  # how much deeper they lie at first [m]
 
     def find_inside(self, place: Floats) -> Bools:
         """Which of the beds at ``place`` (n,) [m] it has, those at its ends counted."""
@@ -67,16 +61,11 @@ class Zone(Table):
 class Beds:
     """b lines of n beds, each of half a sleeper."""
 
-    place: Floats
-    """Along the line, shape (n,) [m]."""
-    stiffness: Floats
-    """k_b, shape (b, n) [N/m]."""
-    score: Floats
-    """Standard normal, shape (b, n): how much more than the mean each bed settles."""
-    scale: Floats
-    """Of zones, shape (n,): by which every settlement is multiplied [-]."""
-    level: Floats
-    """How deep each lies below the level of tamping, shape (b, n) [m]."""
+    place: Floats  # along the line, shape (n,) [m]
+    stiffness: Floats  # k_b, shape (b, n) [N/m]
+    score: Floats  # standard normal, shape (b, n): how much more than the mean each bed settles
+    scale: Floats  # of zones, shape (n,): by which every settlement is multiplied [-]
+    level: Floats  # how deep each lies below the level of tamping, shape (b, n) [m]
     scatter: Scatter
     seed: int
 

@@ -77,8 +77,7 @@ class Window:
     contacts: tuple[Contacts, ...]  # contacts at each of the c + 1 instants
     piston: PistonTrack
     piston_start: float  # height of the piston's face before the first cycle [m]
-    orientation: FloatArray | None = None
-    """Of stones, as in `State`, shape (c + 1, n, 4)."""
+    orientation: FloatArray | None = None  # of stones, as in `State`, shape (c + 1, n, 4)
 
     def __len__(self) -> int:
         """Number of load cycles."""

@@ -107,8 +107,7 @@ class Run:
     clock: Clock = field(default_factory=Clock)
     first_cycle: int = 0  # cycles done before the stage of the load that ``scene`` has
     computed_here: int = 0
-    loaded_start: float = np.nan
-    """Height of the loaded body before the first cycle [m]."""
+    loaded_start: float = np.nan  # height of the loaded body before the first cycle [m]
     start_orientation: FloatArray | None = None
     """Of stones, before the first cycle, shape (n, 4): rotations count from there."""
     computed_before: int | None = None

@@ -38,13 +38,11 @@ EVERY = slice(None)
 class Given(NamedTuple):
     """What acts on the nodes in some steps."""
 
-    table: Floats
-    """(steps + 1, series) amplitudes at the times of the steps."""
+    table: Floats  # (steps + 1, series) amplitudes at the times of the steps
     loads: Loads = NO_LOADS
     held: Constraints = NO_CONSTRAINTS
     probes: Probes = NO_PROBES
-    gravity: Floats | None = None
-    """(3,) [m/s^2]; None: there is none."""
+    gravity: Floats | None = None  # (3,) [m/s^2]; None: there is none
 
 
 NOTHING = Given(np.ones((2, 1)))

@@ -20,10 +20,8 @@ PARALLEL = 1e-9
 class NodalLoad:
     """Forces ``weights[i, c] x driver[s]`` on the nodes, with ``s = c`` or 0 for one column."""
 
-    nodes: Integers
-    """Numbers in the simulation, (k,)."""
-    weights: Floats
-    """(k, 3): shares of a total force [-], or areas under a pressure [m^2]."""
+    nodes: Integers  # numbers in the simulation, (k,)
+    weights: Floats  # (k, 3): shares of a total force [-], or areas under a pressure [m^2]
     driver: Driver
 
 
@@ -34,8 +32,7 @@ class Held:
     nodes: Integers
     components: tuple[int, ...]
     driver: Driver | None = None
-    factor: Floats | None = None
-    """Of the driver, by node, (k,); None: 1."""
+    factor: Floats | None = None  # of the driver, by node, (k,); None: 1
 
 
 @dataclass(eq=False)

@@ -34,8 +34,7 @@ class Discretisation:
     displacement: float
     """Shortfall of the displacement under the load, over the true one [-]; under prescribed motion
     the excess of its reaction, over the one found."""
-    frequency: float
-    """Excess of the frequency of motion of this shape, over the one found [-]."""
+    frequency: float  # excess of the frequency of motion of this shape, over the one found [-]
 
     @property
     def stress(self) -> float:

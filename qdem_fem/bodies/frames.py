@@ -33,10 +33,8 @@ precision makes its spin drift, by 4e-4 in 15,000 steps at 37 rad/s.
 class Journey:
     """Frames within a window of ``k`` steps: where and how fast, less what they began with."""
 
-    fall_velocity: Floats
-    """``dt sum g`` up to each half step [m/s], (k, 3); zero without gravity."""
-    fall: Floats
-    """``dt sum`` of it, at each step's end [m], (k, 3)."""
+    fall_velocity: Floats  # ``dt sum g`` up to each half step [m/s], (k, 3); zero without gravity
+    fall: Floats  # ``dt sum`` of it, at each step's end [m], (k, 3)
 
 
 class BodyFrames:

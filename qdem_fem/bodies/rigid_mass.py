@@ -16,14 +16,10 @@ RIGID_TOLERANCE = 1e-9
 class RigidMass:
     """What a rigid body is to Newton and Euler, in the reference configuration."""
 
-    mass: float
-    """M [kg]"""
-    centre: Floats
-    """c (3,) [m]"""
-    inertia: Floats
-    """Principal moments about the centre, growing, (3,) [kg m^2]."""
-    axes: Floats
-    """(3, 3): row i is the unit vector of moment i; right-handed."""
+    mass: float  # M [kg]
+    centre: Floats  # c (3,) [m]
+    inertia: Floats  # principal moments about the centre, growing, (3,) [kg m^2]
+    axes: Floats  # (3, 3): row i is the unit vector of moment i; right-handed
 
     @property
     def tensor(self) -> Floats:

@@ -31,16 +31,11 @@ SHORTER = 1 / 3
 class ContactTouching:
     """Pairs of spheres that touch now."""
 
-    first: Integers
-    """(t,) node of one, in the numbers of all bodies"""
-    second: Integers
-    """(t,) node of the other"""
-    force: Floats
-    """(t, 3) on the first [N]"""
-    spring: Floats
-    """(t, 3) tangential spring [m]"""
-    overlap: Floats
-    """(t,) [m]"""
+    first: Integers  # (t,) node of one, in the numbers of all bodies
+    second: Integers  # (t,) node of the other
+    force: Floats  # (t, 3) on the first [N]
+    spring: Floats  # (t, 3) tangential spring [m]
+    overlap: Floats  # (t,) [m]
 
 
 class Contacts(ABC):
@@ -53,12 +48,9 @@ class Contacts(ABC):
     kernel: Any
     asked: SphereContact | SurfaceContact
     skin: float
-    one: Floats
-    """(c,) stiffness of one contact of each vertex [N/m]."""
-    deep: float
-    """Depth in another body beyond which a point of this one is not seen [m]."""
-    reach: float
-    """Way within which two vertices may be looked at as touching [m]."""
+    one: Floats  # (c,) stiffness of one contact of each vertex [N/m]
+    deep: float  # depth in another body beyond which a point of this one is not seen [m]
+    reach: float  # way within which two vertices may be looked at as touching [m]
 
     def __init__(self, run: System, asked: SphereContact | SurfaceContact) -> None:
         outer = [np.unique(body.surface) for body in run.bodies]

@@ -31,11 +31,9 @@ class State(System):
     """All that a march reads and writes.  What is costly is made when first asked for."""
 
     contact: Contact | None = None
-    given_step: float | None = None
-    """Time step that the user gave [s]."""
+    given_step: float | None = None  # time step that the user gave [s]
     safety: float = STEP_SAFETY
-    warned: float = nan
-    """The critical step of which a warning was given [s]."""
+    warned: float = nan  # the critical step of which a warning was given [s]
 
     def __post_init__(self) -> None:
         super().__post_init__()

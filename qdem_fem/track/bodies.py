@@ -30,10 +30,8 @@ Room = tuple[float, float, float, float]
 class TrackBox:
     """Where the track lies: 0 <= x <= length, 0 <= y <= width, z >= 0 [m]."""
 
-    length: float
-    """Along the sleeper."""
-    width: float
-    """Along the track: from the middle between two sleepers to the next."""
+    length: float  # along the sleeper
+    width: float  # along the track: from the middle between two sleepers to the next
 
 
 def make_loose_lattice(

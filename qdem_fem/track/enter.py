@@ -62,8 +62,7 @@ class TrackPrepared(tables.Prepared):
 
     recipe: BedRecipe
     bed_file: Path
-    loads: tuple[Series, ...]
-    """On each rail seat [N], (k, 3)."""
+    loads: tuple[Series, ...]  # on each rail seat [N], (k, 3)
     trial: dict[str, Any] = field(default_factory=dict)
     """`qdem_fem.track.bearing.Pulse` that the bed bears, the ``pulses`` that ran it in, and its
     ``words``; filled by `enter_track`."""

@@ -33,10 +33,8 @@ class TrackLayout:
     part: Part
     box: TrackBox
     shape: SleeperShape
-    cells: tuple[int, int, int]
-    """Of the part of the sleeper, along, across and up."""
-    radius: float
-    """Of the spheres of contact."""
+    cells: tuple[int, int, int]  # of the part of the sleeper, along, across and up
+    radius: float  # of the spheres of contact
     shoulder: tuple[float, float] | None
     """How far the flat top of the ballast and how far its foot reach beyond the sleeper's free end;
     None: to the wall."""

@@ -32,38 +32,29 @@ class BedRecipe:
     """Everything that the prepared bed depends on, SI."""
 
     box: TrackBox
-    below: int
-    """Grains below the sleeper."""
-    beside: int
-    """Grains that fall into the cribs."""
+    below: int  # grains below the sleeper
+    beside: int  # grains that fall into the cribs
     seed: int
-    sizes: tuple[float, float]
-    """Least and greatest sieve size of the grains' meshes [m]."""
+    sizes: tuple[float, float]  # least and greatest sieve size of the grains' meshes [m]
     shape: SleeperShape
     cells: tuple[int, int, int]
     ballast: Material
     sleeper: Material
     radius: float
-    stiffness: tuple[float, float]
-    """k_n of ballast and sleeper [N/m]."""
+    stiffness: tuple[float, float]  # k_n of ballast and sleeper [N/m]
     friction: float
-    side_friction: float
-    """Of the walls at the sides; smooth ones are planes of symmetry."""
+    side_friction: float  # of the walls at the sides; smooth ones are planes of symmetry
     gravity: tuple[float, float, float]
     softness: float
     unbalanced: float
     kinetic: float
-    loose: float
-    """Greatest shares of `Rest` that are equilibrium."""
-    patience: float
-    """Simulated time of a stage after which it is given up [s]."""
-    rigid: bool = True
-    """Whether grains are rigid until the last stage."""
+    loose: float  # greatest shares of `Rest` that are equilibrium
+    patience: float  # simulated time of a stage after which it is given up [s]
+    rigid: bool = True  # whether grains are rigid until the last stage
     periodic: bool = False
     """Whether the track repeats along y, as in the paper, in place of walls there."""
     part: Part = "slice"
-    shoulder: tuple[float, float] | None = None
-    """As in `TrackLayout`."""
+    shoulder: tuple[float, float] | None = None  # as in `TrackLayout`
 
     @property
     def layout(self) -> TrackLayout:

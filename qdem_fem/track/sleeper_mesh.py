@@ -24,14 +24,11 @@ class SleeperShape:
     """
 
     length: float = 2.0
-    width: float = 0.24
-    """Of the bottom."""
+    width: float = 0.24  # of the bottom
     height: float = 0.174
     top_width: float = 0.17
-    seat_distance: float = 1.132
-    """From the middle of one rail seat to that of the other."""
-    seat_length: float = 0.13
-    """Along the sleeper."""
+    seat_distance: float = 1.132  # from the middle of one rail seat to that of the other
+    seat_length: float = 0.13  # along the sleeper
 
     @property
     def stations(self) -> Floats:

@@ -32,37 +32,29 @@ class RoughnessTable(Table):
     wheel: WheelKind = "disc"
     seed: Annotated[int, Field(ge=0)] = 1
     amplitude: NonNegative = 1.0
-    highest: Positive = 2000.0
-    """Frequency up to which there is any [Hz]."""
+    highest: Positive = 2000.0  # frequency up to which there is any [Hz]
 
 
 class FlatTable(Table):
     """On both wheels of an axle (`qdem_fem.track.loads.train.WheelFlat`), as ``trackbed train
     --flat``."""
 
-    axle: Annotated[int, Field(ge=0)]
-    """0 in front, 1 behind."""
-    peak: Real
-    """Of the added force of one wheel on the rail [N]."""
-    duration: Positive
-    """[s]; the same at every turn of the wheel."""
+    axle: Annotated[int, Field(ge=0)]  # 0 in front, 1 behind
+    peak: Real  # of the added force of one wheel on the rail [N]
+    duration: Positive  # [s]; the same at every turn of the wheel
 
 
 class BogieTable(Table):
     """The first bogie of a train (`qdem_fem.track.loads.train`)."""
 
-    axle_load: Positive = 100e3
-    """Of both wheels [N]."""
-    speed: Positive = 32.0
-    """[m/s]"""
+    axle_load: Positive = 100e3  # of both wheels [N]
+    speed: Positive = 32.0  # [m/s]
     lead: Positive = 3.0
     """From the front axle to the sleeper at first, from it to the rear axle at last [m]."""
-    rest: NonNegative = 0.05
-    """Time without load at the end [s]."""
+    rest: NonNegative = 0.05  # time without load at the end [s]
     roughness: RoughnessTable | None = None
     """What rolling adds; without it the load has next to nothing above 100 Hz."""
-    flat: Annotated[tuple[FlatTable, ...], Field(strict=False)] = ()
-    """Of wheels that are not round."""
+    flat: Annotated[tuple[FlatTable, ...], Field(strict=False)] = ()  # of wheels that are not round
 
     @property
     def train(self) -> Train:
@@ -80,19 +72,14 @@ class TrackTable(Table):
 
     part: Part = "slice"
     """Of a sleeper: a slice at a rail seat, half of it with a free end, or the whole."""
-    length: Positive
-    """Of the track that is computed, along the sleeper [m]."""
-    width: Positive
-    """Along the track, from one middle between sleepers to the next [m]."""
-    below: Annotated[int, Field(ge=1, le=100_000)]
-    """Grains below the sleeper."""
-    beside: Annotated[int, Field(ge=1, le=100_000)]
-    """Grains that fill the cribs."""
+    length: Positive  # of the track that is computed, along the sleeper [m]
+    width: Positive  # along the track, from one middle between sleepers to the next [m]
+    below: Annotated[int, Field(ge=1, le=100_000)]  # grains below the sleeper
+    beside: Annotated[int, Field(ge=1, le=100_000)]  # grains that fill the cribs
     seed: Annotated[int, Field(ge=0)] = 1
     sizes: Annotated[tuple[Positive, Positive], Field(strict=False)] = (0.026, 0.034)
     """Least and greatest sieve size of the grains' meshes [m]; spheres make them larger."""
-    cells: Cells
-    """Of the sleeper's mesh, along, across and up."""
+    cells: Cells  # of the sleeper's mesh, along, across and up
     shoulder: Annotated[tuple[NonNegative, Positive], Field(strict=False)] | None = None
     """How far the flat top of the ballast and how far its foot reach beyond a free end [m]; by
     default ballast reaches to the wall."""
@@ -102,14 +89,12 @@ class TrackTable(Table):
     sleeper: MaterialTable
     side_friction: NonNegative = 0.0
     """Of the walls at the sides; without it they are planes of symmetry."""
-    bed: Text
-    """File of the prepared bed, made where it is not there; relative to the scene file."""
+    bed: Text  # file of the prepared bed, made where it is not there; relative to the scene file
     prepared_friction: NonNegative | None = None
     """Friction that the bed is prepared with; by default that of the contact."""
     rigid: Rigid = False
     """Whether grains are rigid in the run, and with which inertia; the bed is the same."""
-    softness: Share = 1e-4
-    """Of the springs while grains fall, over those of the run."""
+    softness: Share = 1e-4  # of the springs while grains fall, over those of the run
     unbalanced: Share = 0.05
     kinetic: Share = 0.01
     loose: Share = 0.02
@@ -123,8 +108,7 @@ class TrackTable(Table):
     """Pressure on the rail seat [Pa], as the paper's record; or a bogie."""
     pressure_other: SeriesTable | None = None
     """On the other rail seat of a whole sleeper; by default the same."""
-    seat_area: Positive = 0.13 * 0.17
-    """Of the pressure [m^2]."""
+    seat_area: Positive = 0.13 * 0.17  # of the pressure [m^2]
     bogie: BogieTable | None = None
 
 

@@ -77,17 +77,13 @@ COLLISION = CollisionNumbers()
 class Collision:
     """What a collision did."""
 
-    velocity: Floats
-    """Velocities of the bodies after it, (ndof,)."""
-    impulse: Floats
-    """Impulses of the contacts over all rounds [N s], (nc * dim,)."""
+    velocity: Floats  # velocities of the bodies after it, (ndof,)
+    impulse: Floats  # impulses of the contacts over all rounds [N s], (nc * dim,)
     energy_change: float
     """Kinetic energy after less before [J]; with ``drive``, without the work of those walls."""
-    residual: float
-    """Largest error of the rounds (`find_round_error`) [-]."""
+    residual: float  # largest error of the rounds (`find_round_error`) [-]
     status: Status
-    rounds: int
-    """Rounds until no contact approached."""
+    rounds: int  # rounds until no contact approached
     restitution_scale: float
     """Smallest factor eps had to be multiplied by for impulses to exist and energy not to grow; 1
     without friction."""

@@ -54,39 +54,28 @@ PASSING = PassingNumbers()
 class Closing:
     """Contacts of a time step as its contact law sees them."""
 
-    restitution: Floats
-    """e, (nc,) [-]."""
-    friction: Floats
-    """mu, (nc,) [-]."""
-    gap: Floats
-    """At the midpoint, (nc,) [m]."""
-    before: Floats
-    """Normal velocities at the start of the step, (nc,) [m/s]."""
-    offset: Floats
-    """Relative velocities at its end without impulses, (nc, dim) [m/s]."""
+    restitution: Floats  # e, (nc,) [-]
+    friction: Floats  # mu, (nc,) [-]
+    gap: Floats  # at the midpoint, (nc,) [m]
+    before: Floats  # normal velocities at the start of the step, (nc,) [m/s]
+    offset: Floats  # relative velocities at its end without impulses, (nc, dim) [m/s]
     turning: Floats
     """What the turning of the bodies adds to ``u_N`` from the midpoint to the end, and takes from
     ``before``, (nc,) [m/s]."""
     slow: float
     """What gravity gives in a step [m/s]: an approach as slow cannot be distinguished from rest."""
-    h: float
-    """Length of the step [s]."""
-    touching: float
-    """A gap this small is none [m]."""
+    h: float  # length of the step [s]
+    touching: float  # a gap this small is none [m]
 
 
 @dataclass(frozen=True)
 class Impulses:
     """Impulses of all contacts of a step, and how well they were found."""
 
-    impulse: Floats
-    """p, (nc, dim) [N s]."""
-    velocity: Floats
-    """u at the end of the step, (nc, dim) [m/s]."""
-    error: float
-    """Scale-free residual, the greatest of all rounds [-]."""
-    message: str
-    """What the solver has to say of it."""
+    impulse: Floats  # p, (nc, dim) [N s]
+    velocity: Floats  # u at the end of the step, (nc, dim) [m/s]
+    error: float  # scale-free residual, the greatest of all rounds [-]
+    message: str  # what the solver has to say of it
     cut_off: bool = False
     """Whether approaching contacts were closed without restitution as rounds were too many."""
 

@@ -31,30 +31,21 @@ class Contacts:
     Bodies are numbered as in the scene, fixed ones included.
     """
 
-    body_a: Ints
-    """Body with the vertex (or the disc, the sphere), (nc,)."""
-    body_b: Ints
-    """Body with the face, (nc,)."""
-    point: Floats
-    """Contact points [m], (nc, dim), on the surface of a."""
-    normal: Floats
-    """Unit normals from b to a, (nc, dim)."""
-    gap: Floats
-    """Distances [m], (nc,), negative for an overlap."""
+    body_a: Ints  # body with the vertex (or the disc, the sphere), (nc,)
+    body_b: Ints  # body with the face, (nc,)
+    point: Floats  # contact points [m], (nc, dim), on the surface of a
+    normal: Floats  # unit normals from b to a, (nc, dim)
+    gap: Floats  # distances [m], (nc,), negative for an overlap
     key: Ints
     """Names of the contacts, (nc,): the same two features have the same key at the next step."""
-    radius_a: Floats
-    """Radius of curvature of a's feature at the point [m], (nc,): 0 for a vertex."""
+    radius_a: Floats  # radius of curvature of a's feature at the point [m], (nc,): 0 for a vertex
     radius_b: Floats
     """Radius of curvature of b's feature [m], (nc,): inf for a face, 0 for a vertex."""
-    friction: Floats
-    """Coulomb's coefficients [-], (nc,)."""
-    restitution: Floats
-    """Coefficients of restitution [-], (nc,)."""
+    friction: Floats  # Coulomb's coefficients [-], (nc,)
+    restitution: Floats  # coefficients of restitution [-], (nc,)
     edge_a: Floats
     """Unit directions of a's edge at the contact (nc, dim), zero where it is none; 3D only."""
-    edge_b: Floats
-    """Unit directions of b's edge, likewise; 3D only."""
+    edge_b: Floats  # unit directions of b's edge, likewise; 3D only
 
     def __len__(self) -> int:
         return len(self.gap)
@@ -77,8 +68,7 @@ class ContactForces(Contacts):
     """Normal forces [N], (nc,); impulse over the step's length with time stepping."""
     tangential_force: Floats
     """Tangential forces [N]: (nc,) along (-n_y, n_x) in 2D, (nc, 3) as vectors in 3D; on a."""
-    status: NDArray[np.str_]
-    """``open``, ``stick`` or ``slide``, (nc,)."""
+    status: NDArray[np.str_]  # ``open``, ``stick`` or ``slide``, (nc,)
 
     @property
     def force(self) -> Floats:

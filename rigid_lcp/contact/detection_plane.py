@@ -26,16 +26,12 @@ class Shapes2D:
     """Shapes of all bodies in flat arrays, in their own frames: what the kernels read."""
 
     kind: Ints
-    first: Ints
-    """Where the vertices of each body start, (n + 1,)."""
+    first: Ints  # where the vertices of each body start, (n + 1,)
     vertices: Floats
     """Vertices of all polygons, and the normal of each half-space in place of one, (m, 2)."""
-    normals: Floats
-    """Outward normals of the faces that start at these vertices, (m, 2)."""
-    radius: Floats
-    """Radius of a disc, offset of a half-space, reach of a polygon [m]."""
-    movable: Bools
-    """Pairs of bodies that can not move are never looked at."""
+    normals: Floats  # outward normals of the faces that start at these vertices, (m, 2)
+    radius: Floats  # radius of a disc, offset of a half-space, reach of a polygon [m]
+    movable: Bools  # pairs of bodies that can not move are never looked at
 
 
 def pack_shapes_2d(

@@ -25,12 +25,9 @@ class Shapes3D:
     """Shapes of all bodies in flat arrays, in their own frames: what the kernels read."""
 
     kind: Ints
-    reach: Floats
-    """Radius of a sphere, offset of a half-space, farthest corner of a polyhedron [m]."""
-    solids: Solids
-    """Polyhedra in their body frames; a half-space has its normal as its only face."""
-    movable: Bools
-    """Pairs of bodies that can not move are never looked at."""
+    reach: Floats  # radius of a sphere, offset of a half-space, farthest corner of a polyhedron [m]
+    solids: Solids  # polyhedra in their body frames; a half-space has its normal as its only face
+    movable: Bools  # pairs of bodies that can not move are never looked at
 
 
 def pack_shapes_3d(

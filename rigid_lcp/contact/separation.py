@@ -49,20 +49,16 @@ class Solids(NamedTuple):
     vertex: Floats
     first_face: Ints
     normal: Floats
-    offset: Floats
-    """``normal . x`` on each face [m]."""
+    offset: Floats  # ``normal . x`` on each face [m]
     first_corner: Ints
     loop: Ints
     first_edge: Ints
-    edge: Ints
-    """First and second corner of each edge, (e, 2)."""
-    bisector: Floats
-    """Unit bisectors of the normals of the two faces at each edge, (e, 3)."""
+    edge: Ints  # first and second corner of each edge, (e, 2)
+    bisector: Floats  # unit bisectors of the normals of the two faces at each edge, (e, 3)
     seen: Floats
     """Cosine of half the angle between these normals, (e,): a normal whose cosine with the
     bisector is smaller lies outside the edge's cone of normals."""
-    seen_about: Floats
-    """The same with `NEARLY_OPPOSITE` added to the half angle."""
+    seen_about: Floats  # the same with `NEARLY_OPPOSITE` added to the half angle
 
 
 @njit(cache=True)

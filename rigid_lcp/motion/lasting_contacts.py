@@ -39,8 +39,7 @@ class Lasting:
     """The contacts that touch and do not part, as a step takes them to be."""
 
     contacts: Contacts
-    slip: Floats
-    """Tangential velocities (nc, dim - 1) [m/s], zero for contacts that may stick."""
+    slip: Floats  # tangential velocities (nc, dim - 1) [m/s], zero for contacts that may stick
 
     @property
     def sliding(self) -> Bools:

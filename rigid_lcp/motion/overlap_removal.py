@@ -62,8 +62,7 @@ class Restitution:
     """What restitution did in a step."""
 
     body_a: Ints
-    body_b: Ints
-    """Bodies that pushed each other in the step, (nc,)."""
+    body_b: Ints  # bodies that pushed each other in the step, (nc,)
     taken_out: Callable[[], Floats]
     """What velocities would be without it, less what they are, (n, 3) or (n, 6) [m/s, 1/s]."""
 

@@ -61,26 +61,20 @@ RUNGE_KUTTA = RungeKuttaNumbers()
 class Pace:
     """The step control's memory, and what it has counted."""
 
-    longest: float
-    """Longest step [s]."""
-    step: float
-    """Step that is tried next [s]."""
-    clean: int = 0
-    """Steps since the last overlap."""
+    longest: float  # longest step [s]
+    step: float  # step that is tried next [s]
+    clean: int = 0  # steps since the last overlap
     accepted: int = 0
-    halved: int = 0
-    """Steps taken back because bodies overlapped."""
+    halved: int = 0  # steps taken back because bodies overlapped
     shortened: int = 0
     """Steps taken back because a sliding contact came to rest within them, bodies went too far, or
     a stage had no forces."""
     collisions: int = 0
     scaled: int = 0
     """Collisions whose restitution was scaled down (`rigid_lcp.collision.restitution_scale`)."""
-    cut_off: int = 0
-    """Collisions that ran out of rounds (`rigid_lcp.collision.impulses`)."""
+    cut_off: int = 0  # collisions that ran out of rounds (`rigid_lcp.collision.impulses`)
     worst_residual: float = 0.0
-    steps_above: int = 0
-    """Steps with a stage whose forces were found no better than the tolerance."""
+    steps_above: int = 0  # steps with a stage whose forces were found no better than the tolerance
 
 
 @dataclass(frozen=True)
@@ -91,12 +85,9 @@ class Rate:
     angle: Floats
     rates: Floats
     contacts: Contacts
-    force: Floats
-    """(nc, dim) [N]."""
-    acceleration: Floats
-    """Relative, (nc, dim) [m/s^2]."""
-    residual: float = 0.0
-    """Error of the forces (`find_forces_error`) [-]."""
+    force: Floats  # (nc, dim) [N]
+    acceleration: Floats  # relative, (nc, dim) [m/s^2]
+    residual: float = 0.0  # error of the forces (`find_forces_error`) [-]
 
 
 def advance_runge_kutta(

@@ -18,14 +18,11 @@ from rigid_lcp.shapes import turn_quaternion
 class Motion:
     """Positions and velocities of n bodies, fixed ones included."""
 
-    position: Floats
-    """Centres of mass [m], (n, dim)."""
+    position: Floats  # centres of mass [m], (n, dim)
     angle: Floats
     """2D: angles [rad], (n,), anticlockwise; 3D: unit quaternions (w, x, y, z), (n, 4)."""
-    velocity: Floats
-    """Velocities of the centres of mass [m/s], (n, dim)."""
-    spin: Floats
-    """Spins [rad/s]: (n,) in 2D, (n, 3) in the world frame in 3D."""
+    velocity: Floats  # velocities of the centres of mass [m/s], (n, dim)
+    spin: Floats  # spins [rad/s]: (n,) in 2D, (n, 3) in the world frame in 3D
 
     @property
     def dim(self) -> int:

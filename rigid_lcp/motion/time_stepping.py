@@ -87,12 +87,9 @@ class Step:
 
     motion: Motion
     contacts: ContactForces
-    residual: float
-    """Error of the impulses (scale-free natural residual), `find_forces_error` [-]."""
-    message: str = ""
-    """What the solver has to say of impulses that it did not find."""
-    scaled: bool = False
-    """Whether restitution was scaled down (`rigid_lcp.collision.passing`)."""
+    residual: float  # error of the impulses (scale-free natural residual), `find_forces_error` [-]
+    message: str = ""  # what the solver has to say of impulses that it did not find
+    scaled: bool = False  # whether restitution was scaled down (`rigid_lcp.collision.passing`)
     cut_off: bool = False
     """Whether collisions were closed without restitution (`rigid_lcp.collision.passing`)."""
 

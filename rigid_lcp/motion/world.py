@@ -126,16 +126,13 @@ class World:
     """The unchanging part of a simulation: what does not depend on the state."""
 
     scene: Scene
-    columns: Ints
-    """Number of each body among the movable ones, -1 for a fixed one, (n,)."""
-    mass: Floats
-    """Masses [kg], (n,), inf for a fixed body."""
+    columns: Ints  # number of each body among the movable ones, -1 for a fixed one, (n,)
+    mass: Floats  # masses [kg], (n,), inf for a fixed body
     inertia: Floats
     """Moments of inertia [kg m^2], (n,) in 2D, tensors in the bodies' frames (n, 3, 3) in 3D."""
     reach: Floats
     """Greatest distance of a body's points from its centre of mass [m], (n,); 0 if infinite."""
-    length: float
-    """Size of the smallest movable body [m]: the unit of all tolerances."""
+    length: float  # size of the smallest movable body [m]: the unit of all tolerances
     detect: Callable[[Floats, Floats, Any, Floats], Contacts]
     """Contacts of places and angles within a margin [m], one number or (n,), and of how bodies
     will move on (n, 3) or (n, 6) [m, rad]."""

@@ -32,27 +32,20 @@ FRONT_COST, ENTRY_COST = ELIMINATION.front_cost, ELIMINATION.entry_cost
 class EliminationTree(NamedTuple):
     """Fronts in the order in which they are eliminated, children before parents."""
 
-    size: int
-    """Rows of a block."""
-    order: Ints
-    """Which block of the caller's is eliminated at each place, (blocks,)."""
-    first: Ints
-    """First block column of each front, and the end of the last, (fronts + 1,)."""
+    size: int  # rows of a block
+    order: Ints  # which block of the caller's is eliminated at each place, (blocks,)
+    first: Ints  # first block column of each front, and the end of the last, (fronts + 1,)
     row_start: Ints
     rows: Ints
     """Block rows below the columns of front f, rising: ``rows[row_start[f]:row_start[f + 1]]``."""
     relative: Ints
     """Places of the same rows in the parent's front (columns first, then rows), in blocks."""
-    parent: Ints
-    """(fronts,), -1 for a root."""
+    parent: Ints  # (fronts,), -1 for a root
     entry_start: Ints
-    entry: Ints
-    """Which blocks of the matrix are added to front f: ``entry[entry_start[f]:...]``."""
+    entry: Ints  # which blocks of the matrix are added to front f: ``entry[entry_start[f]:...]``
     entry_row: Ints
-    entry_column: Ints
-    """Their places in it."""
-    factor_start: Ints
-    """Where the numbers of each front's factors begin, (fronts + 1,)."""
+    entry_column: Ints  # their places in it
+    factor_start: Ints  # where the numbers of each front's factors begin, (fronts + 1,)
     front_most: int
     rest_most: int
     stack_most: int

@@ -52,15 +52,11 @@ ForceLaw = Callable[[Floats, Floats, Floats], Floats]
 class ElasticForces:
     """Forces that elastic contacts choose among all those that rigid grains allow."""
 
-    r: Floats
-    """Forces, (nc * dim,) [N] (impulses [N s] where the problem is one of impulses)."""
-    displacement: Floats
-    """Micro-displacements dq, (ndof,) [m, rad]."""
-    residual: float
-    """Scale-free natural residual of r: how well eqs 26 and 27 hold [-]."""
+    r: Floats  # forces, (nc * dim,) [N] (impulses [N s] where the problem is one of impulses)
+    displacement: Floats  # micro-displacements dq, (ndof,) [m, rad]
+    residual: float  # scale-free natural residual of r: how well eqs 26 and 27 hold [-]
     status: Status
-    iterations: int
-    """Relaxation steps, or Newton steps in the direct method."""
+    iterations: int  # relaxation steps, or Newton steps in the direct method
     message: str = ""
 
     @property

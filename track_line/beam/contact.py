@@ -44,40 +44,29 @@ COMB = Comb()
 class Support:
     """What the rail rests on: b lines of n sleepers."""
 
-    bed: Floats
-    """Stiffness k_b of the bed under half a sleeper, shape (b, n) [N/m]."""
-    series: Floats
-    """k_s of pad and bed, shape (b, n) [N/m]."""
-    sleeper_weight: float
-    """W [N]."""
-    pad: float
-    """k_p [N/m]."""
-    period: int
-    """Seats between the wheels of one solution."""
+    bed: Floats  # stiffness k_b of the bed under half a sleeper, shape (b, n) [N/m]
+    series: Floats  # k_s of pad and bed, shape (b, n) [N/m]
+    sleeper_weight: float  # W [N]
+    pad: float  # k_p [N/m]
+    period: int  # seats between the wheels of one solution
 
 
 @dataclass(frozen=True)
 class Rest:
     """b lines at rest under given wheels."""
 
-    rail: Floats
-    """Deflection of the rail over each sleeper, shape (b, n) [m]."""
-    force: Floats
-    """R of each sleeper on its bed, shape (b, n) [N]."""
-    gap: Floats
-    """Between sleeper and bed, where it hangs, shape (b, n) [m]."""
+    rail: Floats  # deflection of the rail over each sleeper, shape (b, n) [m]
+    force: Floats  # R of each sleeper on its bed, shape (b, n) [N]
+    gap: Floats  # between sleeper and bed, where it hangs, shape (b, n) [m]
 
 
 @dataclass(frozen=True)
 class Passage:
     """An axle that has stood over every sleeper of b lines."""
 
-    force: Floats
-    """R of each sleeper while the wheel is over it, shape (b, n) [N]."""
-    level: Floats
-    """Deflection of the rail under the wheel, shape (b, n) [m]."""
-    bears: Bools
-    """Which sleepers bear, shape (b, period, n): where the next passage begins."""
+    force: Floats  # R of each sleeper while the wheel is over it, shape (b, n) [N]
+    level: Floats  # deflection of the rail under the wheel, shape (b, n) [m]
+    bears: Bools  # which sleepers bear, shape (b, period, n): where the next passage begins
 
 
 def make_support(track: Track, bed: Floats) -> Support:

@@ -22,18 +22,12 @@ CUBIC = 3
 class Track(Table):
     """One rail and its half of every sleeper: a 60E1 rail, concrete sleepers."""
 
-    bending: Positive = 6.3798e6
-    """E I of the rail [N m^2]."""
-    rail_mass: NonNegative = 60.21
-    """[kg/m]"""
-    pad: Positive = 100e6
-    """Stiffness of a rail pad [N/m]."""
-    bed: Positive = 28e6
-    """Mean stiffness of the beds, under half a sleeper [N/m]."""
-    sleeper_mass: NonNegative = 150.0
-    """Of half a sleeper [kg]."""
-    spacing: Annotated[Real, Field(ge=0.2, le=1.2)] = 0.6
-    """From sleeper to sleeper [m]."""
+    bending: Positive = 6.3798e6  # E I of the rail [N m^2]
+    rail_mass: NonNegative = 60.21  # [kg/m]
+    pad: Positive = 100e6  # stiffness of a rail pad [N/m]
+    bed: Positive = 28e6  # mean stiffness of the beds, under half a sleeper [N/m]
+    sleeper_mass: NonNegative = 150.0  # of half a sleeper [kg]
+    spacing: Annotated[Real, Field(ge=0.2, le=1.2)] = 0.6  # from sleeper to sleeper [m]
 
 
 @dataclass(frozen=True)
@@ -41,12 +35,9 @@ class Rail:
     """A free rail over n seats as blocks of a symmetric matrix, for deflection [m], positive
     downwards, and slope [-] at each seat."""
 
-    diagonal: Floats
-    """Blocks (w w, w slope, slope slope) of each seat, shape (n, 3) [N/m, N, N m]."""
-    upper: Floats
-    """Blocks to the next seat, row by row, shape (n - 1, 4)."""
-    weight: Floats
-    """Of the rail, consistent with its elements, shape (n, 2) [N, N m]."""
+    diagonal: Floats  # blocks (w w, w slope, slope slope) of each seat, shape (n, 3) [N/m, N, N m]
+    upper: Floats  # blocks to the next seat, row by row, shape (n - 1, 4)
+    weight: Floats  # of the rail, consistent with its elements, shape (n, 2) [N, N m]
 
 
 @BilinearForm

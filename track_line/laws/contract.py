@@ -22,10 +22,8 @@ SEAT_AREA = 0.325
 class BedLoad:
     """What an axle does to beds; arrays that fit each other."""
 
-    force: Floats
-    """Greatest force R of half a sleeper on its bed [N], zero where it hangs."""
-    bed: Floats
-    """Stiffness of the bed under half a sleeper [N/m]."""
+    force: Floats  # greatest force R of half a sleeper on its bed [N], zero where it hangs
+    bed: Floats  # stiffness of the bed under half a sleeper [N/m]
 
 
 class Law(ABC):
@@ -35,10 +33,8 @@ class Law(ABC):
     """
 
     formula: ClassVar[str]
-    source: ClassVar[str]
-    """Where the form and the defaults are from, and which of the two is not."""
-    validity: ClassVar[str]
-    """What it was measured on, and what it is not for."""
+    source: ClassVar[str]  # where the form and the defaults are from, and which of the two is not
+    validity: ClassVar[str]  # what it was measured on, and what it is not for
 
     @abstractmethod
     def rate(self, load: BedLoad, settled: Floats, cycle: float) -> Floats:

@@ -14,8 +14,7 @@ from track_line.laws.contract import BedLoad, Law
 class Guerin(Law):
     """ds/dN = alpha (d/1 mm)^beta, d = F/k_b: soft beds settle more under the same force."""
 
-    alpha: float = 1.44e-9
-    """[m] an axle"""
+    alpha: float = 1.44e-9  # [m] an axle
     beta: float = 2.51
 
     formula = "ds/dN = alpha (F/k_b/1 mm)^beta"

@@ -21,14 +21,11 @@ class LiSelig(Law):
     a: float = 1.2e-2
     m: float = 2.4
     b: float = 0.18
-    thickness: float = 2.0
-    """H [m]"""
-    strength: float = 200e3
-    """sigma_s: unconfined, compressive [Pa]."""
+    thickness: float = 2.0  # H [m]
+    strength: float = 200e3  # sigma_s: unconfined, compressive [Pa]
     spread: float = 0.4
     """Deviator stress in the layer over the pressure under the sleeper [-]; an example."""
-    area: float = SEAT_AREA
-    """Of half a sleeper on its bed [m^2]."""
+    area: float = SEAT_AREA  # of half a sleeper on its bed [m^2]
 
     formula = "s = H a (sigma_d/sigma_s)^m N^b"
     source = "Li and Selig 1996 (J. Geotech. Eng. 122); a, m, b as in PlatypusBytes/ROSE (BSD-3)"

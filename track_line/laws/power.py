@@ -18,14 +18,10 @@ class Power(Law):
     it came there.  a, b: of ``trackbed fit --law power`` to a sweep's mean, without its c.
     """
 
-    a: float = 0.7e-3
-    """Settlement by the first axle [m]."""
-    force: float = 34e3
-    """F0: the force at which a was found [N]."""
-    m: float = 1.6
-    """Exponent of the force [-]."""
-    b: float = 0.2
-    """Exponent of the axles [-]."""
+    a: float = 0.7e-3  # settlement by the first axle [m]
+    force: float = 34e3  # F0: the force at which a was found [N]
+    m: float = 1.6  # exponent of the force [-]
+    b: float = 0.2  # exponent of the axles [-]
 
     formula = "s = a (F/F0)^m N^b"
     source = (

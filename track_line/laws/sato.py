@@ -17,16 +17,11 @@ class Sato(Law):
     A sleeper that hangs does not seat either.
     """
 
-    gamma: float = 1e-3
-    """Settlement by seating [m]."""
-    alpha: float = 1e-5
-    """Of its end, an axle [-]."""
-    growth: float = 1e-19
-    """a [m/Pa^2] an axle."""
-    threshold: float = 42e3
-    """p0 [Pa]"""
-    area: float = SEAT_AREA
-    """Of half a sleeper on its bed [m^2]."""
+    gamma: float = 1e-3  # settlement by seating [m]
+    alpha: float = 1e-5  # of its end, an axle [-]
+    growth: float = 1e-19  # a [m/Pa^2] an axle
+    threshold: float = 42e3  # p0 [Pa]
+    area: float = SEAT_AREA  # of half a sleeper on its bed [m^2]
 
     formula = "s = gamma (1 - e^(-alpha N)) + a (p - p0)^2 N"
     source = "form: Sato 1995 (Vehicle System Dynamics 24); the numbers are an example"

@@ -17,19 +17,14 @@ class Shenton(Law):
     A/20 t, the axle load, is taken as F/F0 of the bed: F0 belongs to an axle of 20 t.
     """
 
-    quality: float = 1.1
-    """K: sleeper, ballast and ground [-]."""
+    quality: float = 1.1  # K: sleeper, ballast and ground [-]
     force: float = 34e3
     """F0: of half a sleeper on its bed where an axle of 20 t stands on it, here as on 60E1 rails,
     beds of 28 MN/m, sleepers 0.6 m apart [N]."""
-    lift: float = 0.0
-    """L [m]"""
-    seating: float = 0.69e-3
-    """[m]"""
-    linear: float = 2.7e-9
-    """[m] an axle"""
-    b: float = 0.2
-    """Exponent of the axles [-]."""
+    lift: float = 0.0  # L [m]
+    seating: float = 0.69e-3  # [m]
+    linear: float = 2.7e-9  # [m] an axle
+    b: float = 0.2  # exponent of the axles [-]
 
     formula = "s = K F/F0 ((0.69 mm + 0.028 L) N^0.2 + 2.7e-6 mm N)"
     source = "Shenton 1985 (Track Technology), as quoted in reviews; read there from memory"

@@ -21,14 +21,11 @@ class Varandas(Law):
     counted whatever they weigh; Varandas counts those that were heavier, in a histogram.
     """
 
-    gamma: float = 10e-3
-    """Settlement by N0 axles of the force F0 [m]."""
-    force: float = 50e3
-    """F0 [N]"""
+    gamma: float = 10e-3  # settlement by N0 axles of the force F0 [m]
+    force: float = 50e3  # F0 [N]
     alpha: float = 0.6
     beta: float = 0.82
-    cycles: float = 1e6
-    """N0"""
+    cycles: float = 1e6  # N0
 
     formula = "s = gamma (F/F0)^(alpha + 1) H(N)/H(N0 - 1)"
     source = "Varandas et al. 2013; parameters of a test of PlatypusBytes/ROSE (BSD-3)"

@@ -26,15 +26,11 @@ class Blocks:
     """Of k_s ds/dF, the mean over the beds; 2 is the limit, and some laws fail at 0.8 of that."""
     outliers: float = 0.001
     """Share of beds that may be beyond the limit by themselves: they hang, and come back [-]."""
-    fewest: int = 40
-    """Blocks of a run at least, equal in N^spread, so that its curve is smooth."""
+    fewest: int = 40  # blocks of a run at least, equal in N^spread, so that its curve is smooth
     spread: float = 0.2
-    sample: int = 4000
-    """Beds by which a block is chosen, spread over all lines."""
-    search: float = 20.0
-    """Powers of e over which the length of a block is looked for."""
-    nudge: float = 1e-4
-    """Of the force, for ds/dF [-]."""
+    sample: int = 4000  # beds by which a block is chosen, spread over all lines
+    search: float = 20.0  # powers of e over which the length of a block is looked for
+    nudge: float = 1e-4  # of the force, for ds/dF [-]
 
 
 BLOCKS = Blocks()

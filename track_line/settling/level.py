@@ -19,16 +19,12 @@ from track_line.arrays import Floats
 class Passband:
     """What of a level is counted, and over which lengths."""
 
-    shortest: float = 3.0
-    """[m]"""
-    longest: float = 25.0
-    """[m]"""
-    section: float = 200.0
-    """Of which a standard deviation is taken [m]."""
+    shortest: float = 3.0  # [m]
+    longest: float = 25.0  # [m]
+    section: float = 200.0  # of which a standard deviation is taken [m]
     margin: float = 30.0
     """At each end, computed but not counted: free ends settle 2.45 times as far [m]."""
-    fade: float = 10.0
-    """Of the margin, where the level fades to its mean, for it has to repeat [m]."""
+    fade: float = 10.0  # of the margin, where the level fades to its mean, for it has to repeat [m]
 
 
 LEVEL = Passband()

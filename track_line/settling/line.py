@@ -18,10 +18,8 @@ from trackbed.scene_files import Positive, Table
 class Axle(Table):
     """A kind of axle."""
 
-    load: Positive
-    """Of the axle, both wheels [N]."""
-    share: Positive = 1.0
-    """Of all axles [-]."""
+    load: Positive  # of the axle, both wheels [N]
+    share: Positive = 1.0  # of all axles [-]
 
     @property
     def wheel(self) -> float:
@@ -38,8 +36,7 @@ class Line:
     support: Support
     beds: Beds
     law: Law
-    axles: tuple[Axle, ...]
-    """Their shares add up to one."""
+    axles: tuple[Axle, ...]  # their shares add up to one
 
     @property
     def shares(self) -> Floats:

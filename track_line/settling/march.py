@@ -26,14 +26,10 @@ VOIDS = (0.1e-3, 1e-3)
 class State:
     """A line after some axles."""
 
-    cycle: float
-    """Axles so far."""
-    settled: Floats
-    """How deep each bed lies, shape (b, n) [m]; where it began is in it."""
-    hardened: Floats
-    """What the law has made a mean bed of this history settle, shape (b, n) [m]."""
-    score: Floats
-    """Of the settlement, standard normal, shape (b, n)."""
+    cycle: float  # axles so far
+    settled: Floats  # how deep each bed lies, shape (b, n) [m]; where it began is in it
+    hardened: Floats  # what the law has made a mean bed of this history settle, shape (b, n) [m]
+    score: Floats  # of the settlement, standard normal, shape (b, n)
     bears: tuple[Bools, ...] = ()
     """Which sleepers bear while each kind of axle rolls by; where the next passage begins."""
 
@@ -43,14 +39,11 @@ class Record:
     """What a recording car, and a look below the sleepers, find in b realisations."""
 
     cycle: float
-    settlement: Floats
-    """Mean of the beds, shape (b,) [m]."""
+    settlement: Floats  # mean of the beds, shape (b,) [m]
     deviation: Floats
     """Standard deviation of D1 under the first axle, each section, shape (b, sections) [m]."""
-    voids: Floats
-    """Share of sleepers that hang by more than each of `VOIDS`, shape (2, b) [-]."""
-    deepest: Floats
-    """Greatest gap, shape (b,) [m]."""
+    voids: Floats  # share of sleepers that hang by more than each of `VOIDS`, shape (2, b) [-]
+    deepest: Floats  # greatest gap, shape (b,) [m]
     spectrum: Floats
     """Root mean square of the level under the first axle in each of `level.BANDS`, (bands,) [m]."""
     hanging: Floats

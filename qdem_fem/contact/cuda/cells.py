@@ -26,23 +26,17 @@ find_cell_bucket: Any = cuda.jit(device=True)(contact_cells.find_cell_bucket.py_
 class Entries(NamedTuple):
     """What stands in cells: spheres, and behind them in a periodic width their images."""
 
-    at: Any
-    """(e, 3) where [m]"""
-    turn: Any
-    """(e,) widths from there to the sphere"""
-    there: Any
-    """(e,) uint8, whether there is one"""
+    at: Any  # (e, 3) where [m]
+    turn: Any  # (e,) widths from there to the sphere
+    there: Any  # (e,) uint8, whether there is one
 
 
 class Cells(NamedTuple):
     """Entries by the bucket of their cell."""
 
-    cell: Any
-    """(e, 3)"""
-    start: Any
-    """First place in ``order`` of every bucket, and the end, (buckets + 1,)."""
-    order: Any
-    """(e,) entries by bucket"""
+    cell: Any  # (e, 3)
+    start: Any  # first place in ``order`` of every bucket, and the end, (buckets + 1,)
+    order: Any  # (e,) entries by bucket
 
 
 @cuda.jit

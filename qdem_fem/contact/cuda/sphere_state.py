@@ -31,8 +31,7 @@ class CudaSphereContacts(SphereContacts):
 
     _host: Contact
     _device: DeviceContact
-    _behind: bool
-    """Whether the GPU has gone on since the host had its copy."""
+    _behind: bool  # whether the GPU has gone on since the host had its copy
 
     @property
     def kernel(self) -> Contact:

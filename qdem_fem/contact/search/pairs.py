@@ -23,28 +23,17 @@ if TYPE_CHECKING:
 class Pairs(NamedTuple):
     """Pairs i < j by row i, and what each remembers."""
 
-    first: Any
-    """First pair of every sphere, and the end, (c + 1,)."""
-    second: Any
-    """(p,) sphere j of the pair."""
-    back_first: Any
-    """First entry in ``back_pair`` of every sphere, and the end, (c + 1,)."""
-    back_pair: Any
-    """(p,) the pairs in which a sphere is the second."""
-    touching: Any
-    """(p,) uint8, whether the spheres touched when they were last looked at."""
-    spring: Any
-    """(p, 3) tangential spring s, of i against j [m]."""
-    pull: Any
-    """(p, 3) force on i [N]."""
-    acting: Any
-    """(a,) the spheres to look at: those in a pair or near a wall."""
-    image: Any
-    """(p, 3) from j to the image of it that i meets [m]; (0,) where nothing is periodic."""
-    wall_first: Any
-    """First entry in ``wall`` of every sphere, and the end, (c + 1,)."""
-    wall: Any
-    """The walls that each sphere is near."""
+    first: Any  # first pair of every sphere, and the end, (c + 1,)
+    second: Any  # (p,) sphere j of the pair
+    back_first: Any  # first entry in ``back_pair`` of every sphere, and the end, (c + 1,)
+    back_pair: Any  # (p,) the pairs in which a sphere is the second
+    touching: Any  # (p,) uint8, whether the spheres touched when they were last looked at
+    spring: Any  # (p, 3) tangential spring s, of i against j [m]
+    pull: Any  # (p, 3) force on i [N]
+    acting: Any  # (a,) the spheres to look at: those in a pair or near a wall
+    image: Any  # (p, 3) from j to the image of it that i meets [m]; (0,) where nothing is periodic
+    wall_first: Any  # first entry in ``wall`` of every sphere, and the end, (c + 1,)
+    wall: Any  # the walls that each sphere is near
 
 
 SEARCH = 12.0

@@ -31,35 +31,23 @@ DEEPEST = 1.0
 class Spheres(NamedTuple):
     """Spheres at surface vertices, by their own numbers."""
 
-    reference: Any
-    """(c, 3) reference position of the vertex [m]"""
-    place: Any
-    """(c,) of its first component in the displacement"""
-    force_at: Any
-    """(c,) of its first component in the windows of forces"""
-    body: Any
-    """(c,)"""
-    radius: Any
-    """(c,) [m]"""
-    normal: Any
-    """(c,) k_n [N/m]"""
-    tangential: Any
-    """(c,) k_t [N/m]"""
+    reference: Any  # (c, 3) reference position of the vertex [m]
+    place: Any  # (c,) of its first component in the displacement
+    force_at: Any  # (c,) of its first component in the windows of forces
+    body: Any  # (c,)
+    radius: Any  # (c,) [m]
+    normal: Any  # (c,) k_n [N/m]
+    tangential: Any  # (c,) k_t [N/m]
 
 
 class Planes(NamedTuple):
     """Rigid walls, and what each sphere remembers of each."""
 
-    point: Any
-    """(w, 3) [m]"""
-    normal: Any
-    """(w, 3), unit"""
-    friction: Any
-    """(w,)"""
-    spring: Any
-    """(w, c, 3) tangential spring [m]"""
-    force: Any
-    """(w, c, 3) force on the sphere [N]"""
+    point: Any  # (w, 3) [m]
+    normal: Any  # (w, 3), unit
+    friction: Any  # (w,)
+    spring: Any  # (w, c, 3) tangential spring [m]
+    force: Any  # (w, c, 3) force on the sphere [N]
 
 
 class Contact(NamedTuple):
@@ -68,18 +56,12 @@ class Contact(NamedTuple):
     spheres: Any
     pairs: Any
     planes: Any
-    friction: Any
-    """Coulomb's coefficient between bodies."""
-    half_skin: Any
-    """Way of a vertex after which pairs are looked for again [m]."""
-    start: Any
-    """(c, 3) positions when pairs were last looked for [m]"""
-    position: Any
-    """(c, 3) [m]"""
-    force: Any
-    """(c, 3) [N]"""
-    slid: Any
-    """(c,) work that sliders took since the start, by the pair's first sphere [J]"""
+    friction: Any  # Coulomb's coefficient between bodies
+    half_skin: Any  # way of a vertex after which pairs are looked for again [m]
+    start: Any  # (c, 3) positions when pairs were last looked for [m]
+    position: Any  # (c, 3) [m]
+    force: Any  # (c, 3) [N]
+    slid: Any  # (c,) work that sliders took since the start, by the pair's first sphere [J]
 
 
 @inlined

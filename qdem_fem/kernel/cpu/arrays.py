@@ -8,47 +8,35 @@ from typing import Any, NamedTuple
 class Layout(NamedTuple):
     """Where the elements' data lie (`qdem_fem.kernel.cpu.build_layout`); integers are int64."""
 
-    corners: Any
-    """4 x node number of the corners, (blocks x 4 x lanes,) int32."""
-    rows: Any
-    """Gradients [1/m] and Lame constants times volume [N m], (blocks x rows x lanes,)."""
-    chunk_block: Any
-    """First block of every chunk, and the end, (chunks + 1,)."""
+    corners: Any  # 4 x node number of the corners, (blocks x 4 x lanes,) int32
+    rows: Any  # gradients [1/m] and Lame constants times volume [N m], (blocks x rows x lanes,)
+    chunk_block: Any  # first block of every chunk, and the end, (chunks + 1,)
     chunk_shift: Any
     """Place of a node's force in the chunk's window, less 4 x its number, (chunks,)."""
-    piece_first: Any
-    """First node of every piece of the motion, (pieces,)."""
-    piece_stop: Any
-    """The node after its last, (pieces,)."""
+    piece_first: Any  # first node of every piece of the motion, (pieces,)
+    piece_stop: Any  # the node after its last, (pieces,)
     chunk_piece: Any
     """First of the pieces whose forces are in this chunk's window alone, (chunks + 1,); the
     pieces from the last entry on are in several windows."""
     piece_window: Any
     """First of the piece's entries in ``window_shift``, and the end, (pieces + 1,)."""
-    window_shift: Any
-    """Shifts of the windows that hold the piece's nodes."""
+    window_shift: Any  # shifts of the windows that hold the piece's nodes
 
 
 class Fields(NamedTuple):
     """What moves: flat arrays of four numbers a node, in the kernel's precision."""
 
-    displacement: Any
-    """[m]"""
-    velocity: Any
-    """Half a step behind the displacement [m/s]."""
-    forces: Any
-    """The windows of the chunks, zero between steps [N]."""
-    inverse_mass: Any
-    """(n,) [1/kg]"""
+    displacement: Any  # [m]
+    velocity: Any  # half a step behind the displacement [m/s]
+    forces: Any  # the windows of the chunks, zero between steps [N]
+    inverse_mass: Any  # (n,) [1/kg]
 
 
 class Loads(NamedTuple):
     """Nodal forces: ``weight x table[k, series]`` [N] at one place of ``Fields.forces``."""
 
-    force_at: Any
-    """(L,) int64, in the windows."""
-    node_at: Any
-    """(L,) int64, in ``Fields.velocity``."""
+    force_at: Any  # (L,) int64, in the windows
+    node_at: Any  # (L,) int64, in ``Fields.velocity``
     series: Any
     weight: Any
 
@@ -56,25 +44,18 @@ class Loads(NamedTuple):
 class Constraints(NamedTuple):
     """Components whose displacement is ``weight x table[k, series]`` [m]."""
 
-    node_at: Any
-    """(C,) int64, in ``Fields.displacement``."""
+    node_at: Any  # (C,) int64, in ``Fields.displacement``
     series: Any
     weight: Any
-    previous: Any
-    """(C,) velocity given in the last step [m/s], to count the work of the motion."""
-    roller_at: Any
-    """(R,) 4 x number of the nodes that stay in an oblique plane."""
-    roller_normal: Any
-    """(R, 3) unit normals."""
+    previous: Any  # (C,) velocity given in the last step [m/s], to count the work of the motion
+    roller_at: Any  # (R,) 4 x number of the nodes that stay in an oblique plane
+    roller_normal: Any  # (R, 3) unit normals
 
 
 class Probes(NamedTuple):
     """Nodes whose displacement is recorded every ``stride`` steps."""
 
-    node_at: Any
-    """(Q,) 4 x node number."""
-    record: Any
-    """(samples, Q, 3) [m]"""
+    node_at: Any  # (Q,) 4 x node number
+    record: Any  # (samples, Q, 3) [m]
     stride: int
-    first: int
-    """Steps of the window before its first sample."""
+    first: int  # steps of the window before its first sample

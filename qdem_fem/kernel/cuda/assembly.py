@@ -48,16 +48,13 @@ thousands: those launched behind its end compute nothing, but each launch takes 
 class NodeActions(NamedTuple):
     """Loads, rollers, given displacements and probes, sorted by node; columns: `cuda_step`."""
 
-    first: NDArray[np.int32]
-    """The first action of every node, and the end, (n + 1,)."""
+    first: NDArray[np.int32]  # the first action of every node, and the end, (n + 1,)
     actions: NDArray[np.int32]
     """Kind, component, series and place in the list it came from, (A + 1, 4).
 
     The last row is no node's: an array on a GPU had better not be empty."""
-    weights: Floats
-    """Weight, or the normal of a roller, (A + 1, 3)."""
-    memory: Floats
-    """Work [J] in this window and velocity given in the last step [m/s], (A + 1, 2)."""
+    weights: Floats  # weight, or the normal of a roller, (A + 1, 3)
+    memory: Floats  # work [J] in this window and velocity given in the last step [m/s], (A + 1, 2)
 
     def find_kind(self, kind: int) -> tuple[NDArray[np.intp], NDArray[np.int32]]:
         """Places of all actions of a kind, and their places in the list they came from."""

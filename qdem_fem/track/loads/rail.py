@@ -18,12 +18,10 @@ QUIET = 12.0
 class Track:
     """A rail on its foundation, one of two; a 50N rail, the paper's 0.6 m a sleeper."""
 
-    rail_stiffness: float = 206e9 * 1.96e-5
-    """E I of one rail [N m^2]."""
+    rail_stiffness: float = 206e9 * 1.96e-5  # E I of one rail [N m^2]
     modulus: float = 30e6
     """Track modulus u: force a metre of one rail over its deflection [N/m^2]; assumed."""
-    spacing: float = 0.6
-    """From sleeper to sleeper [m]."""
+    spacing: float = 0.6  # from sleeper to sleeper [m]
 
     def __post_init__(self) -> None:
         refuse_unless_positive(self, "track")

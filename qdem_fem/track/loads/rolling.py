@@ -49,19 +49,13 @@ MOST_WORK = 2e10
 class Rolling:
     """One wheel and what its rail lies on; assumed but for the rail, 50N as in `Track`."""
 
-    unsprung: float = 600.0
-    """Mass of one wheel with its share of the axle [kg]."""
-    wheel_radius: float = 0.43
-    """[m]"""
-    head_radius: float = 0.3
-    """Of the rail's head, across [m]."""
-    rail_mass: float = 50.4
-    """[kg/m]"""
-    pad: float = 225e6
-    """Stiffness of a rail pad [N/m]."""
+    unsprung: float = 600.0  # mass of one wheel with its share of the axle [kg]
+    wheel_radius: float = 0.43  # [m]
+    head_radius: float = 0.3  # of the rail's head, across [m]
+    rail_mass: float = 50.4  # [kg/m]
+    pad: float = 225e6  # stiffness of a rail pad [N/m]
     pad_loss: float = 0.25
-    sleeper: float = 84.0
-    """Mass of half a sleeper [kg]."""
+    sleeper: float = 84.0  # mass of half a sleeper [kg]
     ballast_loss: float = 1.0
     """Loss factors [-]; the ballast's stiffness follows from `Track.modulus`."""
 

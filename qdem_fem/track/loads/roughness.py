@@ -63,10 +63,8 @@ class Roughness:
     rail: RailKind = "smooth"
     wheel: WheelKind = "disc"
     seed: int = 1
-    amplitude: float = 1.0
-    """Of all heights, over the levels' [-]."""
-    highest: float = 2000.0
-    """Frequency up to which there is any [Hz]."""
+    amplitude: float = 1.0  # of all heights, over the levels' [-]
+    highest: float = 2000.0  # frequency up to which there is any [Hz]
 
     def __post_init__(self) -> None:
         known = self.rail in RAIL and self.wheel in WHEEL

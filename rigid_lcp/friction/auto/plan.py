@@ -30,8 +30,7 @@ class Stage:
     """One row of a plan."""
 
     name: str
-    when: Callable[[Trial], bool]
-    """Its condition."""
+    when: Callable[[Trial], bool]  # its condition
     attempt: Callable[[Trial], bool] | tuple[Stage, ...]
     """What is tried, with its budget, and whether that ends the search; or rows of its own."""
 

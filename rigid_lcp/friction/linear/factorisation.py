@@ -51,8 +51,7 @@ class SingularSystem(ArithmeticError):
 class Factorisation(Protocol):
     """Factors ``A + B W`` for one W and many A, B (nc, dim, dim)."""
 
-    flops: float
-    """About what one factorisation costs."""
+    flops: float  # about what one factorisation costs
 
     def factor(self, a: Floats, b: Floats) -> Solve:
         """What solves ``(A + B W) x = right`` for x.  Raises `SingularSystem`."""

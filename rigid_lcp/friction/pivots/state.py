@@ -48,17 +48,13 @@ class Pivots(NamedTuple):
     b: Floats
     f: Floats
     a: Floats
-    rows: Ints
-    """Numbers of the kept rows in the problem: all but tangential ones without friction."""
-    unit: float
-    """The mean of the diagonal of A."""
-    shift: Floats
-    """(1,) what is added to the diagonal of A now."""
+    rows: Ints  # numbers of the kept rows in the problem: all but tangential ones without friction
+    unit: float  # the mean of the diagonal of A
+    shift: Floats  # (1,) what is added to the diagonal of A now
     diagonal: tuple[Ints, Ints]
     """Where the diagonal of A stands among its values by rows and by columns."""
     codes: Ints
-    events: Ints
-    """(1,) changes of lists so far."""
+    events: Ints  # (1,) changes of lists so far
 
 
 def start_pivots(

@@ -33,31 +33,21 @@ class Geometry(NamedTuple):
     column_start: Ints
     column_index: Ints
     column_value: Floats
-    normal: Ints
-    """(nc,) row of the normal equation of a contact."""
-    tangent: Ints
-    """(nc,) row of its tangential equation; -1 without friction: nothing to solve for."""
-    contact: Ints
-    """(n,) contact of a row."""
-    mu: Floats
-    """(nc,) coefficients of friction [-]."""
-    slip: Ints
-    """(nc,) sign of f_T where a tangential velocity imposes it, else 0."""
+    normal: Ints  # (nc,) row of the normal equation of a contact
+    tangent: Ints  # (nc,) row of its tangential equation; -1 without friction: nothing to solve for
+    contact: Ints  # (n,) contact of a row
+    mu: Floats  # (nc,) coefficients of friction [-]
+    slip: Ints  # (nc,) sign of f_T where a tangential velocity imposes it, else 0
 
 
 class Reduced(NamedTuple):
     """The lists, and the inverse of the matrix of eq. 28 that belongs to them."""
 
-    kind: Ints
-    """(nc,) list of every contact."""
-    place: Ints
-    """(n,) place of a row in the inverse, -1 where it is not in."""
-    members: Ints
-    """(n,) rows in the inverse, in order; the first `size` count."""
-    size: Ints
-    """(1,) number of unknowns k."""
-    inverse: Floats
-    """(n, n), used up to k: row by unknown, column by equation."""
+    kind: Ints  # (nc,) list of every contact
+    place: Ints  # (n,) place of a row in the inverse, -1 where it is not in
+    members: Ints  # (n,) rows in the inverse, in order; the first `size` count
+    size: Ints  # (1,) number of unknowns k
+    inverse: Floats  # (n, n), used up to k: row by unknown, column by equation
 
 
 def start_reduced(contacts: int, rows: int) -> Reduced:

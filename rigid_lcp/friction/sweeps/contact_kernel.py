@@ -59,8 +59,7 @@ class SweepBlocks(NamedTuple):
     offset: Floats
     friction: Floats
     local: Floats
-    packed: Floats
-    """`rigid_lcp.friction.sweeps.pack_contacts` where ``body`` is not empty."""
+    packed: Floats  # `rigid_lcp.friction.sweeps.pack_contacts` where ``body`` is not empty
     body: Ints
     block: Floats
     start: Ints
@@ -73,8 +72,7 @@ class SweepBlocks(NamedTuple):
 class Momentum(NamedTuple):
     """What goes from sweep to sweep, changed in place."""
 
-    last: Floats
-    """Forces before the last sweep, (nc, dim)."""
+    last: Floats  # forces before the last sweep, (nc, dim)
     velocity: Floats
     """``w = B^T r`` of the bodies, (bodies + 1, body_size); the last row stands for no body."""
     last_velocity: Floats
