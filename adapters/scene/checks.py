@@ -6,7 +6,7 @@ itself, so that one wrong key never hides what is wrong elsewhere.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from functools import partial
 from itertools import pairwise
@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from adapters import laws, moves
 from adapters.bed import RadiusDistribution
 from adapters.bed.stones import SPHERE, find_form
 from adapters.errors import SceneError
@@ -33,9 +34,6 @@ ALTERNATIVES = (
 """Pairs of keys of which a scene gives exactly one."""
 JUMP_KEYS, TOLERANCE_KEY = ("procedure.k", "procedure.h"), "procedure.tolerance"
 """Cycles computed and jumped by hand, and what stands instead."""
-ENGINES = "adapters.engines"
-"""The room of the engines; only looked for by name, as they import the scene."""
-
 OWNED = (
     (
         "sample.container",
@@ -51,6 +49,14 @@ OWNED = (
     ),
 )
 """A key, keys of its table that only one of its words has, what to say where they miss or are."""
+
+CHOICES: tuple[tuple[str, str, Callable[[], Iterable[str]], Mapping[str, str]], ...] = (
+    # engines are looked for by name, as their room imports the scene
+    ("engine.name", "engine", lambda: ("auto", *find_choices("adapters.engines", "ENGINE")), {}),
+    ("procedure.law", "law", laws.list_laws, laws.RETIRED),
+    ("procedure.move", "way", moves.list_moves, moves.RETIRED),
+)
+"""Keys whose word is a name, what that names, the names that there are, and those that left."""
 
 STONE_ENGINES = ("liggghts",)
 """Engines whose grains may be stones of several spheres."""
@@ -218,47 +224,29 @@ def _check_launcher(scene: Values) -> Iterator[Problem]:
 
 
 def _check_choice(
-    scene: Values, key: str, what: str, known: Sequence[str], retired: Mapping[str, str]
-) -> Iterator[Problem]:
-    """A name that must be one of ``known``; ``retired`` ones left trackbed."""
-    name = scene.need(key)
+    key: str, what: str, list_known: Callable[[], Iterable[str]], retired: Mapping[str, str],
+    scene: Values,
+) -> Iterator[Problem]:  # fmt: skip
+    name, known = scene.need(key), tuple(list_known())
     if name not in known:
         hint = explain_retired(name, retired) or suggest_word(name, known)
         yield Problem(key, f"unknown {what} {name!r}{hint}")
 
 
-def _check_engine(scene: Values) -> Iterator[Problem]:
-    known = ("auto", *find_choices(ENGINES, "ENGINE"))
-    return _check_choice(scene, "engine.name", "engine", known, {})
-
-
-def _check_law(scene: Values) -> Iterator[Problem]:
-    from adapters.laws import RETIRED, list_laws
-
-    return _check_choice(scene, "procedure.law", "law", list_laws(), RETIRED)
-
-
-def _check_move(scene: Values) -> Iterator[Problem]:
-    from adapters.moves import RETIRED, list_moves
-
-    return _check_choice(scene, "procedure.move", "way", list_moves(), RETIRED)
-
-
 def _check_relaxation(scene: Values) -> Iterator[Problem]:
-    if scene.need("procedure.relaxation") not in ("smallest-move", "none"):
+    key, usual = "procedure.relaxation", ("smallest-move", "none")
+    if scene.need(key) not in usual:
         from adapters.relaxation import METHODS, RETIRED  # loads the compiler
 
-        yield from _check_choice(
-            scene, "procedure.relaxation", "relaxation", (*METHODS, "none"), RETIRED
-        )
+        yield from _check_choice(key, "relaxation", lambda: (*METHODS, "none"), RETIRED, scene)
 
 
 CHECKS: tuple[Check, ...] = (
     _check_alternatives, *(partial(_check_owned_keys, *row) for row in OWNED), _check_symmetry,
     _check_grain_radius, _check_grading_scale, _check_rain, _check_rolling, _check_form,
     _check_series, _check_partial_piston, _check_stages, _check_procedure, _check_jumps,
-    _check_settlement, _check_seating, _check_launcher, _check_engine, _check_law, _check_move,
-    _check_relaxation, *mechanics.CHECKS,
+    _check_settlement, _check_seating, _check_launcher,
+    *(partial(_check_choice, *row) for row in CHOICES), _check_relaxation, *mechanics.CHECKS,
 )  # fmt: skip
 
 

@@ -34,16 +34,15 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
     """
     text = read_scene(path, overrides, guide=GUIDE, after_override=_drop_alternatives)
     data = text.data
-    loading = data.get("loading")
-    if isinstance(loading, dict) and isinstance(loading.get("series"), str):
+    tables = {name: value for name, value in data.items() if isinstance(value, dict)}
+    loading, sample, engine = (tables.get(name, {}) for name in ("loading", "sample", "engine"))
+    if isinstance(loading.get("series"), str):
         loading["series"] = str(text.path.parent.absolute() / loading["series"])
-    sample = data.get("sample")
-    if isinstance(sample, dict) and str(sample.get("form")).endswith(".toml"):
+    if str(sample.get("form")).endswith(".toml"):
         sample["form"] = str(text.path.parent.absolute() / str(sample["form"]))
-    if isinstance(data.get("procedure"), dict):
-        data["procedure"] = fill_procedure(data["procedure"])
-    engine = data.get("engine")
-    if isinstance(engine, dict) and engine.get("rayleigh_share") == "fast":
+    if "procedure" in tables:
+        data["procedure"] = fill_procedure(tables["procedure"])
+    if engine.get("rayleigh_share") == "fast":
         engine["rayleigh_share"] = DOUBTFUL.rayleigh_share
     problems = list(expand_schedule(data))
     text.check(Scene)
