@@ -13,7 +13,7 @@ from typing import cast
 
 from adapters.decks.parse import VARIABLE, Deck, is_outside, list_included
 from adapters.decks.scripts import format_script
-from adapters.decks.split import format_prepare, format_whole, format_window
+from adapters.decks.split import format_whole, format_window
 from adapters.engines import copy_deck, get_engine, run_process
 from adapters.errors import EngineFailed
 from adapters.scene import Scene
@@ -78,8 +78,6 @@ def format_run(bed: Adopted, kind: str, cycles: int) -> str:
     """The deck of a stage: prepare, window or whole by ``kind``, of ``cycles`` load cycles."""
     if bed.engine == "yade":
         return format_script(bed.deck, kind, cycles, bed.loaded[0] if bed.loaded else "")
-    if kind == "prepare":
-        return format_prepare(bed.deck, bed.engine)
     return (format_window if kind == "window" else format_whole)(bed.deck, bed.engine, cycles)
 
 

@@ -73,11 +73,6 @@ def find_named(commands: Sequence[Command], kind: str) -> dict[str, Command]:
     return {one.word(1): one for one in list_live(commands) if one.name == kind}
 
 
-def format_prepare(deck: Deck, engine: str) -> str:
-    """``prepare.in``: all above the cycle, then the state and the restart file."""
-    return join([*prepare(deck, engine), *COMPLETE])
-
-
 def format_window(deck: Deck, engine: str, cycles: int) -> str:
     """``window.in``: ``cycles`` load cycles from ``cycle_0.restart``, each with its state."""
     start = max((n for n, one in enumerate(deck.before) if one.name == "clear"), default=0)
@@ -95,15 +90,13 @@ def format_window(deck: Deck, engine: str, cycles: int) -> str:
 
 
 def format_whole(deck: Deck, engine: str, cycles: int) -> str:
-    """``whole.in``: preparation and ``cycles`` load cycles in one process."""
-    return join([*prepare(deck, engine), *list_cycles(deck, engine, cycles), *COMPLETE])
-
-
-def prepare(deck: Deck, engine: str) -> Iterator[str]:
-    """Lines that make the bed before its first cycle, and write it."""
-    yield f"# generated from {deck.path.name}"
-    yield from (one.text for one in deck.before)
-    yield from write_state(engine, "0")
+    """``prepare.in``, all above the cycle and the state; with ``cycles`` ``whole.in``, these load
+    cycles in the same process."""
+    return join([
+        f"# generated from {deck.path.name}", *(one.text for one in deck.before),
+        *write_state(engine, "0"), *(list_cycles(deck, engine, cycles) if cycles else ()),
+        *COMPLETE,
+    ])  # fmt: skip
 
 
 def list_cycles(deck: Deck, engine: str, cycles: int) -> Iterator[str]:

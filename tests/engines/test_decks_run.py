@@ -13,7 +13,7 @@ from adapters.decks.engine import Adopted, run_deck
 from adapters.decks.parse import BEGIN
 from adapters.decks.run import run_deck_scene
 from adapters.decks.scene import load_deck_scene
-from adapters.decks.split import format_prepare, format_whole, format_window
+from adapters.decks.split import format_whole, format_window
 from adapters.decks.states import States, load_states, read_states
 from adapters.errors import SceneError
 from adapters.files import RunFolder, read_frames
@@ -30,7 +30,7 @@ SHIFT = np.array([2e-6, -1e-6, 1e-5])
 
 def step_moved(bed: Adopted, folder: Path, shift: np.ndarray = SHIFT) -> tuple[States, States]:
     """States before a step of time, and behind it from grains and plate moved by ``shift``."""
-    run_deck(bed, format_prepare(bed.deck, bed.engine), folder / "prepare.in")
+    run_deck(bed, format_whole(bed.deck, bed.engine, 0), folder / "prepare.in")
     before = read_states(folder, 0, 0, bed)
     restart = bytearray((folder / "cycle_0.restart").read_bytes())
     move = np.broadcast_to(shift, before.position[0].shape)
