@@ -51,6 +51,12 @@ def gather_contacts(run: ExportedRun, instant: Instant) -> dict[str, Array]:
     return fields
 
 
+def gather_named_contacts(run: ExportedRun, instant: Instant) -> dict[str, Array]:
+    """`gather_contacts` behind the identifiers of the two grains, ``id1`` and ``id2``."""
+    first, second = instant.state.contacts.pair.T
+    return {"id1": first, "id2": second} | gather_contacts(run, instant)
+
+
 def list_contacts(instant: Instant) -> IntArray:
     """Rows of the two grains of every contact among the grains, shape (m, 2)."""
     return np.searchsorted(instant.state.identifier, instant.state.contacts.pair)

@@ -6,7 +6,7 @@ cycles no displacement and no piston.  Cycles inside a jump have no state, only 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +20,7 @@ from adapters.report.export.fields import (
     Array,
     gather_contacts,
     gather_grains,
+    gather_named_contacts,
     gather_placed_grains,
     list_contacts,
     split_columns,
@@ -27,6 +28,7 @@ from adapters.report.export.fields import (
 from adapters.report.export.instants import ExportedRun, Instant
 from trackbed.run_files import replace_file, write_pvd
 
+Gather = Callable[[ExportedRun, Instant], dict[str, Array]]
 ENGINE_NAME = {"velocity": "v"}
 """Field -> its name in a dump, where engines and OVITO have a shorter one."""
 
@@ -78,36 +80,21 @@ def export_ovito(run: ExportedRun, into: Path, every: int) -> list[Path]:
     """
     box = _find_box(run)
 
-    def make_grain_frames() -> Iterator[Frame]:
+    def make_frames(gather: Gather, kind: Kind) -> Iterator[Frame]:
         for instant in run.instants(every):
-            fields = gather_placed_grains(run, instant)
+            fields = gather(run, instant)
+            if "tangential_force" in fields:
+                fields["tangential_force"] = np.linalg.norm(fields["tangential_force"], axis=1)
             named = {ENGINE_NAME.get(name, name): values for name, values in fields.items()}
-            yield _make_frame(instant, dict(split_columns(named, "")), box, "atoms")
+            columns = dict(split_columns(named, ""))
+            values = np.column_stack([*columns.values()]).astype(float)
+            yield Frame(instant.cycle, tuple(columns), values, box, kind)
 
-    def make_contact_frames() -> Iterator[Frame]:
-        for instant in run.instants(every):
-            yield _make_frame(instant, _gather_contact_columns(run, instant), box, "entries")
-
-    write_dump(into / "grains.dump", make_grain_frames())
+    write_dump(into / "grains.dump", make_frames(gather_placed_grains, "atoms"))
     if not run.own:
         return [into / "grains.dump"]
-    write_dump(into / "contacts.dump", make_contact_frames())
+    write_dump(into / "contacts.dump", make_frames(gather_named_contacts, "entries"))
     return [into / "grains.dump", into / "contacts.dump"]
-
-
-def _gather_contact_columns(run: ExportedRun, instant: Instant) -> dict[str, Array]:
-    fields = gather_contacts(run, instant)
-    if run.frictional:
-        fields["tangential_force"] = np.linalg.norm(fields["tangential_force"], axis=1)
-    first, second = instant.state.contacts.pair.T
-    return {"id1": first, "id2": second, **fields}
-
-
-def _make_frame(
-    instant: Instant, columns: Mapping[str, Array], box: FloatArray, kind: Kind
-) -> Frame:
-    values = np.column_stack([*columns.values()]).astype(float)
-    return Frame(instant.cycle, tuple(columns), values, box, kind)
 
 
 def _find_box(run: ExportedRun) -> FloatArray:
@@ -130,31 +117,20 @@ def export_csv(run: ExportedRun, into: Path, every: int) -> list[Path]:
     run folder has a row a cycle already.  The piston's table holds all its samples.
     """
 
-    def list_grain_columns() -> Iterator[dict[str, Array]]:
+    def list_columns(gather: Gather) -> Iterator[dict[str, Array]]:
         for instant in run.instants(every):
-            fields = split_columns(gather_placed_grains(run, instant), "_")
-            yield _add_cycle(instant, dict(fields))
+            columns = dict(split_columns(gather(run, instant), "_"))
+            length = len(next(iter(columns.values())))
+            yield {"cycle": np.full(length, instant.cycle), **columns}
 
-    def list_contact_columns() -> Iterator[dict[str, Array]]:
-        for instant in run.instants(every):
-            first, second = instant.state.contacts.pair.T
-            fields = split_columns(gather_contacts(run, instant), "_")
-            yield _add_cycle(instant, {"id1": first, "id2": second, **dict(fields)})
-
-    tables = {"grains": list_grain_columns()}
+    tables = {"grains": list_columns(gather_placed_grains)}
     if run.own:
-        tables["contacts"] = list_contact_columns()
+        tables["contacts"] = list_columns(gather_named_contacts)
     if run.own and run.loaded:
         tables["piston"] = run.piston_samples()
     for name, parts in tables.items():
         write_csv_rows(into / f"{name}.csv", parts)
     return [into / f"{name}.csv" for name in tables]
-
-
-def _add_cycle(instant: Instant, columns: Mapping[str, Array]) -> dict[str, Array]:
-    """Columns with the number of the cycle before them."""
-    length = len(next(iter(columns.values())))
-    return {"cycle": np.full(length, instant.cycle), **columns}
 
 
 def write_csv_rows(path: Path, parts: Iterable[Mapping[str, Array]]) -> None:
