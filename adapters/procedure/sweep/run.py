@@ -89,23 +89,18 @@ def run_sweep(sweep: Sweep, cluster: Cluster, progress: Progress) -> list[Result
     check_folder(sweep)
     try:
         with allow_interrupts(), explain_full_disk(sweep.folder), RunFolder(sweep.folder).lock():
-            return _run_pending(sweep, cluster, progress)
+            results = {one.name: find_result(sweep, one, None) for one in sweep.members}
+            _write_record(sweep, cluster, results)
+            pending = [one for one in sweep.members if results[one.name].state != "finished"]
+            done = len(results) - len(pending)
+            progress.print_line(f"{len(results)} members, {done} finished")
+            sweep.stop_file.unlink(missing_ok=True)
+            if pending:
+                _run(sweep, cluster, pending, results, progress)
+            return list(results.values())
     except Interrupted as stop:
         what = str(stop).partition("\n")[0]
         raise Interrupted(f"{what}\n  -> the same command goes on with the sweep") from None
-
-
-def _run_pending(sweep: Sweep, cluster: Cluster, progress: Progress) -> list[Result]:
-    results = {member.name: find_result(sweep, member, None) for member in sweep.members}
-    _write_record(sweep, cluster, results)
-    pending = [m for m in sweep.members if results[m.name].state != "finished"]
-    progress.print_line(
-        f"{len(sweep.members)} members, {len(sweep.members) - len(pending)} finished"
-    )
-    sweep.stop_file.unlink(missing_ok=True)
-    if pending:
-        _run(sweep, cluster, pending, results, progress)
-    return list(results.values())
 
 
 def _run(
