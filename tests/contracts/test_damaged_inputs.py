@@ -20,22 +20,32 @@ import skfem
 
 from adapters.bed import State, save_state
 from adapters.files.states import write_state_file
+from adapters.scene import load_scene as settlement_scene
 from qdem_fem.grains import make_grains, save_grains
 from qdem_fem.grains.sets import load_grains
 from qdem_fem.mesh import read_mesh
+from qdem_fem.scene import load_scene as qdem_scene
+from qdem_fem.scene import make_simulation
 from qdem_fem.track.bed import Bed, read_bed, write_bed
 from rigid_lcp.friction.files.formats import read_problem
+from rigid_lcp.scene.file import build_scene
+from rigid_lcp.scene.file import load_scene as rigid_scene
 from tests.small_bed import small_bed
 from tests.verification.test_qdem_track import RECIPE
+from track_line.scene import load_scene as line_scene
 from trackbed.command import main
 from trackbed.errors import EXIT_CODES, TrackbedError
+from trackbed.scenes import read_template
 
 DAMAGES = {True: 50, False: 300}
 """Of a reader, slow (what computes or draws) or not."""
 MOST_SECONDS, MOST_BYTES = 10.0, 1e9
 WORDS = [
     "nan", "inf", "-1", "0", "1e308", "1e-300", "999999999999", "true", "'x'", "[]", "{}", "../..",
-    "/dev/zero", "\u00e9", ",", "=", "[", "\x00",
+    "/dev/zero", "\u00e9", ",", "=", "[", "\x00", "0.3", "1e400", "-inf", "-0.0", "5e-324", "1e17",
+    "1e-17", '""', '"\\u0000"', '"x-max"', "9" * 400, "[1, 'a', [2]]", "{ a = 1 }", "[{ a = 1 }]",
+    "1979-05-27", "[0, 0, 1]", "[1e-17, 1, 1]", '{ ramp = 1, value = "p" }', '{ csv = "/" }',
+    "{ times = [1, 0], values = [0, [1, 2, 3]] }", "{ box = { size = [2, 1, 0], cells = [1] } }",
 ]  # fmt: skip
 RIGID = """dimensions = 2
 [run]
@@ -122,6 +132,9 @@ def write_inputs(folder: Path) -> None:
     (folder / "rigid.toml").write_text(RIGID)
     (folder / "qdem.toml").write_text(QDEM)
     (folder / "bed.toml").write_text(small_bed(2, 3, 14))
+    for name in ("karrech", "pile", "line", "cantilever", "cantilever-vibration"):
+        text = read_template(name).replace("cells = [48, 6, 6]", "cells = [4, 1, 1]")
+        (folder / f"{name}.toml").write_text(text)
     (folder / "load.csv").write_text("t [ms];F [kN]\n0;0\n0,05;1,5\n0,1;0\n")
     solid = meshio.Mesh(mesh.p.T, [("tetra", mesh.t.T)])
     for name, kind in (("beam.msh", "gmsh22"), ("four.msh", "gmsh"), ("beam.vtu", "vtu")):
@@ -172,9 +185,27 @@ def read_by(reader: Callable[..., Any]) -> Callable[[Path], int]:
     return read
 
 
+def read_settlement(path: Path) -> None:
+    """A scene, and what follows from it where it is sound."""
+    scene = settlement_scene(path)
+    assert 0 < scene.time_step < np.inf
+    assert scene.grain_count >= 1
+    assert 0.05 < scene.restitution <= 1
+    assert scene.loaded_area <= scene.container.area
+
+
+def read_qdem(path: Path) -> None:
+    make_simulation(qdem_scene(path))
+
+
 READERS: dict[str, tuple[str, Callable[[Path], int]]] = {
     "rigid scene": ("rigid.toml", run_words("rigid", "@", "--dry-run")),
     "qdem scene": ("qdem.toml", run_words("qdem", "@", "--dry-run")),
+    "pile": ("pile.toml", read_by(lambda path: build_scene(rigid_scene(path)))),
+    "line": ("line.toml", read_by(line_scene)),
+    "karrech": ("karrech.toml", read_by(read_settlement)),
+    "cantilever": ("cantilever.toml", read_by(read_qdem)),
+    "vibration": ("cantilever-vibration.toml", read_by(read_qdem)),
     "load": ("load.csv", run_words("qdem", "@/../qdem.toml", "--dry-run")),
     "settlement scene": ("bed.toml", run_words("run", "@", "--dry-run", "--run-folder", "@-dry")),
     "table": ("series.csv", run_words("fit", "@", "--law", "auto", "--to-cycle", "300")),

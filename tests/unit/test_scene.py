@@ -13,12 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from adapters.engines.contract import get_engine, list_engines, list_real_engines
-from adapters.errors import SceneError, TrackbedError
+from adapters.errors import SceneError
 from adapters.files.load_series import read_load_series
 from adapters.scene.file import load_scene
 from adapters.scene.procedures import schedule_jumps
 from adapters.scene.tables import Loading, Procedure, Scene
-from trackbed.scene_files.lines import find_key_lines
 from trackbed.scenes import find_scene_file, find_scene_verb, list_scenes, read_template
 
 pytestmark = pytest.mark.lowest
@@ -59,16 +58,6 @@ def refusal(folder: Path, text: str, overrides: list[str] | None = None) -> str:
     with pytest.raises(SceneError) as caught:
         load_scene(write(folder, text), overrides or [])
     return str(caught.value)
-
-
-def scene_or_refusal(path: Path) -> Scene | None:
-    """The scene, or None when it was refused by an error of ours that names the file."""
-    try:
-        return load_scene(path)
-    except TrackbedError as error:
-        if str(path) not in str(error):
-            raise
-        return None
 
 
 # ---------------------------------------------------------------------------- what a scene means
@@ -387,9 +376,6 @@ def test_value_in_place_of_a_table(tmp_path: Path, table: str) -> None:
     assert f"--set {table}=3: {table}: must be a table, not 3" in message
 
 
-ALL_KEYS = sorted(key for key in find_key_lines(KARRECH) if "." in key)
-
-
 # ---------------------------------------------------------------------------- overrides
 
 
@@ -403,43 +389,6 @@ def test_override_of_an_alternative_replaces_the_other(tmp_path: Path) -> None:
     assert scene.time_step == pytest.approx(5e-7, rel=1e-12)
     assert scene.material.grain.viscous_alpha is None
     assert scene.engine.rayleigh_share is None
-
-
-# ---------------------------------------------------------------------------- files
-
-
-VALUES = st.sampled_from(
-    [
-        *("0", "-1", "0.3", "1.5", "2", "1e400", "nan", "-inf", "-0.0", "5e-324", "1.7e308"),
-        *("true", '""', '"x"', "[]", "[1, 'a', [2]]", "{}", "{ a = 1 }", "[{ a = 1 }]"),
-        *("1979-05-27", "07:32:00", "'\\u0000'", "9" * 400),
-    ]
-)
-
-
-@pytest.mark.long
-@settings(max_examples=150, deadline=None)
-@given(
-    changes=st.dictionaries(st.sampled_from(ALL_KEYS), VALUES, max_size=4),
-    dropped=st.sets(st.integers(0, KARRECH.count("\n")), max_size=3),
-)
-def test_no_scene_ends_in_a_traceback(
-    tmp_path_factory: pytest.TempPathFactory, changes: dict[str, str], dropped: set[int]
-) -> None:
-    """Whatever values keys take, and whatever lines are lost: a scene or an error of ours."""
-    lines = KARRECH.split("\n")
-    for key, value in changes.items():
-        line = find_key_lines(KARRECH)[key] - 1
-        if not lines[line].startswith("["):
-            lines[line] = f"{key.rpartition('.')[2]} = {value}"
-    text = "\n".join(line for index, line in enumerate(lines) if index not in dropped)
-    path = write(tmp_path_factory.mktemp("scene"), text)
-    scene = scene_or_refusal(path)
-    if scene:
-        assert 0 < scene.time_step < inf
-        assert scene.grain_count >= 1
-        assert 0.05 < scene.restitution <= 1
-        assert scene.loaded_area <= scene.container.area
 
 
 # ---------------------------------------------------------------------------- load series
