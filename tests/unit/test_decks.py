@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import copy
 import re
+from functools import reduce
+from operator import getitem
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -47,51 +49,38 @@ BASE: dict[str, Any] = {
 
 START_RESTART = b"what a restart file holds is the engine's own business"
 
+BOX = {
+    "sample.radius": None,
+    "sample.container": "box",
+    "sample.size_x": 0.03,
+    "sample.size_y": 0.02,
+}
+KINDS: dict[str, dict[str, Any]] = {  # what each of the scenes has unlike the base
+    "whole": {},
+    "frictionless": {"material.grain.friction": 0.0, "material.wall.friction": 0.0},
+    "rough walls": {"material.grain.friction": 0.0},
+    "unloaded": {"loading": None},
+    "no symmetry": {"sample.symmetry": []},
+    "box": BOX | {"sample.symmetry": []},
+    "box with mirror": BOX | {"sample.symmetry": ["y"]},
+    "partial": {"loading.area_share": 0.8},
+    "series": {"loading": {"waveform": "series", "piston_mass": 0.005}},
+}
+STARTS = ("first", "continue", "moved", "perturbed")
+
 Command = tuple[str, ...]
 
 
 def scene(tmp_path: Path, kind: str) -> Scene:
-    """The scenes of this file, by name."""
+    """One of `KINDS`."""
     data = copy.deepcopy(BASE)
-    sample, material, loading = data["sample"], data["material"], data["loading"]
-    if kind == "frictionless":
-        material["grain"]["friction"] = material["wall"]["friction"] = 0.0
-    elif kind == "rough walls":
-        material["grain"]["friction"] = 0.0
-    elif kind == "unloaded":
-        del data["loading"]
-    elif kind == "no symmetry":
-        sample["symmetry"] = []
-    elif kind == "box":
-        del sample["radius"]
-        sample |= {"container": "box", "size_x": 0.03, "size_y": 0.02, "symmetry": []}
-    elif kind == "box with mirror":
-        del sample["radius"]
-        sample |= {"container": "box", "size_x": 0.03, "size_y": 0.02, "symmetry": ["y"]}
-    elif kind == "partial":
-        loading["area_share"] = 0.8
-    elif kind == "series":
+    for key, value in KINDS[kind].items():
+        *tables, name = key.split(".")
+        reduce(getitem, tables, data)[name] = value
+    if kind == "series":
         (tmp_path / "load.csv").write_text("time,stress\n0,10\n0.01,30\n0.02,20\n0.03,10\n")
-        data["loading"] = {
-            "waveform": "series", "series": str(tmp_path / "load.csv"), "piston_mass": 0.005,
-        }  # fmt: skip
-    else:
-        assert kind == "whole"
+        data["loading"]["series"] = str(tmp_path / "load.csv")
     return Scene.model_validate(data)
-
-
-KINDS = (
-    "whole",
-    "frictionless",
-    "rough walls",
-    "unloaded",
-    "no symmetry",
-    "box",
-    "box with mirror",
-    "partial",
-    "series",
-)
-STARTS = ("first", "continue", "moved", "perturbed")
 
 
 def preparation(scene: Scene, folder: Path) -> list[Command]:

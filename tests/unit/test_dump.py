@@ -17,67 +17,29 @@ from adapters.files import dump_kernel, dump_reader
 from adapters.files.dump import Frame, write_dump
 from adapters.files.dump_reader import read_frames
 
-# As LIGGGHTS 3.8.0 writes it: rows in no order, a blank before each line end.
-GRAINS = """\
-ITEM: TIMESTEP
-0
-ITEM: NUMBER OF ATOMS
-3
-ITEM: BOX BOUNDS ff ff ff
--0.1 0.1
--0.1 0.1
-0 0.25
-ITEM: ATOMS id type x vx\x20
-5 1 -0.0089999999999999993 0\x20
-2 1 0.010500000000000001 -2.9905695484907615e-16\x20
-7 1 0.029999999999999999 0.025074591573576797\x20
-ITEM: TIMESTEP
-10
-ITEM: NUMBER OF ATOMS
-3
-ITEM: BOX BOUNDS ff ff ff
--0.1 0.1
--0.1 0.1
-0 0.25
-ITEM: ATOMS id type x vx\x20
-7 1 0.03 0\x20
-5 1 -0.009 1e-3\x20
-2 1 .0105 -1.5E+02\x20
-ITEM: TIMESTEP
-20
-ITEM: NUMBER OF ATOMS
-3
-ITEM: BOX BOUNDS ff ff ff
--0.1 0.1
--0.1 0.1
-0 0.25
-ITEM: ATOMS id type x vx\x20
-2 1 1 0\x20
-5 1 2 0\x20
-7 1 3 0\x20
-"""
-CONTACTS = """\
-ITEM: TIMESTEP
-0
-ITEM: NUMBER OF ENTRIES
-2
-ITEM: BOX BOUNDS ff ff ff
--0.1 0.1
--0.1 0.1
--0.1 0.1
-ITEM: ENTRIES c_pl[1] c_pl[2] c_pl[7] c_pl[8]\x20
-0.0105 0 2 7\x20
--0.009 0 5 2\x20
-ITEM: TIMESTEP
-10
-ITEM: NUMBER OF ENTRIES
-0
-ITEM: BOX BOUNDS ff ff ff
--0.1 0.1
--0.1 0.1
--0.1 0.1
-ITEM: ENTRIES c_pl[1] c_pl[2] c_pl[7] c_pl[8]\x20
-"""
+
+def written_frame(step: int, header: str, *rows: str, height: str = "0 0.25") -> str:
+    """As LIGGGHTS 3.8.0 writes it: a blank before each line end of the table."""
+    table = "".join(f"{line} \n" for line in (header, *rows))
+    return (
+        f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF {header.split()[1]}\n{len(rows)}\n"
+        f"ITEM: BOX BOUNDS ff ff ff\n-0.1 0.1\n-0.1 0.1\n{height}\n{table}"
+    )
+
+
+ATOMS, ENTRIES = "ITEM: ATOMS id type x vx", "ITEM: ENTRIES c_pl[1] c_pl[2] c_pl[7] c_pl[8]"
+GRAINS = (  # rows in no order
+    written_frame(
+        0, ATOMS, "5 1 -0.0089999999999999993 0",
+        "2 1 0.010500000000000001 -2.9905695484907615e-16",
+        "7 1 0.029999999999999999 0.025074591573576797",
+    )
+    + written_frame(10, ATOMS, "7 1 0.03 0", "5 1 -0.009 1e-3", "2 1 .0105 -1.5E+02")
+    + written_frame(20, ATOMS, "2 1 1 0", "5 1 2 0", "7 1 3 0")
+)  # fmt: skip
+CONTACTS = written_frame(
+    0, ENTRIES, "0.0105 0 2 7", "-0.009 0 5 2", height="-0.1 0.1"
+) + written_frame(10, ENTRIES, height="-0.1 0.1")
 FILES = settings(
     deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )

@@ -64,17 +64,9 @@ def test_flow_chart(tmp_path: Path) -> None:
         "procedure.total_cycles=70",
     )
     assert stages_of(tmp_path / "run") == [
-        "preparation",
-        "window_000000",
-        "window_000010",
-        "jump_000015_1",
-        "window_000025",
-        "jump_000032_1",
-        "window_000052",
-        "window_000059",
-        "window_000064",
-        "window_000069",
-    ]
+        "preparation", "window_000000", "window_000010", "jump_000015_1", "window_000025",
+        "jump_000032_1", "window_000052", "window_000059", "window_000064", "window_000069",
+    ]  # fmt: skip
     kinds = {int(row["cycle"]): row["kind"] for row in rows}
     assert [cycle for cycle, kind in kinds.items() if kind == "jumped"] == [25, 52]
     assert [cycle for cycle, kind in kinds.items() if kind == "healing"] == [26, 27, 53, 54]

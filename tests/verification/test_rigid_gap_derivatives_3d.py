@@ -11,10 +11,18 @@ from rigid_lcp import HalfSpace, Sphere
 from rigid_lcp.arrays import Floats
 from rigid_lcp.contact import detect_3d, pack_shapes_3d
 from rigid_lcp.contact.arrays import Contacts, build_frames
+from rigid_lcp.contact.placed_solids import Shapes3D
 from rigid_lcp.motion.equations import find_inertial_acceleration, find_relative_velocity
 from rigid_lcp.motion.state import Motion, displace_motion
 from rigid_lcp.shapes.rotations import make_quaternion, multiply_quaternions, rotate
 from tests.rigid_solids import CUBE, UPRIGHT, contacts, near_pair
+
+
+def gaps_at(arrays: Shapes3D, motion: Motion, t: float) -> dict[int, float]:
+    """The gap of every contact after a time, by its key."""
+    there = displace_motion(motion, t * np.hstack([motion.velocity, motion.spin]))
+    found = detect_3d(arrays, there.position, there.angle, 0.05)
+    return dict(zip(found.key.tolist(), found.gap.tolist(), strict=True))
 
 
 @pytest.mark.long
@@ -31,16 +39,10 @@ def test_gap_rate_is_the_derivative_of_the_gap(seed: int) -> None:
     motion = Motion(place, turns, rates[:, :3], rates[:, 3:])
     arrays = pack_shapes_3d(shapes, np.array([True, True, True, False]))
     h = 1e-7
-
-    def gaps(t: float) -> dict[int, float]:
-        there = displace_motion(motion, t * rates)
-        found = detect_3d(arrays, there.position, there.angle, 0.05)
-        return dict(zip(found.key.tolist(), found.gap.tolist(), strict=True))
-
     found = detect_3d(arrays, place, turns, 0.05)
     assert len(found) > 0
     speed = find_relative_velocity(found, motion)[:, 0]
-    ahead, behind = gaps(h), gaps(-h)
+    ahead, behind = gaps_at(arrays, motion, h), gaps_at(arrays, motion, -h)
     checked = 0
     for key, rate in zip(found.key.tolist(), speed, strict=True):
         if key in ahead and key in behind:
@@ -71,15 +73,9 @@ def test_inertial_terms_are_the_second_derivative_of_the_gap(seed: int) -> None:
     motion = Motion(place, turns, rates[:, :3], rates[:, 3:])
     arrays = pack_shapes_3d(shapes, np.array([True, True, True, True, False]))
     h = 1e-4
-
-    def gaps(t: float) -> dict[int, float]:
-        there = displace_motion(motion, t * rates)
-        found = detect_3d(arrays, there.position, there.angle, 0.05)
-        return dict(zip(found.key.tolist(), found.gap.tolist(), strict=True))
-
     found = detect_3d(arrays, place, turns, 0.05)
     exact = find_inertial_acceleration(found, motion)[:, 0]
-    moved = [gaps(t) for t in (-h, -h / 2, h / 2, h)]
+    moved = [gaps_at(arrays, motion, t) for t in (-h, -h / 2, h / 2, h)]
     checked = 0
     for k, key in enumerate(found.key.tolist()):
         if not all(key in there for there in moved):
