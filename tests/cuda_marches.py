@@ -39,14 +39,10 @@ def lists_gpu_shuffled(given: Cloud, seed: int) -> Pairs:
 class Sums(NamedTuple):
     """What a march asks between its steps."""
 
-    gap: float
-    """Greatest of what touched [m]."""
-    bound: float
-    """On omega^2 of what touches [1/s^2]."""
-    extents: Floats
-    """(b,) of bodies along y [m]"""
-    finite: bool
-    """Whether all spheres are at numbers."""
+    gap: float  # greatest of what touched [m]
+    bound: float  # on omega^2 of what touches [1/s^2]
+    extents: Floats  # (b,) of bodies along y [m]
+    finite: bool  # whether all spheres are at numbers
 
 
 def sums_gpu(given: Cloud, seed: int, first: Integers, lost: bool) -> Sums:

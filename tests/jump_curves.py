@@ -75,12 +75,10 @@ class Curve(FakeBed):
     bursts: float = 0.0
     """Share of the settlement that comes in bursts; a cycle's is the same in every run."""
     seed: int = 1
-    jitter: float = 0.0
-    """Deviation of each reading [m], independent from cycle to cycle."""
+    jitter: float = 0.0  # deviation of each reading [m], independent from cycle to cycle
     first_cycle: float = 0.0
     """What the bed settles more in the first cycle behind a jump, over what it was moved by."""
-    kappa: float = 0.0
-    """The same in the n-th, times n (`jump_slopes`)."""
+    kappa: float = 0.0  # the same in the n-th, times n (`jump_slopes`)
 
     def settlement(self, first: int, cycles: int) -> FloatArray:
         """u [m] at the ends of ``cycles`` cycles from ``first`` on, less u before them."""
@@ -111,11 +109,9 @@ class Play:
     taken_back: list[dict[str, Any]] = field(default_factory=list)
     true_errors: list[float] = field(default_factory=list)
     """Gain of each jump that stands less that of the mean law, over the total."""
-    computed: int = 0
-    """Cycles, those of jumps taken back included."""
+    computed: int = 0  # cycles, those of jumps taken back included
     settlement: float = 0.0
-    truth: float = 0.0
-    """What the mean bed would have from the same state after k_i cycles [m]."""
+    truth: float = 0.0  # what the mean bed would have from the same state after k_i cycles [m]
     refused: bool = False
 
     @property

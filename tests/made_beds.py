@@ -21,10 +21,8 @@ from adapters.relaxation.smallest import find_smallest_move
 
 STIFFNESS = make_hertz_stiffness(46.9e9, 0.25, 210e9, 0.3)
 DENSITY = 2710.0
-OVERLAP = 6e-8
-"""Mean overlap of a made bed [m]."""
-SETTLEMENT = 40e-6
-"""Mean settlement of the jumps [m]."""
+OVERLAP = 6e-8  # mean overlap of a made bed [m]
+SETTLEMENT = 40e-6  # mean settlement of the jumps [m]
 
 
 def state_at_rest(position: FloatArray, radius: FloatArray) -> State:

@@ -48,13 +48,11 @@ def compute_elastic_energy(
 class Elements(NamedTuple):
     """What an element keeps of the reference configuration."""
 
-    nodes: Integers
-    """Node numbers (m, 4)."""
+    nodes: Integers  # node numbers (m, 4)
     gradients: Floats
     """Rows: grad_X N_1, grad_X N_2, grad_X N_3 [1/m], (m, 3, 3), the inverse of the edge vectors;
     grad_X N_0 is minus their sum."""
-    volume: Floats
-    """Reference volume V0 [m^3], (m,)."""
+    volume: Floats  # reference volume V0 [m^3], (m,)
 
 
 def stress_viscous(

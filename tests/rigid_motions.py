@@ -233,8 +233,7 @@ def grains_in_a_box(seed: int) -> Scene:
 
 # --- a disc that goes round another ---
 
-ORBIT_RADII = (0.1, 0.3)
-"""Radii of the disc that goes round and of the fixed one [m]."""
+ORBIT_RADII = (0.1, 0.3)  # radii of the disc that goes round and of the fixed one [m]
 ORBIT_FRICTION = 0.5
 
 

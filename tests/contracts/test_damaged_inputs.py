@@ -37,8 +37,7 @@ from trackbed.command import main
 from trackbed.errors import EXIT_CODES, TrackbedError
 from trackbed.scenes import read_template
 
-DAMAGES = {True: 50, False: 300}
-"""Of a reader, slow (what computes or draws) or not."""
+DAMAGES = {True: 50, False: 300}  # of a reader, slow (what computes or draws) or not
 MOST_SECONDS, MOST_BYTES = 10.0, 1e9
 WORDS = [
     "nan", "inf", "-1", "0", "1e308", "1e-300", "999999999999", "true", "'x'", "[]", "{}", "../..",

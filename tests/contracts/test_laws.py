@@ -18,8 +18,7 @@ SETTLING = -1e-5 * np.stack(
 """Settlements of four kinds [m]."""
 FAULTY = np.where(CYCLE[:5, None] == 3.0, np.nan, 0.0)
 ROUND_OFF = 1e-12
-SEARCHED = 1e-7
-"""Of a shape parameter, which is searched to half of the digits of a number."""
+SEARCHED = 1e-7  # of a shape parameter, which is searched to half of the digits of a number
 
 every_law = pytest.mark.parametrize("name", list_laws())
 

@@ -37,8 +37,7 @@ only_lammps = pytest.mark.engine("lammps")
 ALPHA = 0.44
 VISCOUS = f"material.grain.viscous_alpha={ALPHA}"
 ELASTIC = "material.grain.restitution=1.0"
-PAIR_MASS = find_grain_mass(load_table_1()) / 2
-"""Effective mass of two grains of Table 1 [kg]."""
+PAIR_MASS = find_grain_mass(load_table_1()) / 2  # effective mass of two grains of Table 1 [kg]
 
 
 @with_pull

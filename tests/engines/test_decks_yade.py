@@ -23,10 +23,8 @@ from trackbed import command
 
 pytestmark = [pytest.mark.long, pytest.mark.engine("yade")]
 EXAMPLES = Path("/usr/share/doc/yade/examples")
-SHIFT = np.array([2e-6, -1e-6, 1e-5])
-"""Of all grains together [m]."""
-DIGIT = 2.0**-52 * 0.1
-"""Last digit of a place in `own_decks.YADE` [m]."""
+SHIFT = np.array([2e-6, -1e-6, 1e-5])  # of all grains together [m]
+DIGIT = 2.0**-52 * 0.1  # last digit of a place in `own_decks.YADE` [m]
 
 
 def test_windows_go_on_to_the_last_digits(tmp_path: Path) -> None:

@@ -29,8 +29,7 @@ from tests.engine_sample import AFTER, FIRST, JUMP, QUIET, SECOND, TINY, Sample,
 from tests.forked_commands import Commands, awaited, gone
 from trackbed.scenes import find_scene_file, read_template
 
-HISTORY = 7
-"""Columns of ``history.txt``."""
+HISTORY = 7  # columns of ``history.txt``
 
 
 def springs(contacts: Contacts) -> dict[tuple[int, ...], np.ndarray]:

@@ -27,8 +27,7 @@ from validation.bench.few_grains_yade import run_grains
 pytestmark = pytest.mark.engine("yade")
 
 ALPHA = 0.44
-PAIR_MASS = find_grain_mass(load_table_1()) / 2
-"""Effective mass of two grains of Table 1 [kg]."""
+PAIR_MASS = find_grain_mass(load_table_1()) / 2  # effective mass of two grains of Table 1 [kg]
 ENGINE = YadeEngine()
 TINY = ('engine.name="yade"', *engine_sample.TINY[:4])
 """Forty soft grains, about 2,500 steps a cycle."""

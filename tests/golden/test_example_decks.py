@@ -29,8 +29,7 @@ BED = (
 )
 """What differs from the scene karrech-coarse: fewer, softer grains, a lighter piston."""
 CYCLES = 3
-PISTON_HEIGHT = 0.048
-"""Above the highest grain of the settled bed, 47.5 mm [m]."""
+PISTON_HEIGHT = 0.048  # above the highest grain of the settled bed, 47.5 mm [m]
 
 
 def example(name: str) -> Path:

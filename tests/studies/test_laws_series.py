@@ -17,8 +17,7 @@ from validation.studies.laws.series import (
 )
 
 pytestmark = pytest.mark.studies
-READ = np.geomspace(1, 1e5, 61)
-"""Twelve a decade: ten times a reading is one."""
+READ = np.geomspace(1, 1e5, 61)  # Twelve a decade: ten times a reading is one
 
 
 def one_case(settlement: np.ndarray, name: str = "series") -> LawCase:

@@ -128,10 +128,8 @@ class Deck(NamedTuple):
 
     commands: list[Command]
     """In order, words with the value of every ``${name}`` that is known before the run."""
-    files: set[str]
-    """Files of the folder that are included or that a command names."""
-    unused: set[str]
-    """Variables that are given a value and never used."""
+    files: set[str]  # files of the folder that are included or that a command names
+    unused: set[str]  # variables that are given a value and never used
 
 
 def deck_read(folder: Path, deck: str) -> Deck:

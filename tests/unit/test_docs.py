@@ -14,8 +14,7 @@ ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(ROOT.glob("docs/*.md"))]
 PACKAGES = ("adapters", "qdem_fem", "rigid_lcp", "track_line", "trackbed", "validation")
 STUDIES = {path.parent.name.replace("_", "-") for path in ROOT.glob("validation/studies/*/page.md")}
-HISTORY = re.compile(r"`[^`]*6035ef5:[^`]*`")
-"""Places in an earlier commit."""
+HISTORY = re.compile(r"`[^`]*6035ef5:[^`]*`")  # places in an earlier commit
 LINK = re.compile(r"\]\((?!https?:)([^)#\s]+)")
 MODULE = re.compile(r"python -m ([\w.]+)")
 STUDY = re.compile(r"validation\.study ([a-z-]+)")
@@ -24,8 +23,7 @@ VERB = re.compile(r"(?:^\s*|[`$] ?)trackbed ([a-z]+)(?= |$|`)([^`\n]*)", re.MULT
 PLACE = re.compile(rf"`((?:{'|'.join(PACKAGES)}|tests|docs|\w+_inputs|yade_scripts)/[\w./-]*)`")
 DOTTED = re.compile(rf"`((?:{'|'.join(PACKAGES)})(?:\.\w+)+)`")
 FLAG = re.compile(r"(?<![\w-])--[a-z][a-z-]+")
-OUTSIDE = {"mpi": "an MPI's or the launcher's own", "mca": "OpenMPI's"}
-"""Flags inside a launcher."""
+OUTSIDE = {"mpi": "an MPI's or the launcher's own", "mca": "OpenMPI's"}  # flags inside a launcher
 
 
 @cache

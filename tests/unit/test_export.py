@@ -64,8 +64,7 @@ class Bed:
     """Two pairs of grains over one cycle in place of a run: what a `Track` is asked for."""
 
     DISTANCE = 1.9e-3
-    FORCE = 0.25
-    """How hard a pair pushes [N]."""
+    FORCE = 0.25  # how hard a pair pushes [N]
 
     def __init__(self, friction: float, contacts: bool = True) -> None:
         x = self.DISTANCE * np.array([[0, 0, 1], [1, 0, 1], [0, 3, 1], [0, 3, 2]], float)

@@ -25,8 +25,7 @@ pytestmark = pytest.mark.lowest
 
 BOX = make_box_mesh((0.4, 0.3, 0.2), (2, 2, 2))
 NODES, ELEMENTS = BOX.nodes, BOX.elements
-UNIT = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
-"""Corners of a right-handed element."""
+UNIT = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])  # corners of a right-handed element
 
 
 def damaged(row: int, column: int, value: Any) -> tuple[np.ndarray, np.ndarray]:

@@ -29,8 +29,7 @@ from adapters.laws.fit.refusal import UNCERTAIN, find_refusals
 from adapters.laws.fit.regime import SHAKEDOWN, count_independent, find_regimes, select_tail
 from trackbed.command import main
 
-READ = np.unique(np.geomspace(1, 1000, 22).round())
-"""Cycles at which a laboratory reads."""
+READ = np.unique(np.geomspace(1, 1000, 22).round())  # cycles at which a laboratory reads
 SERIES = {
     "shakedown": [READ / (30 + READ), 1 - np.exp(-((READ / 50) ** 0.6)), 1 - READ**-0.5],
     "steady": [np.log(READ), 4.3 * READ**0.17, np.log1p(READ / 3) + 0.3 * np.log1p(READ / 100)],

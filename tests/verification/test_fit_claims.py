@@ -16,8 +16,7 @@ from adapters.laws.fit.growth import find_fall, find_growth, measure_growth
 from adapters.laws.fit.prediction import fit_auto, fit_series
 from trackbed.command import main
 
-LEAST = 2000.0
-"""About where the rate of `quicken` is least; at cycle 3,400 it is 1.5 times that."""
+LEAST = 2000.0  # about where the rate of `quicken` is least; at cycle 3,400 it is 1.5 times that
 
 
 def read_cycles(per_decade: int, last: float) -> FloatArray:

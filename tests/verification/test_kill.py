@@ -23,8 +23,7 @@ from tests.small_bed import small_bed
 from trackbed import command
 
 SEED = 2007
-SLOW = 0.04
-"""Seconds that each part of a slow run sleeps before and behind its work."""
+SLOW = 0.04  # seconds that each part of a slow run sleeps before and behind its work
 
 PARTS = ("preparation", "window", "jump", "relaxation")
 

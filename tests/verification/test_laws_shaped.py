@@ -22,8 +22,7 @@ TRUE = {
 }
 """Parameters of a series in mm over 100 cycles, each term of some weight."""
 CYCLE = np.arange(1.0, 101.0)
-every_law = pytest.mark.parametrize("name", TRUE)
-"""Of the others, `test_laws` knows."""
+every_law = pytest.mark.parametrize("name", TRUE)  # of the others, `test_laws` knows
 
 
 def series(name: str) -> FloatArray:

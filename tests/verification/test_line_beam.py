@@ -24,8 +24,7 @@ TRACK = Track()
 WEIGHT = TRACK.sleeper_mass * GRAVITY
 BED, WHEEL = 28e6, 100e3
 SERIES = TRACK.pad * BED / (TRACK.pad + BED)
-ROUND_OFF = 1e-12
-"""Of forces over the wheel load."""
+ROUND_OFF = 1e-12  # of forces over the wheel load
 
 
 def make_matrix(rail: Rail) -> np.ndarray:

@@ -27,12 +27,10 @@ from tests.small_bed import read_rows, small_bed
 from trackbed.command import main
 
 SCENE = small_bed(k=2, h=4, total_cycles=14)
-ENDS = ("4", "14")
-"""Cycle before the first jump, and the last."""
+ENDS = ("4", "14")  # cycle before the first jump, and the last
 SINKING = (0.0, 1e-7, 4e-7)
 """What pistons of members sink by more in each cycle [m]: the fake engine knows no chaos."""
-STUDENT = 2.91998558
-"""t of 90 % with two degrees of freedom, from a table."""
+STUDENT = 2.91998558  # t of 90 % with two degrees of freedom, from a table
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -34,8 +34,7 @@ from validation.bench.qdem.problem import Problem, clamp_mesh, make_smooth_step
 
 SAMPLES = 100
 SAFETIES = (0.8, 0.4, 0.2)
-LONG_SAMPLES, TENTH = 400, 40
-"""Samples of the energy over a long run, and a tenth of them."""
+LONG_SAMPLES, TENTH = 400, 40  # samples of the energy over a long run, and a tenth of them
 
 
 def block() -> Problem:
@@ -219,18 +218,12 @@ def test_spin_keeps_strain_and_angular_momentum() -> None:
 
 HEIGHT = 0.22
 DENSITY = 2350.0
-YOUNG_SOFT = 0.5e6
-"""Of the quasi-static tests of the paper [Pa]."""
-VISCOSITY_SOFT = 2e5
-"""mu_D of the creep tests [Pa s], see above."""
-STRESS = 10 / (2.4 * 0.25)
-"""10 N on the top of the slab [Pa]."""
-RISE = 0.2
-"""Duration of the smooth steps of the load [s]."""
-UNLOADED, END = 2.0, 3.5
-"""[s]"""
-SAMPLING = 0.02
-"""Of the creep [s]."""
+YOUNG_SOFT = 0.5e6  # of the quasi-static tests of the paper [Pa]
+VISCOSITY_SOFT = 2e5  # mu_D of the creep tests [Pa s], see above
+STRESS = 10 / (2.4 * 0.25)  # 10 N on the top of the slab [Pa]
+RISE = 0.2  # duration of the smooth steps of the load [s]
+UNLOADED, END = 2.0, 3.5  # [s]
+SAMPLING = 0.02  # of the creep [s]
 
 
 def creep_uniaxial_strain(time: ArrayLike, stress: float, young: float, viscosity: float) -> Any:

@@ -15,8 +15,7 @@ from validation.bench.qdem.contact import (
     sum_momenta,
 )
 
-CLOSES = 1e-3
-"""Share of the greatest energy that the account may lack."""
+CLOSES = 1e-3  # share of the greatest energy that the account may lack
 BY_MODEL = pytest.mark.parametrize(
     "model",
     [

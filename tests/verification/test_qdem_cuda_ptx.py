@@ -16,8 +16,7 @@ from typing import Any
 import pytest
 
 ROOT = Path(__file__).parents[2]
-CARDS = ((8, 0), (9, 0))
-"""Compute capabilities of A100 and H100."""
+CARDS = ((8, 0), (9, 0))  # compute capabilities of A100 and H100
 BUILDERS = (
     ("qdem_fem.kernel.cuda.step", "build_element_forces"),
     ("qdem_fem.kernel.cuda.step", "build_node_motion"),

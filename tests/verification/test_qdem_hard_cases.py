@@ -174,8 +174,7 @@ def test_one_element_vibrates_in_its_six_modes() -> None:
 
 # --- inverted elements ------------------------------------------------------------------------
 
-PUSH_STEPS = 2000
-"""Steps over which a node is pushed by 1 m."""
+PUSH_STEPS = 2000  # steps over which a node is pushed by 1 m
 
 
 def _push(seed: int) -> tuple[TetMesh, int, Floats]:

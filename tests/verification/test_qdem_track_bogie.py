@@ -21,8 +21,7 @@ from qdem_fem.track.loads.train import Train
 from trackbed.command import main
 from validation.bench.track_trials import SCENE
 
-SHARE = 0.13
-"""Of `SCENE`."""
+SHARE = 0.13  # of `SCENE`
 LEAD = QUIET * Track().elastic_length + Track().spacing / 2
 """With this one a bogie begins where the command's train does, so both are sampled alike."""
 SPEED = Train().speed

@@ -19,8 +19,7 @@ from qdem_fem.track.bed import STAGES, Bed, name_file, prepare_bed, read_bed, ru
 from qdem_fem.track.recipe import BedRecipe, make_bed_grains
 from validation.bench.track_trials import load_track
 
-JUDGEMENTS = 3
-"""After so many the process is killed; the stage of 20 grains takes more."""
+JUDGEMENTS = 3  # after so many the process is killed; the stage of 20 grains takes more
 
 
 class Killed(Exception):

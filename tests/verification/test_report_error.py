@@ -38,14 +38,11 @@ from adapters.report.error import (
 )
 from adapters.report.jumps import show_with_verdict
 
-A = 3e-5
-"""Settlement a ln(1 + N) of the hand-made full run [m]."""
+A = 3e-5  # settlement a ln(1 + N) of the hand-made full run [m]
 
-SINKING = 4.0
-"""What the loaded body sinks by over the settlement of the mean grain."""
+SINKING = 4.0  # what the loaded body sinks by over the settlement of the mean grain
 
-CYCLE_S = 4.0
-"""Its CPU time a cycle [s]."""
+CYCLE_S = 4.0  # its CPU time a cycle [s]
 
 
 def settled(cycle: float) -> float:

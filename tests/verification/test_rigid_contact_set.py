@@ -15,8 +15,7 @@ from rigid_lcp.errors import NotConverged
 from rigid_lcp.motion import count_parts, make_world
 
 GRAVITY = 9.81
-SIDE = 0.1
-"""Side of a tile [m]."""
+SIDE = 0.1  # side of a tile [m]
 
 
 def lay_floor(scene: Scene, kind: str, gap: float, rng: np.random.Generator) -> None:

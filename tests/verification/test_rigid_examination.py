@@ -19,8 +19,7 @@ from validation.bench.rigid.walls import build_wall, count_bricks, draw_masses
 
 WITHOUT_BEDS = ("crystals", "towers", "walls", "random assemblies")
 """Families that are made in no time."""
-WEIGHT = GRAVITY * beds.STEP
-"""Impulse of the weight of 1 kg in a step [N s]."""
+WEIGHT = GRAVITY * beds.STEP  # impulse of the weight of 1 kg in a step [N s]
 
 
 # --- the judge --------------------------------------------------------------------------------

@@ -13,8 +13,7 @@ from rigid_lcp.errors import NotConverged
 from rigid_lcp.motion.acceleration_forces import find_forces
 from rigid_lcp.scene.simulation import Method
 
-ROUND_OFF = 1e-13
-"""Relative round-off of an energy after some hundred steps."""
+ROUND_OFF = 1e-13  # relative round-off of an energy after some hundred steps
 
 
 def tilted_rod(friction: float) -> Scene:
