@@ -18,6 +18,10 @@ from adapters.files.load_series import read_load_series
 from adapters.scene.file import load_scene
 from adapters.scene.procedures import schedule_jumps
 from adapters.scene.tables import Loading, Procedure, Scene
+from qdem_fem.tables.keys import Scene as QdemScene
+from qdem_fem.track.table import TrackTable
+from track_line.scene.file import SceneTables as LineTables
+from trackbed.scene_files.types import Table
 from trackbed.scenes import find_scene_file, find_scene_verb, list_scenes, read_template
 
 pytestmark = pytest.mark.lowest
@@ -78,12 +82,11 @@ def test_shipped_scenes_load_without_doubts() -> None:
 def test_new_names_the_verb_that_reads_the_scene() -> None:
     """`trackbed new` says which verb goes on: that whose reader takes the scene."""
     from qdem_fem.scene.checks import GUIDE, read_scene
-    from qdem_fem.tables import Scene
     from rigid_lcp.scene.file import load_scene as rigid_scene
     from track_line.scene import load_scene as line_scene
 
     def check_qdem(path: Path) -> None:
-        read_scene(path, guide=GUIDE).check(Scene)
+        read_scene(path, guide=GUIDE).check(QdemScene)
 
     readers = {"run": load_scene, "qdem": check_qdem, "rigid": rigid_scene, "line": line_scene}
     for name in list_scenes():
@@ -112,22 +115,20 @@ def test_shipped_scenes_are_what_they_say(tmp_path: Path) -> None:
     assert float(coarse.stress_at(3.0)) == pytest.approx(0, abs=1e-9)
 
 
-def test_every_key_of_the_models_is_explained(tmp_path: Path) -> None:
-    """karrech.toml and ballast.toml, the format's specification, name every key of the models."""
-
-    def names(schema: dict[str, object], definitions: dict[str, dict[str, object]]) -> set[str]:
-        properties = schema.get("properties", {})
-        assert isinstance(properties, dict)
-        found = set(properties)
-        for value in properties.values():
-            for target in re.findall(r"#/\$defs/(\w+)", json.dumps(value)):
-                found |= names(definitions[target], definitions)
-        return found
-
-    schema = Scene.model_json_schema()
-    text = KARRECH + read_template("ballast")
-    lacks = [key for key in names(schema, schema["$defs"]) if not re.search(rf"\b{key}\b", text)]
-    assert lacks == []
+@pytest.mark.parametrize(
+    ("model", "names"),
+    [
+        (Scene, ["karrech", "ballast"]),
+        (QdemScene, ["cantilever"]),
+        (TrackTable, ["cantilever", "track-small"]),
+        (LineTables, ["line"]),
+    ],
+)
+def test_every_key_of_the_models_is_explained(model: type[Table], names: list[str]) -> None:
+    """The shipped scenes that specify a format name every key of its models."""
+    schema, text = model.model_json_schema(), "".join(map(read_template, names))
+    keys = {key for table in (schema, *schema["$defs"].values()) for key in table["properties"]}
+    assert [key for key in keys if not re.search(rf"\b{key}\b", text)] == []
 
 
 def test_engine_names_agree() -> None:

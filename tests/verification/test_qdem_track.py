@@ -31,7 +31,6 @@ from qdem_fem.track.loads.rail import Track, find_seat_share
 from qdem_fem.track.loads.train import Train
 from qdem_fem.track.recipe import BedRecipe, make_bed_grains
 from qdem_fem.track.sleeper_mesh import SleeperShape
-from qdem_fem.track.table import BogieTable, TrackTable
 from trackbed.command import main
 from trackbed.scene_files.grading import Grading
 from validation.bench.track_trials import SCENE, load_track
@@ -436,11 +435,3 @@ def test_scene_of_the_small_track_is_sound() -> None:
     assert isinstance(prepared, TrackPrepared)
     assert prepared.recipe.below + prepared.recipe.beside == 300
     assert prepared.scene.simulation.duration == pytest.approx(prepared.load.times[-1], abs=1e-3)
-
-
-def test_every_key_of_a_track_is_named_in_its_scene() -> None:
-    text = (Path(__file__).parents[2] / "trackbed" / "scenes" / "track-small.toml").read_text(
-        encoding="utf-8"
-    )
-    keys = [*TrackTable.model_fields, *BogieTable.model_fields]
-    assert [key for key in keys if key not in text] == []
