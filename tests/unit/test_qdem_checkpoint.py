@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 import qdem_fem as q
 from qdem_fem.files.errors import CheckpointError, DiskFull
 from qdem_fem.mesh.generation import make_box_mesh
+from tests.qdem_restored import go_on
 
 CELLS = (5, 2, 2)
 STEEL = {"young": 2e11, "poisson": 0.3, "density": 7800.0}
@@ -119,12 +120,7 @@ def test_state_of_periodic_bodies_in_the_middle(tmp_path: Path) -> None:
         run.load(body, 50, (0, 0, 100.0))
         return run
 
-    first, second = ring(), ring()
-    first.advance(1e-4)
-    first.save(tmp_path / "state.npz")
-    second.restore(tmp_path / "state.npz")
-    for run in (first, second):
-        run.advance(1e-4)
+    first, second = go_on(ring, tmp_path / "state.npz", 1e-4, 1e-4)
     assert abs(first.bodies[0].displacement).max() > 0
     assert state_of(first) == state_of(second)
 

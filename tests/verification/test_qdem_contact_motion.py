@@ -30,6 +30,7 @@ from qdem_fem.files.errors import (
 from qdem_fem.mesh.generation import make_box_mesh
 from qdem_fem.scene.build import make_simulation
 from qdem_fem.scene.checks import load_scene
+from tests.qdem_restored import go_on
 from tests.qdem_slopes import slope_gain
 
 STONE = q.Material(30e9, 0.2, 2700.0)
@@ -322,13 +323,8 @@ def test_a_skin_leaves_room_to_the_images_across_the_width() -> None:
 
 def test_a_saved_run_goes_on_to_the_same_bits(tmp_path: Path) -> None:
     """History, list and losses are in the checkpoint; another contact's is refused."""
-    whole, half, again = grinding(), grinding(), grinding()
-    for run in (whole, half):
-        run.advance(80 * run.step)
-    half.save(tmp_path / "state.npz")
-    again.restore(tmp_path / "state.npz")
-    for run in (whole, again):
-        run.advance(80 * run.step)
+    half = 80 * grinding().step
+    whole, again = go_on(grinding, tmp_path / "state.npz", half, half)
     assert state_of(again) == state_of(whole)
     assert whole.energy().friction > 0
     with pytest.raises(CheckpointError, match="contact differ"):

@@ -29,6 +29,7 @@ from qdem_fem.files.errors import (
 from qdem_fem.mesh.generation import make_box_mesh
 from qdem_fem.scene.build import make_simulation
 from qdem_fem.scene.checks import load_scene
+from tests.qdem_restored import go_on
 from tests.qdem_slopes import slope_gain
 from trackbed import command
 
@@ -539,17 +540,7 @@ def test_resume_goes_on_to_the_same_bits(tmp_path: Path) -> None:
         run.load(run.bodies[0], [3], q.make_ramp(1e-4, [5.0, 1, 2]))
         return run
 
-    whole, first, second = made(), made(), made()
-    for run in (whole, first):
-        run.advance(4e-5)
-    first.save(tmp_path / "state.npz")
-    second.restore(tmp_path / "state.npz")
-    for run in (whole, second):
-        run.advance(4e-5)
-    for name in ("displacement", "velocity"):
-        assert (getattr(whole.bodies[0], name) == getattr(second.bodies[0], name)).all()
-        assert (getattr(whole.bodies[1], name) == getattr(second.bodies[1], name)).all()
-    assert whole.energy() == second.energy()
+    go_on(made, tmp_path / "state.npz", 4e-5, 4e-5)
     with pytest.raises(CheckpointError, match="rigid"):
         made(("lumped", False)).restore(tmp_path / "state.npz")
 
