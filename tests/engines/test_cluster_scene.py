@@ -121,9 +121,7 @@ def test_small_on_two_processes(engine: str, tmp_path: Path) -> None:
 
 @pytest.mark.engine("liggghts")
 @pytest.mark.skipif(shutil.which("mpirun") is None, reason="mpirun is not installed")
-def test_srun_takes_the_number_of_processes_from_the_job(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_srun_takes_the_number_of_processes_from_the_job(tmp_path, monkeypatch) -> None:
     """The scene's own launcher: one word before the command; here a stand-in for SLURM's."""
     srun = tmp_path / "srun"
     words = " ".join(("mpirun", *YIELDING))

@@ -47,9 +47,7 @@ WIGGLED = own_decks.LAMMPS.replace(
 
 @pytest.mark.long
 @pytest.mark.engine("lammps")
-def test_the_check_sees_what_a_cut_loses(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_check_sees_what_a_cut_loses(tmp_path, capsys) -> None:
     """A floor that starts its wave again is another floor, and is refused before that is run."""
     bed = Adopted(read_deck(write_deck(tmp_path, WIGGLED)), "lammps")
     assert not check_cut(bed, tmp_path, cycles=1).agrees

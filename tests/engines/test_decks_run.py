@@ -54,9 +54,7 @@ def step_moved(bed: Adopted, folder: Path, shift: np.ndarray = SHIFT) -> tuple[S
     pytest.param("lammps", own_decks.LAMMPS.partition(BEGIN)[0] + STEP,
                  marks=pytest.mark.engine("lammps")),
 ], ids=["spheres and plate", "stones", "lammps"])  # fmt: skip
-def test_the_engine_goes_on_from_where_grains_were_put(
-    engine: str, text: str, tmp_path: Path
-) -> None:
+def test_the_engine_goes_on_from_where_grains_were_put(engine: str, text: str, tmp_path) -> None:
     """From rest a step of 2e-5 s carries none further than a dt^2, 4e-6 m under a thousand weights.
     Bodies take their spheres with them; the plate is where it was put, to round-off."""
     bed = load_deck_scene(adopt(write_deck(tmp_path, text), engine).scene, [
@@ -78,9 +76,7 @@ def test_the_engine_goes_on_from_where_grains_were_put(
     pytest.param("lammps", own_decks.LAMMPS.partition(BEGIN)[0] + STEP,
                  marks=pytest.mark.engine("lammps")),
 ])  # fmt: skip
-def test_a_periodic_bed_is_the_same_wherever_it_is_put(
-    engine: str, text: str, tmp_path: Path
-) -> None:
+def test_a_periodic_bed_is_the_same_wherever_it_is_put(engine: str, text: str, tmp_path) -> None:
     """Moved by half a period, and over the side, all grains go on as from where they were: from
     rest, a step carries none further than a thousand weights do, and no period is lost."""
     text = text.replace("boundary f f f", "boundary p p f").replace(

@@ -96,9 +96,7 @@ def test_clumps_are_moved_with_their_members_and_springs(tmp_path: Path) -> None
 KEYS = {"total_cycles": 30, "k_i": 6, "k": 4, "h": 5, "healing_cycles": 2, "settlement": '"law"'}
 
 
-def test_a_script_is_run_with_jumps_and_a_full_run_beside_it(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_script_is_run_with_jumps_and_a_full_run_beside_it(tmp_path, capsys) -> None:
     """Every cycle is computed or jumped once, and what is done is not done again."""
     scene = adopt(write_script(tmp_path), "yade").scene
     words = [word for key, value in KEYS.items() for word in ("--set", f"procedure.{key}={value}")]
@@ -124,9 +122,7 @@ def test_a_script_is_run_with_jumps_and_a_full_run_beside_it(
     ("plate = O.b", "O.bodies.append(box((1, 1, 1), (1, 1, 1)))\nO.bodies[-1].dynamic = True\n"
      "plate = O.b", "a Box, moves by itself"),
 ])  # fmt: skip
-def test_what_no_window_can_have_is_named(
-    old: str, new: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_no_window_can_have_is_named(old: str, new: str, said: str, tmp_path, capsys) -> None:
     """Before a window computes another bed, with the name and what to do; exit code 5."""
     text = own_decks.YADE.replace("O.run(20000)", "O.run(20)").replace(END, f"packed\n{END}")
     text = text.replace("packed\n", "" if "packed" not in new else "packed\n")

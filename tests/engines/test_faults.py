@@ -93,9 +93,7 @@ def test_what_an_engine_leaves_is_judged(
 
 
 @pytest.mark.long
-def test_absurd_time_step_is_not_credible(
-    sample: Sample, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_absurd_time_step_is_not_credible(sample: Sample, tmp_path, monkeypatch) -> None:
     """Fifty Rayleigh times a step: whatever the engine makes of it ends in a typed error."""
     sample.need_process()
     monkeypatch.setattr(Scene, "time_step", 50 * sample.scene.rayleigh_time)
@@ -114,9 +112,7 @@ STARTED = "while ! test -s screen.txt; do sleep 0.01; done; sleep 0.05"
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
 @pytest.mark.long
-def test_engine_killed(
-    sample: Sample, tmp_path: Path, capsys: pytest.CaptureFixture[str], number: signal.Signals
-) -> None:
+def test_engine_killed(sample: Sample, tmp_path, capsys, number: signal.Signals) -> None:
     """An engine that someone else ends is named; nothing before it is lost, no jump is blamed."""
     sample.need_process()
     run = sample.copy(tmp_path / "run", AFTER)
@@ -150,9 +146,7 @@ def test_full_disk(sample: Sample, tmp_path: Path, capsys: pytest.CaptureFixture
 
 @pytest.mark.engine("yade")
 @pytest.mark.parametrize("sample", ["yade"], indirect=True)
-def test_disk_with_too_little_room_for_a_saved_scene(
-    sample: Sample, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_disk_with_too_little_room_for_a_saved_scene(sample: Sample, tmp_path, capsys) -> None:
     """YADE would write on a full disk for ever: its script asks for the room before.
 
     200 KiB are enough for each dump, and not for what is asked.

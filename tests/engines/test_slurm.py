@@ -163,9 +163,7 @@ JOB = """\
 @pytest.mark.parametrize(("engine", "mpi"), [("liggghts", "pmix"), ("lammps", "pmi2")])
 @pytest.mark.engine("liggghts")
 @pytest.mark.engine("lammps")
-def test_srun_starts_the_engine(
-    engine: str, mpi: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_srun_starts_the_engine(engine: str, mpi: str, tmp_path, monkeypatch) -> None:
     """The cluster's scene, small, as a batch job of two tasks: srun takes their number from it."""
     settings = [
         *(one for one in SMALL if "frequency" not in one), f'engine.name="{engine}"',

@@ -38,9 +38,7 @@ def test_an_error_says_what_where_and_what_to_do() -> None:
 
 
 @pytest.mark.parametrize("verb", DOORS)
-def test_a_missing_scene_reads_alike_at_every_door(
-    verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_missing_scene_reads_alike_at_every_door(verb: str, tmp_path, capsys) -> None:
     """No file: exit code 2 and the file's name first, at every door."""
     path = tmp_path / "none.toml"
     assert main([verb, str(path)]) == 2
@@ -78,9 +76,7 @@ def test_a_wrong_scene_reads_alike_at_every_door(
 
 
 @pytest.mark.parametrize("verb", DOORS)
-def test_an_override_that_is_none_reads_alike_at_every_door(
-    verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_override_that_is_none_reads_alike_at_every_door(verb: str, tmp_path, capsys) -> None:
     """``--set`` without a key: exit code 2 and how to write one."""
     path = tmp_path / "scene.toml"
     path.write_text('title = "one"\n')

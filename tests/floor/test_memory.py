@@ -45,9 +45,7 @@ def test_packed_arrays_are_measured_before_they_are_unpacked(
         read(path)
 
 
-def test_a_record_that_is_too_long_can_not_be_read(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_record_that_is_too_long_can_not_be_read(tmp_path, monkeypatch) -> None:
     """Objects of Python take many times the bytes of JSON."""
     (tmp_path / "a.json").write_text('{"a": 1}')
     assert read_object(tmp_path / "a.json") == {"a": 1}
@@ -56,9 +54,7 @@ def test_a_record_that_is_too_long_can_not_be_read(
 
 
 @pytest.mark.parametrize("key", ["sample.count=100000000", "procedure.k_i=99999999"])
-def test_a_run_that_is_too_large_is_refused(
-    key: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_run_that_is_too_large_is_refused(key: str, tmp_path, capsys) -> None:
     """With the memory that it would need; exit code 5, and nothing is written."""
     (tmp_path / "scene.toml").write_text(small_bed(k=4, h=8, total_cycles=10**8))
     assert main(["run", str(tmp_path / "scene.toml"), "--set", key]) == 5

@@ -96,9 +96,7 @@ def test_what_has_no_end_is_refused(tmp_path: Path) -> None:
         refuse_links(tmp_path)
 
 
-def test_a_lock_that_becomes_a_link_is_not_followed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_lock_that_becomes_a_link_is_not_followed(tmp_path, monkeypatch) -> None:
     """Even where the link was put there behind the look for links."""
     (tmp_path / "mine").write_text("mine")
     (tmp_path / "run").mkdir()
@@ -109,9 +107,7 @@ def test_a_lock_that_becomes_a_link_is_not_followed(
     assert (tmp_path / "mine").read_text() == "mine"
 
 
-def test_a_disk_without_locks_is_not_another_writer(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_disk_without_locks_is_not_another_writer(tmp_path, monkeypatch) -> None:
     """ENOLCK, as some network disks answer, has a sentence of its own."""
 
     def refuse(*_: object) -> None:
@@ -189,9 +185,7 @@ def test_no_file_is_written_through_a_link(tmp_path: Path) -> None:
     assert (tmp_path / "mine").read_text() == "mine"
 
 
-def test_a_seal_is_the_digest_of_what_is_on_the_disk(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_seal_is_the_digest_of_what_is_on_the_disk(tmp_path, monkeypatch) -> None:
     """SHA-256, and the file is given to the disk first."""
     synced = []
     monkeypatch.setattr(os, "fsync", synced.append)

@@ -32,9 +32,7 @@ def folder_of(kind: str, path: Path) -> Path:
 
 
 @pytest.mark.parametrize("kind", SCENES)
-def test_status_tells_how_far_a_run_is(
-    kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_status_tells_how_far_a_run_is(kind: str, tmp_path, capsys) -> None:
     """Stopped, running, finished, and what to do next, in the words of the command."""
     folder = folder_of(kind, tmp_path / "run")
     assert main(["status", str(folder), "--json"]) == 0
@@ -52,9 +50,7 @@ def test_status_tells_how_far_a_run_is(
 
 
 @pytest.mark.parametrize("kind", SCENES)
-def test_a_changed_table_of_a_finished_run_is_named(
-    kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_changed_table_of_a_finished_run_is_named(kind: str, tmp_path, capsys) -> None:
     """By status and report, whether a digit was changed or the file is gone; a result that names
     what is no table, or other folders' files, is no harm."""
     folder = folder_of(kind, tmp_path / "run")
@@ -96,9 +92,7 @@ def test_what_a_story_has_no_verb_for_is_a_sentence(
 
 
 @pytest.mark.parametrize("words", [["status"], ["report"], ["export", "--to", "csv"], ["resume"]])
-def test_links_are_refused_by_every_verb(
-    words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_links_are_refused_by_every_verb(words: list[str], tmp_path, capsys) -> None:
     """What would be written to ``export`` or ``figures`` would follow a link out of the folder."""
     (tmp_path / "mine").mkdir()
     for name in ("export", "figures"):
@@ -110,9 +104,7 @@ def test_links_are_refused_by_every_verb(
 
 
 @pytest.mark.parametrize("kind", SCENES)
-def test_report_of_a_finished_run_is_shown(
-    kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_report_of_a_finished_run_is_shown(kind: str, tmp_path, capsys) -> None:
     """Its path."""
     folder = folder_of(kind, tmp_path / "run")
     (folder / "result.json").write_text('{"time": 0.5}')

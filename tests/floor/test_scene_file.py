@@ -197,9 +197,7 @@ def test_nearest_word_is_suggested(word: str, said: str) -> None:
 
 @pytest.mark.parametrize("name", ["karrech-coarse", "cantilever-vibration", "pile", "line"])
 @pytest.mark.parametrize("verb", ["run", "qdem", "rigid", "line"])
-def test_a_scene_names_its_verb(
-    tmp_path: Path, name: str, verb: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_scene_names_its_verb(tmp_path, name: str, verb: str, capsys) -> None:
     """Given to another verb: exit code 3 and the command to give, no list of unknown keys."""
     own = find_scene_verb(name)
     if verb == own:

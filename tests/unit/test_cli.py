@@ -136,10 +136,7 @@ def wrap(error: BaseException) -> BaseException:
         (wrap(errors.UsageError("this is no whole file")), 130),
     ],
 )
-def test_exit_codes(
-    error: BaseException, code: int,
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
+def test_exit_codes(error: BaseException, code: int, monkeypatch, capsys) -> None:
     """Every kind of error has its exit code; only an unknown one is called a bug."""
 
     def fails(_arguments: object) -> int:
@@ -156,9 +153,7 @@ def test_exit_codes(
 
 
 @pytest.mark.parametrize("begins", [True, False])
-def test_an_interrupt_that_python_drops_ends_the_command(
-    begins: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_interrupt_that_python_drops_ends_the_command(begins: bool, monkeypatch, capsys) -> None:
     """What is raised in a finaliser is printed and dropped: Ctrl-C there counts all the same."""
     after: list[str] = []
     before = signal.getsignal(signal.SIGINT)  # ignored in a job that a shell put behind
@@ -306,9 +301,7 @@ def test_validate_lists_cases(capsys: pytest.CaptureFixture[str]) -> None:
     assert subprocess.run(module, cwd=ROOT, capture_output=True, text=True).stdout == text
 
 
-def test_a_study_is_judged_by_its_record(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_study_is_judged_by_its_record(tmp_path, monkeypatch, capsys) -> None:
     """Rows of ``record.jsonl`` to the study's ``check_bars``; a line cut off by a kill is none."""
     from validation import studies, study
 

@@ -218,9 +218,7 @@ def test_no_try_is_shorter_than_a_cycle(bed: Bed, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("ratio", "calm"), [(9.5, True), (10.5, False)])
-def test_calm_is_ten_times_the_energy_before(
-    ratio: float, calm: bool, bed: Bed, tmp_path: Path
-) -> None:
+def test_calm_is_ten_times_the_energy_before(ratio: float, calm: bool, bed: Bed, tmp_path) -> None:
     """Of cycle ends behind the healing; the first of it, five times as fast, is no measure."""
     bed.thrown, bed.speed = 0.0, float(np.sqrt(ratio))
     assert (("j", 9, 19) in list_spans(settle(tmp_path, total_cycles=30))) is calm
@@ -267,9 +265,7 @@ def test_a_bed_without_a_loaded_body_has_its_mean_grain(bed: Bed, tmp_path: Path
     assert said[0].startswith("mean grain settles 614 um; 30 of 60 cycles computed")
 
 
-def test_a_deck_that_was_never_checked_is_named(
-    bed: Bed, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_deck_that_was_never_checked_is_named(bed: Bed, tmp_path, capsys) -> None:
     settle(tmp_path, total_cycles=6)
     said = capsys.readouterr().err
     assert "never checked that windows compute its bed" in said

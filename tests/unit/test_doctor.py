@@ -77,9 +77,7 @@ def test_text_names_everything(program, tmp_path: Path, capsys: pytest.CaptureFi
     assert set(os.listdir(tmp_path)) == before
 
 
-def test_missing_library(
-    program, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_missing_library(program, monkeypatch, capsys) -> None:
     """A missing library is named with its install command."""
     program(BANNER)
     real = metadata.version

@@ -36,9 +36,7 @@ def test_start_up_is_cpu_time(name: str, text: str, cpu_s: float, start_up: floa
     assert engine.find_start_up(cpu_s, "Step\n" + text + "COMPLETE step 9\n") == start_up
 
 
-def test_a_file_that_an_engine_removes_is_no_fault(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_file_that_an_engine_removes_is_no_fault(tmp_path, monkeypatch) -> None:
     """Between the list of a folder and the look at its files one may go: YADE's start does."""
     for name, changed in (("gone", 9e9), ("stays", 1e9)):
         (tmp_path / name).touch()

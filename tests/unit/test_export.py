@@ -320,9 +320,7 @@ def test_default_folder_is_no_run(scene_file: Path, tmp_path: Path) -> None:
         (["--to", "vtu", "--variant", "contrl"], "no run contrl"),
     ],
 )
-def test_refusals(
-    run: Path, words: list[str], said: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_refusals(run: Path, words: list[str], said: str, capsys) -> None:
     """Wrong use is exit code 2 and a sentence."""
     assert command.main(["export", str(run), *words]) == 2
     assert said in capsys.readouterr().err

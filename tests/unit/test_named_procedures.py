@@ -81,9 +81,7 @@ def test_growing_jumps_leave_room_for_the_windows_given(total: int, k: int, heal
     assert len(jumps) == len(found.h or ())
 
 
-def test_a_tolerance_is_its_own_procedure(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_tolerance_is_its_own_procedure(tmp_path, capsys) -> None:
     """Beside a name it takes its place, without one and without k_i it is one; the flags together
     are refused.  A name that is none, and cycles that are missing, are the one problem named."""
     found = load("procedure.name=growing", "procedure.tolerance=0.05")
@@ -117,9 +115,7 @@ def test_a_named_run_is_extended_without_computing_its_start_again(tmp_path: Pat
 
 
 @pytest.mark.parametrize("name", [*PROCEDURES])
-def test_a_named_run_ends_at_its_last_cycle(
-    tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_named_run_ends_at_its_last_cycle(tmp_path, name: str, capsys) -> None:
     """Against u = a ln(1 + N) to cycle 300, within 2 %; and the run says its procedure's name."""
     run = tmp_path / "run"
     words = ["run", str(COARSE), "--procedure", name, "--cycles", "300", "--run-folder", str(run)]

@@ -282,9 +282,7 @@ def test_scenes_of_decks_are_checked(override: str, said: str, tmp_path: Path) -
         load_deck_scene(tmp_path / "mybed" / "scene.toml", [override])
 
 
-def test_what_runs_of_decks_do_not_do_is_said(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_runs_of_decks_do_not_do_is_said(tmp_path, capsys) -> None:
     """A sentence and a way on, before anything is run."""
     scene = adopt(write_deck(tmp_path), "liggghts").scene
     for words, said in ((["--dry-run"], "--check runs two"), (["--members", "3"], "members")):
@@ -488,9 +486,7 @@ def test_a_file_outside_of_the_folder_is_refused_and_kept(name: str, tmp_path: P
     assert (tmp_path / "w.in").read_text() == "# mine\n"
 
 
-def test_a_file_that_the_deck_writes_over_stays(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_file_that_the_deck_writes_over_stays(tmp_path, monkeypatch) -> None:
     """An old table beside the deck is lent; what the engine writes in its place is no loan."""
     path = write_deck(make_folder(tmp_path), cut("fix p all print 1 x file hist.txt"))
     (path.parent / "hist.txt").write_text("old")
@@ -516,9 +512,7 @@ def test_a_file_that_the_deck_writes_over_stays(
     [("# Trackbed: Cycle", "is no mark"), ("# trackbed: cycle (my load)", "is no mark"),
      ('"', "a quote is not closed")],
 )  # fmt: skip
-def test_what_is_nearly_a_mark_or_a_command_is_a_sentence(
-    line: str, said: str, tmp_path: Path
-) -> None:
+def test_what_is_nearly_a_mark_or_a_command_is_a_sentence(line: str, said: str, tmp_path) -> None:
     with pytest.raises(UsageError, match=said):
         read_text(tmp_path, cut(line))
 

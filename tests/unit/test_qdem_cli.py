@@ -181,9 +181,7 @@ def test_frequency_of_the_run_is_that_of_its_own_matrices(scene: Path) -> None:
 
 @pytest.mark.long
 @pytest.mark.parametrize("share", [0.0, 0.13, 0.5, 0.97])
-def test_interrupted_run_goes_on_to_the_same_bits(
-    scene: Path, monkeypatch: pytest.MonkeyPatch, share: float
-) -> None:
+def test_interrupted_run_goes_on_to_the_same_bits(scene: Path, monkeypatch, share: float) -> None:
     """SIGTERM saves the state (exit 130); --resume ends with every byte of an uninterrupted run."""
     whole, parts = scene.with_name("whole"), scene.with_name("parts")
     command(scene, "--run-folder", whole, "--no-pictures")
@@ -343,9 +341,7 @@ def test_warnings_of_what_comes_before_the_run_are_sentences(
     assert not [line for line in lines if ".py" in line]
 
 
-def test_progress_lines_go_to_standard_error(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_progress_lines_go_to_standard_error(capsys, monkeypatch) -> None:
     """A plain line every ten seconds, with the time left."""
     clock = iter([0.0, 1.0, 5.0, 12.0, 13.0])
     monkeypatch.setattr(time, "monotonic", lambda: next(clock))
@@ -406,9 +402,7 @@ def test_doubts_reach_the_terminal_the_report_and_json(
     assert words in (folder / "report.html").read_text()
 
 
-def test_no_frequency_from_less_than_two_periods(
-    scene: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_no_frequency_from_less_than_two_periods(scene: Path, capsys) -> None:
     """3 ms of free motion of a bar that bends at 100 Hz, as Euler and Bernoulli have it."""
     options = ["--json", "--no-pictures", "--run-folder", str(scene.parent / "out")]
     for key in ("simulation.duration", "output.vtu_interval"):

@@ -112,9 +112,7 @@ def test_page_shows_the_numbers_of_the_json(finished: Path) -> None:
     assert len(wanted) > 30
 
 
-def test_status_ends_with_what_came_out(
-    finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_status_ends_with_what_came_out(finished: Path, tmp_path, capsys) -> None:
     """``trackbed status`` says by units what report.json says; --json keeps its keys."""
     numbers = json.loads((finished / "report.json").read_text())
     run = next(row for row in numbers["error_rows"] if row["name"] == "this run")

@@ -52,9 +52,7 @@ def test_a_run_goes_on_from_its_last_sound_frame_to_the_same_end(scene: Path) ->
     np.testing.assert_array_equal(again["motion"].rates, last["motion"].rates)
 
 
-def test_another_scene_needs_force(
-    scene: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_another_scene_needs_force(scene: Path, capsys, monkeypatch) -> None:
     """The folder is looked at before anything is compiled."""
     run = ["rigid", str(scene), "--no-pictures"]
     assert command.main(run) == 0

@@ -174,9 +174,7 @@ CUBE = [[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]
 
 
 @pytest.mark.parametrize("more", [[0.5, 0.5, 0.5], [0.5, 0.5, 0], [0.5, 0, 0]])
-def test_vertices_of_another_body_than_their_hull_are_refused(
-    tmp_path: Path, more: list[float]
-) -> None:
+def test_vertices_of_another_body_than_their_hull_are_refused(tmp_path, more: list[float]) -> None:
     """In space as in the plane: inside it, in a face, on an edge."""
     text = SMALL.replace("= 2\n", "= 3\n").replace("[0, 1]", "[0, 0, 1]")
     text = text.replace("[0.0, 0.05]", "[0, 0, 1]")

@@ -351,9 +351,7 @@ SAFE_TO_COMBINE = [
 
 @settings(max_examples=60, deadline=None)
 @given(chosen=st.lists(st.sampled_from(SAFE_TO_COMBINE), min_size=1, unique=True))
-def test_all_problems_at_once(
-    tmp_path_factory: pytest.TempPathFactory, chosen: list[tuple[str, str]]
-) -> None:
+def test_all_problems_at_once(tmp_path_factory, chosen: list[tuple[str, str]]) -> None:
     """Any set of wrong keys is reported whole, each at its own line, and nothing else."""
     folder = tmp_path_factory.mktemp("scene")
     text, expected = KARRECH, set()

@@ -138,9 +138,7 @@ def test_what_a_member_said(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("missing", ["distributed", "pyarrow", "dask_jobqueue"])
-def test_a_missing_library_is_told_before_anything_starts(
-    missing: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_missing_library_is_told_before_anything_starts(missing: str, monkeypatch) -> None:
     """Exit code 4 and how to get it; dask-jobqueue is asked for only where SLURM is."""
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == missing else 1)
     with pytest.raises(EngineMissing, match=rf"{missing}\n.*trackbed\[sweep\]"):

@@ -91,9 +91,7 @@ def test_a_script_without_marks_gets_them(text: str, marked: list[str], tmp_path
     ("bed.py", "O.run(5", "no script of YADE"),
     ("in.bed", "O.run(5)", "end with .py"),
 ])  # fmt: skip
-def test_scripts_that_can_not_be_cut_are_refused(
-    name: str, text: str, said: str, tmp_path: Path
-) -> None:
+def test_scripts_that_can_not_be_cut_are_refused(name: str, text: str, said: str, tmp_path) -> None:
     """With the place; nothing is written."""
     (tmp_path / name).write_text(text)
     with pytest.raises(UsageError, match=said):

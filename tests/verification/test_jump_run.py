@@ -92,9 +92,7 @@ def test_to_the_end_with_its_control(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("jumps", ["procedure.h=8", "procedure.tolerance=0.02"])
-def test_a_finished_run_is_extended(
-    jumps: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_finished_run_is_extended(jumps: str, tmp_path, capsys) -> None:
     """Its table is that of a run which was asked for so many cycles from the start, its control's
     too; what is left of its old end is kept apart.  It is not shortened."""
     scene = tmp_path / "scene.toml"
@@ -154,9 +152,7 @@ def test_load_step_is_taken_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert "taken back" in describe_control(read_run_record(tmp_path / "run"))
 
 
-def test_collapse_is_refused_with_its_code(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_collapse_is_refused_with_its_code(tmp_path, monkeypatch, capsys) -> None:
     """Exit code 6 and what to do; ``resume --cycle-by-cycle`` goes on to the end, for good."""
     monkeypatch.setattr(engine_fake, "BED", FakeBed(lambda n: 0.005 * CURVES["collapse"](n)))
     scene = small(tmp_path, 200)

@@ -204,9 +204,7 @@ def test_few_seating_cycles_beside_a_large_k_i_leave_cycles_to_forecast_from(
         settle(tmp_path / "no", monkeypatch, (1, 2), "procedure.seating_cycles=82", *FIXED, WAITS)
 
 
-def test_a_piston_that_hangs_again_is_waited_for_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_piston_that_hangs_again_is_waited_for_again(tmp_path, monkeypatch) -> None:
     """Jumps of 10 from 15; hung in cycles 45 to 47: no jump before cycle 62.  A run that is asked
     to go on finds its stages, and decides as before, whatever came later."""
     keys = ("procedure.h=10", "procedure.healing_cycles=2", "procedure.total_cycles=99", WAITS)
@@ -218,9 +216,7 @@ def test_a_piston_that_hangs_again_is_waited_for_again(
     assert again[:2] == (jumps, rows)
 
 
-def test_a_piston_that_hangs_to_the_end_has_every_cycle_computed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_piston_that_hangs_to_the_end_has_every_cycle_computed(tmp_path, monkeypatch) -> None:
     """No jump, and the closed form's settlement exactly."""
     jumps, rows, _ = settle(tmp_path / "run", monkeypatch, (1, 99), *FIXED, WAITS)
     assert not jumps
@@ -229,9 +225,7 @@ def test_a_piston_that_hangs_to_the_end_has_every_cycle_computed(
     )
 
 
-def test_history_begins_where_the_bed_carries_its_piston(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_history_begins_where_the_bed_carries_its_piston(tmp_path, monkeypatch) -> None:
     """A bed that takes the load from cycle 23 on, u = a ln(1 + N - 23).  Nothing of the cycles
     until then is known to the jump: those of 25 to 40 are, counted from 23, and the gain
     a ln(53 / 18) follows, to the 5 % that ln N differs from ln(1 + N); counted from the first
@@ -296,9 +290,7 @@ def test_self_chosen_jumps_wait_too(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert all(not 64 <= cycle < 94 for cycle in first["waits"])
 
 
-def test_a_piston_that_creeps_while_it_hangs_is_no_ratcheting_bed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_piston_that_creeps_while_it_hangs_is_no_ratcheting_bed(tmp_path, monkeypatch) -> None:
     """It sinks by 1 um a cycle from 40 to 80, hung, and the bed goes by its logarithm before and
     behind.  The run waits; nothing of those cycles is left among what the jumps behind are
     decided from, so that the rate goes as 1/N (beta within .1 of zero)."""
@@ -314,9 +306,7 @@ def test_a_piston_that_creeps_while_it_hangs_is_no_ratcheting_bed(
     assert all(not 40 < one.first_cycle < 100 for one in jumps)
 
 
-def test_a_control_shares_the_cycles_that_were_waited_for(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_control_shares_the_cycles_that_were_waited_for(tmp_path, monkeypatch) -> None:
     """Hung until 23, jump from 40: the control computes from there, and its first 40 cycles are
     the procedure's."""
     settle(tmp_path / "run", monkeypatch, (1, 23), *FIXED, WAITS, control=True)

@@ -159,9 +159,7 @@ def test_interrupt_is_no_damaged_file(tmp_path: Path, monkeypatch: pytest.Monkey
     assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL  # given back
 
 
-def test_two_writers(
-    commands: Commands, whole: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_two_writers(commands: Commands, whole: bytes, tmp_path, capsys) -> None:
     """The second writer is refused with the first one's pid; the first is not disturbed."""
     run = tmp_path / "run"
     pid = commands.start(*resume(commands, run), slow=SLOW)

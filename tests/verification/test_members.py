@@ -156,9 +156,7 @@ def test_what_is_left_is_gone_on_with(finished: Path, copy: Path) -> None:
 
 
 @pytest.mark.long
-def test_members_later_and_longer(
-    tmp_path: Path, finished: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_members_later_and_longer(tmp_path, finished: Path, capsys) -> None:
     """A run without members is bit for bit the first of several, and gets members when asked; they
     are extended with it, as if it had been longer from the start, and none alone."""
     run = run_scene(tmp_path, members="1")

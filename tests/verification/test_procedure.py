@@ -74,9 +74,7 @@ def test_flow_chart(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("total", [24, 15, 14, 60])
-def test_a_dry_run_tells_the_plan_that_the_run_follows(
-    total: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_dry_run_tells_the_plan_that_the_run_follows(total: int, tmp_path, capsys) -> None:
     """Jumps, cycles computed and cost; a run without room for a jump says so before it starts."""
     scene = tmp_path / "scene.toml"
     scene.write_text(small_bed(k=2, h=8, total_cycles=total))
@@ -162,9 +160,7 @@ def drop(before: State, target: FloatArray) -> float:
     return float((before.position - target)[:, 2].mean())
 
 
-def test_piston_waits_where_grains_have_no_room_below_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_piston_waits_where_grains_have_no_room_below_it(tmp_path, monkeypatch) -> None:
     """A given settlement with no room under a piston that goes down: the bed is relaxed under the
     old one, settles by its gain all the same, and the piston comes to lie on it."""
     no_room(monkeypatch, lambda before, target, height: height < before.piston_height)
@@ -181,9 +177,7 @@ def test_piston_waits_where_grains_have_no_room_below_it(
     assert relaxed.piston_height == min(top, before.piston_height)
 
 
-def test_what_a_bed_has_no_room_for_is_left_to_the_next_jump(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_a_bed_has_no_room_for_is_left_to_the_next_jump(tmp_path, monkeypatch) -> None:
     """u = a ln(1 + N) and jumps by history of 20 and 15 cycles, of which the first may move by no
     more than 6 um: a ln(61 / 41) = 7.9 um is halved.  The next is asked for a ln(101 / 86) and for
     that half; a differs by 2 % from N in place of 1 + N."""
@@ -262,9 +256,7 @@ def test_room_that_jumps_found() -> None:
         assert 1e6 * find_known_room(jumps, one.last_cycle) == pytest.approx(room)
 
 
-def test_a_jump_of_no_settlement_is_tried_with_less_of_its_move(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_jump_of_no_settlement_is_tried_with_less_of_its_move(tmp_path, monkeypatch) -> None:
     """History asks the first jump for nothing, and what its grains move beside one another has no
     room: tried with less and less of that, the run goes on from where they were."""
     no_room(
@@ -280,9 +272,7 @@ def test_a_jump_of_no_settlement_is_tried_with_less_of_its_move(
 
 
 @pytest.mark.long
-def test_a_jammed_bed_is_moved_by_what_it_has_room_for(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_jammed_bed_is_moved_by_what_it_has_room_for(tmp_path, monkeypatch) -> None:
     """No move of more than 2 um has room, where 8, 4 and less are asked for: every jump but the
     first ones moves the bed, and by no less than half of that from then on."""
     no_room(monkeypatch, lambda before, target, _: drop(before, target) > 2e-6)

@@ -224,9 +224,7 @@ def test_a_saved_flight_goes_on_to_the_same_bits(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("precision", ["float64", "float32"])
-def test_a_bodys_field_is_its_part_of_all_and_reads_no_more(
-    precision: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_bodys_field_is_its_part_of_all_and_reads_no_more(precision: Any, monkeypatch) -> None:
     mesh = make_box_mesh((0.1, 0.1, 0.1), (1, 1, 1))
     bodies = [q.Body(mesh, q.Material(1e9, 0.2, 2e3), name=name) for name in "abc"]
     run = q.Simulation(bodies, precision=precision, threads=1)

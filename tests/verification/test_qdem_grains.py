@@ -337,9 +337,7 @@ def test_command_makes_grains_between_two_sieves(tmp_path: Path) -> None:
         (["--sizes", "0.05", "0.04"], "no grading curve"),
     ],
 )
-def test_command_refuses_in_a_sentence(
-    words: list[str], sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_command_refuses_in_a_sentence(words: list[str], sentence: str, tmp_path, capsys) -> None:
     assert main(["grains", *words, "--out", str(tmp_path / "g.npz")]) == 3
     assert sentence in capsys.readouterr().err
     assert not list(tmp_path.iterdir())

@@ -49,9 +49,7 @@ three = st.tuples(*[st.floats(-50, 50)] * 3)
 
 @settings(max_examples=25, deadline=None)
 @given(three, three)
-def test_energy_and_momentum_of_a_rigid_brick(
-    tmp_path_factory: pytest.TempPathFactory, velocity: Any, spin: Any
-) -> None:
+def test_energy_and_momentum_of_a_rigid_brick(tmp_path_factory, velocity: Any, spin: Any) -> None:
     """``m v^2/2 + sum I_i omega_i^2/2``, ``I_i = m (a^2 + b^2)/12``: about its centre."""
     folder = tmp_path_factory.mktemp("scene")
     run, _ = loaded(folder, velocity, spin, "body.0.rigid=true")

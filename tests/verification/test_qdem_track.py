@@ -158,9 +158,7 @@ def test_grains_that_fall_in_a_column_do_not_stand_as_a_tower() -> None:
 
 @pytest.mark.long
 @pytest.mark.parametrize("slow", [2, 100])
-def test_what_rings_while_the_sum_of_all_grows_is_stopped_by_itself(
-    slow: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_rings_while_the_sum_of_all_grows_is_stopped_by_itself(slow: int, monkeypatch) -> None:
     """A cube falls, so all together have no peak; the other rings on its springs with a third of
     what bears it, and goes on for ever, unless bodies are stopped one by one now and then."""
     numbers = replace(kinetic_damping.KINETIC, slow_after=slow, looks=200)

@@ -90,9 +90,7 @@ def test_a_block_that_slides_finds_no_rest(bed: Bed, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("rigid", [False, True])
-def test_a_bed_is_run_in_until_it_bears(
-    rigid: bool, bed: Bed, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_bed_is_run_in_until_it_bears(rigid: bool, bed: Bed, tmp_path, monkeypatch) -> None:
     """What a pulse leaves is where the next begins; a file from before there were any goes on.  A
     pulse that leaves much is refused behind the last that is allowed."""
     path, left = tmp_path / "bed.npz", [SUNK, BORNE, SUNK, SUNK]

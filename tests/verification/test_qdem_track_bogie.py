@@ -137,9 +137,7 @@ def test_a_bogie_as_near_as_may_be_has_all_of_its_load(tmp_path: Path) -> None:
     assert np.interp(RISE, time, force) == pytest.approx(expected, rel=1e-3)
 
 
-def test_a_run_that_ends_before_the_bogie_has_passed_says_so(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_run_that_ends_before_the_bogie_has_passed_says_so(tmp_path, capsys) -> None:
     """(2 x 1 m + 2.1 m)/(32 m/s) = 0.128 s."""
     load_of(tmp_path, "lead = 1.0")
     words = ["qdem", str(tmp_path / "scene.toml"), "--dry-run"]
@@ -218,9 +216,7 @@ def test_device_of_a_scene_is_of_its_run(tmp_path: Path, monkeypatch: pytest.Mon
     assert options["device"] == "cuda"
 
 
-def test_no_room_beside_the_sleeper_is_refused_before_grains_fall(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_no_room_beside_the_sleeper_is_refused_before_grains_fall(tmp_path, capsys) -> None:
     """Grains of 70 mm between a sleeper of 240 mm and walls 300 mm apart; no file is begun."""
     load_of(tmp_path, "lead = 1.0")
     change = ["--set", "track.width=0.3", "--set", "track.below=2", "--set", "track.beside=1"]

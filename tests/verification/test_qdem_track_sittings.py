@@ -56,9 +56,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Bed:
 
 
 @pytest.mark.long
-def test_a_killed_stage_goes_on_to_the_same_bits(
-    whole: Bed, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_killed_stage_goes_on_to_the_same_bits(whole: Bed, tmp_path, monkeypatch) -> None:
     """Killed three times: peaks, steps, places are those of a stage that was not."""
     monkeypatch.setattr(track_bed, "BED", replace(track_bed.BED, saving_interval=0.0))
     recipe, part = recipe_at(tmp_path), tmp_path / "bed.part.npz"

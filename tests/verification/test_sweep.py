@@ -80,9 +80,7 @@ def sweep(
     return code, json.loads(printed.out) if printed.out else None, printed.err
 
 
-def test_tables_and_picture(
-    scene: Path, tmp_path: Path, in_process: list[list[str]], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_tables_and_picture(scene: Path, tmp_path, in_process: list[list[str]], capsys) -> None:
     """Every member's cycles and their mean are in CSV and Parquet alike; the rest is not run."""
     into = tmp_path / "sweep"
     code, shown, _ = sweep(capsys, scene, *FREQUENCIES, "--seeds", 2, "--into", into)
@@ -308,9 +306,7 @@ def test_a_signal_loses_no_result(
 
 
 @pytest.mark.long
-def test_killed_it_goes_on(
-    scene: Path, tmp_path: Path, in_process: list[list[str]], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_killed_it_goes_on(scene: Path, tmp_path, in_process: list[list[str]], capsys) -> None:
     """A kill leaves no process behind; the same command ends with the tables of unstopped runs."""
     into = tmp_path / "sweep"
     words = ["sweep", str(scene), "--seeds", "2", "--into", str(into), "--workers", "1"]
