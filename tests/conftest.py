@@ -15,8 +15,9 @@ if "PYTEST_XDIST_WORKER" in os.environ:  # as many processes as processors: no t
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 settings.register_profile(  # beside other processes time says nothing
-    "no clock", settings.default, deadline=None, suppress_health_check=[HealthCheck.too_slow]
-)
+    "no clock", settings.default, deadline=None,
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
+)  # fmt: skip
 settings.load_profile("no clock")
 
 BEGAN = time.monotonic()  # each process reads this file at its start

@@ -106,7 +106,7 @@ def law_twin(
     return float(force), float(np.clip(total, -mu * force, mu * force)), float(spring)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(
     gap=st.floats(-1e-3, 0), normal=st.floats(-1, 1), slip=st.floats(-1, 1),
     spring=st.floats(-1e4, 1e4), mass=st.floats(0.1, 10),

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from adapters.errors import DumpError, UsageError
@@ -40,9 +40,7 @@ GRAINS = (  # rows in no order
 CONTACTS = written_frame(
     0, ENTRIES, "0.0105 0 2 7", "-0.009 0 5 2", height="-0.1 0.1"
 ) + written_frame(10, ENTRIES, height="-0.1 0.1")
-FILES = settings(
-    deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+FILES = settings(max_examples=60)
 
 
 def written(folder: Path, content: str | bytes) -> Path:
@@ -128,7 +126,6 @@ def test_kernel_rounds_any_decimal_text(tokens: list[str]) -> None:
 
 
 @given(st.integers(2**52, 2**53 - 1), st.integers(-80, 63))
-@settings(deadline=None)
 def test_kernel_rounds_ties_to_even(mantissa: int, exponent: int) -> None:
     """Decimals exactly halfway between two float64, and the nearest decimals beside the half."""
     halves = 2 * mantissa + 1

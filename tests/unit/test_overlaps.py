@@ -47,7 +47,7 @@ def wall_overlap_twin(walls: Walls, x: FloatArray, radius: float) -> list[float]
     return overlaps
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seed=st.integers(0, 2**32 - 1), ratio=st.sampled_from([1.0, 1.5, 20.0]))
 def test_pairs_are_exactly_the_near_ones(seed: int, ratio: float) -> None:
     """No pair is missed and none is made up, for equal radii and for radii of 1:20."""
@@ -62,7 +62,7 @@ def test_pairs_are_exactly_the_near_ones(seed: int, ratio: float) -> None:
     assert (found[:, 0] < found[:, 1]).all()
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_wall_overlaps_against_numpy(seed: int) -> None:
     """Floor, mirror planes, disc with its rim and cylinder, against distances written out."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import qdem_fem as q
@@ -176,9 +176,7 @@ def victim() -> q.Simulation:
 
 
 @given(place=st.floats(0, 1, exclude_max=True), change=st.integers(1, 255), cut=st.booleans())
-@settings(
-    max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=200)
 def test_no_damage_goes_unseen(
     saved: Path, victim: q.Simulation, tmp_path: Path, place: float, change: int, cut: bool
 ) -> None:

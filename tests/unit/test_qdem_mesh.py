@@ -269,7 +269,7 @@ def test_all_problems_are_named_at_once() -> None:
     ),
     order=st.permutations(range(4)),
 )
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 def test_whatever_is_damaged_is_read_rightly_or_refused(
     changes: list[tuple[int, int, int]], moved: list[tuple[int, int, float]], order: list[int]
 ) -> None:

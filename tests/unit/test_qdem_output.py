@@ -63,7 +63,7 @@ def test_pvd_names_times_and_files(tmp_path: Path) -> None:
     ]
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(values=st.lists(FINITE, min_size=1, max_size=20))
 def test_table_keeps_bits(tmp_path_factory: pytest.TempPathFactory, values: list[float]) -> None:
     """Numbers are read back as they were written."""

@@ -12,7 +12,7 @@ from rigid_lcp.sparse.dense_tiles import TERMS_AT_ONCE, divide_rows, subtract_pr
 ROUND_OFF = np.finfo(float).eps
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.integers(0, 2**32 - 1), st.integers(1, 9), st.integers(1, 9),
     st.sampled_from([0, 1, 3, 12, TERMS_AT_ONCE, TERMS_AT_ONCE + 1, 2 * TERMS_AT_ONCE + 5]),

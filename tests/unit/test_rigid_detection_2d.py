@@ -95,7 +95,7 @@ def heap(seed: int, count: int = 40) -> tuple[list[object], np.ndarray, np.ndarr
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_broad_phase_finds_every_near_pair(seed: int) -> None:
     """Against all pairs of boxes in plain NumPy."""
     shapes, places, angles = heap(seed)
@@ -112,7 +112,7 @@ def test_broad_phase_finds_every_near_pair(seed: int) -> None:
 
 @pytest.mark.long
 @given(st.integers(0, 2**32 - 1), st.floats(-3, 3), st.floats(-100, 100))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_turned_scene_has_turned_contacts(seed: int, turn: float, shift: float) -> None:
     """Gaps do not change, normals turn, names stay, wherever the frame is."""
     shapes, places, angles = heap(seed)
@@ -129,7 +129,7 @@ def test_turned_scene_has_turned_contacts(seed: int, turn: float, shift: float) 
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_keys_name_one_contact_each(seed: int) -> None:
     shapes, places, angles = heap(seed)
     contacts = found(shapes, places, angles)
@@ -144,7 +144,7 @@ def test_rows_of_keys() -> None:
 
 
 @given(st.floats(-3, 3), st.floats(-3, 3), st.floats(0, 6))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_widest_face_is_the_separation(x: float, y: float, turn: float) -> None:
     """Against all vertices over all faces in plain NumPy."""
     own, c, s = Polygon.regular(5, 1.0), np.cos(turn), np.sin(turn)

@@ -77,7 +77,7 @@ def test_many_corners_are_thinned_out_evenly() -> None:
     assert 1 - np.cos(np.diff(angle, append=angle[0] + 2 * np.pi).max() / 2) < 0.1
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.floats(-4.0, -1.0), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
 def test_tilted_faces_have_the_gap_of_each_corner(digits: float, x: float, y: float) -> None:
     """A small box over a wide one: each corner of it has its own height as gap."""
@@ -154,7 +154,7 @@ def test_spheres_in_one_place_part_along_z() -> None:
 
 
 @pytest.mark.long
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.integers(0, 10_000))
 def test_numbering_does_not_matter(seed: int) -> None:
     shapes, position, quaternion = near_pair(seed, gap=-1e-4)
@@ -170,7 +170,7 @@ def test_numbering_does_not_matter(seed: int) -> None:
 
 
 @pytest.mark.long
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.integers(0, 10_000))
 def test_contacts_turn_with_the_scene(seed: int) -> None:
     shapes, position, quaternion = near_pair(seed)
@@ -187,7 +187,7 @@ def test_contacts_turn_with_the_scene(seed: int) -> None:
 
 
 @pytest.mark.long
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(0, 10_000), st.sampled_from([1e-3, 1e3]))
 def test_unit_of_length_does_not_matter(seed: int, unit: float) -> None:
     shapes, position, quaternion = near_pair(seed)
@@ -198,7 +198,7 @@ def test_unit_of_length_does_not_matter(seed: int, unit: float) -> None:
     assert np.allclose(unit * found.gap, other.gap, atol=1e-14 * unit)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(0, 10_000))
 def test_names_last(seed: int) -> None:
     """A step later, a tenth of a percent of the size away, contacts have the same names."""

@@ -111,7 +111,7 @@ def complementarity_error(w: Floats, q: Floats, mu: float, dim: int, r: Floats) 
     return worst
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(
     st.integers(0, 2**31), st.sampled_from([2, 3]), st.integers(1, 12),
     st.sampled_from(["regular", "deficient", "twice", "whole numbers", "skew", "a zero row"]),

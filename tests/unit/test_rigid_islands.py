@@ -61,7 +61,7 @@ def test_island_problem_has_the_rows_of_the_whole(dim: int, factors: bool) -> No
     np.testing.assert_array_equal(alone.offset, problem.offset[rows])
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     st.lists(st.tuples(st.integers(-1, 7), st.integers(-1, 7)), min_size=1, max_size=10),
     st.integers(0, 10**6),
@@ -125,7 +125,7 @@ def test_islands_without_a_solution_are_named() -> None:
     np.testing.assert_array_equal(found.r, [1.0, 0.0, 0.0, 0.0])
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     seed=st.integers(0, 10_000), bodies=st.integers(1, 12), contacts=st.integers(1, 14),
     factors=st.booleans(), dim=st.sampled_from([2, 3]),

@@ -114,7 +114,7 @@ def test_npz_bodies(tmp_path: Path) -> None:
     nz=st.sampled_from(list(FORMATS)),
     seed=st.integers(0, 10**6),
 )
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @pytest.mark.peer("h5py")
 def test_fclib_every_storage(tmp_path_factory, dim, contacts, nz, seed):
     """Rows, columns and triplets are one matrix, symmetric or not."""

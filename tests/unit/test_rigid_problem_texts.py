@@ -79,7 +79,7 @@ def written(path: Path, kind: str, dim: int, contacts: int, seed: int = 0) -> tu
     dim=st.sampled_from([2, 3]), contacts=st.integers(1, 5), seed=st.integers(0, 99),
     kind=st.sampled_from(sorted(TEXTS)),
 )  # fmt: skip
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_text_of_every_storage(tmp_path_factory, dim, contacts, seed, kind):
     """W, q and mu to the last bit; a number more at the end, which some files have, is no fault."""
     path = tmp_path_factory.mktemp("text") / "one.dat"

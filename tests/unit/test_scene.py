@@ -138,7 +138,7 @@ def test_engine_names_agree() -> None:
     assert set(list_engines()) - set(list_real_engines()) == {"fake"}
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     frequency=st.floats(0.01, 1000),
     share=st.floats(0.05, 1),
@@ -349,7 +349,7 @@ SAFE_TO_COMBINE = [
 ]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(chosen=st.lists(st.sampled_from(SAFE_TO_COMBINE), min_size=1, unique=True))
 def test_all_problems_at_once(tmp_path_factory, chosen: list[tuple[str, str]]) -> None:
     """Any set of wrong keys is reported whole, each at its own line, and nothing else."""
@@ -434,7 +434,7 @@ def test_wrong_series_is_refused_with_its_line(
     assert f"{tmp_path}/load.csv: loading.series: can not read" in refusal(tmp_path, text)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(stress=st.lists(st.floats(0, 1e6), min_size=2, max_size=30), step=st.floats(1e-6, 10))
 def test_series_returns_what_was_written(
     tmp_path_factory: pytest.TempPathFactory, stress: list[float], step: float

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from adapters.errors import TrackbedError, UsageError
@@ -163,9 +163,7 @@ def test_long_tables_are_read_fast(tmp_path: Path) -> None:
     bom=st.booleans(),
     end=st.sampled_from(["\n", "\r\n"]),
 )
-@settings(
-    suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=50, deadline=None
-)
+@settings(max_examples=50)
 def test_csv_is_read_exactly(tmp_path: Path, rows: dict[float, float], bom: bool, end: str) -> None:
     """Any cycles and settlements written in full come back to the last bit, sorted."""
     lines = ["cycle,settlement", *(f"{cycle!r},{value!r}" for cycle, value in rows.items())]
@@ -177,9 +175,7 @@ def test_csv_is_read_exactly(tmp_path: Path, rows: dict[float, float], bom: bool
 
 
 @given(content=st.one_of(st.text(max_size=80), st.binary(max_size=80)))
-@settings(
-    suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=100, deadline=None
-)
+@settings(max_examples=100)
 def test_any_file_is_read_or_refused_with_a_sentence(tmp_path: Path, content: str | bytes) -> None:
     """Text and bytes of any kind, named .csv or after a dump, never end in a traceback."""
     data = content if isinstance(content, bytes) else content.encode(errors="surrogatepass")

@@ -51,7 +51,7 @@ def areas(triangles: FloatArray) -> FloatArray:
 # --- contact law ----------------------------------------------------------------------------
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(st.floats(0.06, 0.999))
 @pytest.mark.long
 def test_damping_of_rebound_makes_the_rebound(restitution: float) -> None:

@@ -111,7 +111,7 @@ def test_contact_time_factor() -> None:
     assert exact == pytest.approx(law.CONTACT_TIME_FACTOR, rel=1e-7)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(speed=st.floats(1e-4, 100), modulus=YOUNG, radius=LENGTH, mass=st.floats(1e-9, 100))
 def test_integration_meets_the_closed_form(
     speed: float, modulus: float, radius: float, mass: float
@@ -125,7 +125,7 @@ def test_integration_meets_the_closed_form(
         assert ode.contact_time == pytest.approx(closed.contact_time, rel=1e-6)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(alpha=st.floats(0.01, 0.68), speed=st.floats(1e-3, 10), radius=st.floats(1e-4, 0.1))
 def test_restitution_of_both_laws(alpha: float, speed: float, radius: float) -> None:
     """e = exp(-pi a/sqrt(1 - a^2)): a = alpha in LIGGGHTS' law, alpha/sqrt(5/6) in a literal eq. 7.

@@ -161,7 +161,7 @@ settlements = st.integers(0, 2**32 - 1).map(
 
 @every_law
 @given(settlement=settlements, reach=st.floats(1.0, 50.0), probability=st.floats(0.05, 0.99))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_band_holds_the_prediction_and_widens(
     law: Law, settlement: FloatArray, reach: float, probability: float
 ) -> None:

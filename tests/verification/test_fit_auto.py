@@ -328,7 +328,7 @@ def test_agreement_is_that_of_what_comes(level: float) -> None:
     unit=st.sampled_from([1e-3, 100.0, -1.0]),
     period=st.sampled_from([0.02, 2.5e-5, 50.0]),
 )
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 def test_outlook_has_no_units_and_no_direction(seed: int, unit: float, period: float) -> None:
     """Strain, %, mm, heave; cycles, seconds, gross tonnes: the same regime, prediction and band."""
     read = noisy(np.log1p(READ / 20), seed)[:, None]

@@ -73,7 +73,7 @@ def test_linear_is_eq_16() -> None:
 
 @every_default_law
 @given(cycle=windows(), seed=seeds)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_fit_is_the_textbook_least_squares(law: Law, cycle: FloatArray, seed: int) -> None:
     """Residuals are orthogonal to the columns 1, ln N[, N]; the linear law joins the end points."""
     displacement = paths(seed, (len(cycle),))
@@ -92,7 +92,7 @@ def test_fit_is_the_textbook_least_squares(law: Law, cycle: FloatArray, seed: in
 
 @every_law
 @given(cycle=windows(), seed=seeds, factor=st.floats(-5.0, 5.0))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_fit_linear_in_displacement(law: Law, cycle: FloatArray, seed: int, factor: float) -> None:
     """fit(u + s v) = fit(u) + s fit(v): so the law of the mean is the mean of the laws."""
     first, second = paths(seed, (len(cycle), 3)), paths(seed + 1, (len(cycle), 3))

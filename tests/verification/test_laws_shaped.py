@@ -72,7 +72,7 @@ def test_no_worse_than_a_general_optimiser(name: str, seed: int) -> None:
 
 
 @given(seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_two_terms_of_one_sign_are_non_negative_least_squares(seed: int) -> None:
     """``log-linear``: the better of scipy's nnls for u and for -u."""
     random = np.random.default_rng(seed)

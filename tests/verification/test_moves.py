@@ -115,7 +115,7 @@ def test_smoothing_is_its_defining_sum() -> None:
 
 
 @given(seed=st.integers(0, 2**32 - 1), quantile=st.floats(0.01, 1.0))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_clip_shortens_without_turning(seed: int, quantile: float) -> None:
     """Clipped moves keep their direction; the share below the bound is untouched; 1 keeps all."""
     move = np.random.default_rng(seed).standard_cauchy((40, 3))

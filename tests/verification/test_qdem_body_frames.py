@@ -52,7 +52,7 @@ def frames_of(run: q.Simulation) -> BodyFrames:
 # --- the transformation --------------------------------------------------------------------------
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.integers(0, 2**32 - 1))
 def test_there_and_back_and_the_best_rigid_motion(seed: int) -> None:
     """`fit` finds a rigid motion exactly; world and own fields are inverse to each other."""

@@ -278,7 +278,7 @@ def test_spheres_that_turn_as_one_strain_their_spring() -> None:
 # --- the list ------------------------------------------------------------------------------------
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, 2**32 - 1), st.integers(0, 80), st.sampled_from([1e-3, 1.0, 1e6]))
 def test_list_is_complete_and_in_order(seed: int, count: int, scale: float) -> None:
     """Every pair within reach, once, in order; clusters far apart, negative coordinates."""
@@ -313,7 +313,7 @@ def test_pairs_of_bodies_of_many_patches(far: float) -> None:
 # --- the slider ----------------------------------------------------------------------------------
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.integers(0, 2**32 - 1))
 def test_slider_keeps_length_in_a_turn_and_its_losses_are_the_trapezoids(seed: int) -> None:
     """A turned normal costs nothing; held, all work is stored; slipping, work less store is lost.
@@ -350,7 +350,7 @@ def test_table_1_of_the_paper() -> None:
     assert find_pair_stiffness(1.613, 1.613) == pytest.approx(1.613, rel=EPS)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, 2**32 - 1), st.integers(2, 9), st.integers(1, 20), st.booleans())
 def test_bound_of_a_network_holds(seed: int, nodes: int, springs: int, walls: bool) -> None:
     """The highest eigenvalue of springs with random directions, ``k_t`` across, walls, masses."""

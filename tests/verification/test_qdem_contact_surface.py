@@ -303,7 +303,7 @@ def test_a_saved_run_goes_on_to_the_same_bits(tmp_path: Path) -> None:
     assert whole.energy().friction > 0
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(1, 6), st.integers(0, 2**32 - 1))
 def test_points_of_a_face_integrate_linear_functions(parts: int, seed: int) -> None:
     """Equal shares, inside, and their mean is the mean of the corners."""

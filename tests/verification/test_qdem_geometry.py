@@ -142,7 +142,7 @@ def gradients_exact(x: np.ndarray) -> tuple[np.ndarray, float]:
 
 
 @given(seed=st.integers(0, 2**32 - 1), digits=st.floats(0, 9))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_gradients_of_slivers(seed: int, digits: float) -> None:
     """Against rational arithmetic, for elements flattened by up to nine digits.
 
@@ -255,7 +255,7 @@ def test_node_sets_of_boxes_lie_where_their_names_say() -> None:
     around=st.integers(3, 7),
     seed=st.integers(0, 2**32 - 1),
 )
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_generated_meshes_are_sound(cells: tuple[int, int, int], around: int, seed: int) -> None:
     """Any number of cells: read without a change, conforming, and right after a jitter < 1/4."""
     ring = make_ring_mesh(1, 2, 0.7, (cells[0], around, cells[2]))

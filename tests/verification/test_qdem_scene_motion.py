@@ -47,7 +47,7 @@ def loaded(folder: Path, velocity: Any = None, spin: Any = None, *overrides: str
 three = st.tuples(*[st.floats(-50, 50)] * 3)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(three, three)
 def test_energy_and_momentum_of_a_rigid_brick(tmp_path_factory, velocity: Any, spin: Any) -> None:
     """``m v^2/2 + sum I_i omega_i^2/2``, ``I_i = m (a^2 + b^2)/12``: about its centre."""

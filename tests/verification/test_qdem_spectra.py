@@ -62,7 +62,7 @@ def test_parzen_window_has_the_bandwidth_it_is_asked_for() -> None:
     assert smooth == pytest.approx(0.75 * u * np.sinc(u * away / 2) ** 4, abs=1e-6)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     frequency=st.floats(0.5, 5e3),
     periods=st.floats(1.5, 12),

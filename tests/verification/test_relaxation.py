@@ -91,7 +91,7 @@ def test_hertz_potential_is_that_of_eq_5(settled: Bed) -> None:
     np.testing.assert_allclose(gradient, twin, rtol=1e-12, atol=1e-15)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_multipliers_against_scipy(seed: int) -> None:
     """The multipliers are those of SciPy's bounded least squares on the same small problem."""

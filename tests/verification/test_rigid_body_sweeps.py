@@ -49,7 +49,7 @@ def twin_sweep(
     return now, product, float((weight * (y - now) ** 2).sum())
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     seed=st.integers(0, 10_000), dim=st.sampled_from([2, 3]), contacts=st.integers(1, 8),
     mu=st.sampled_from([0.0, 0.05, 0.5, 1.2, 30.0]), part=st.sampled_from([0.0, 0.7]),

@@ -71,7 +71,7 @@ def test_random_collisions_never_make_energy() -> None:
 @given(st.floats(0.0, 1.0) | st.just(1.0), st.integers(0, 10**6))
 @example(0.25, 816)  # two on which the method without friction stops just above the tolerance
 @example(0.25, 147)
-@settings(deadline=None, max_examples=8)
+@settings(max_examples=8)
 def test_energy_is_as_derived(eps: float, seed: int) -> None:
     """One eps, one round: ``E' - E = -(1 - eps)/2 dp . |v|``; and no contact approaches."""
     bodies, velocity = network_bodies(30, seed)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rigid_lcp.arrays import Floats
@@ -22,7 +22,6 @@ def projected(points: Floats, mu: Floats) -> Floats:
     return points - find_natural_map(points, np.zeros_like(points), mu, 1.0)
 
 
-@settings(deadline=None)
 @given(NUMBER, NUMBER, NUMBER, FRICTION)
 def test_projection_is_the_nearest_point(n: float, s: float, t: float, mu: float) -> None:
     """Moreau: ``x = P_K(x) + P_K°(x)``, the two orthogonal, the second in the polar cone -K*."""
@@ -43,7 +42,6 @@ def test_a_contact_that_parts_needs_no_force(mu: float) -> None:
     assert find_natural_residual(force, velocity, np.array([mu]), 1.0) == 0.0
 
 
-@settings(deadline=None)
 @given(st.floats(0.01, 10), st.floats(0, 2), st.floats(0.01, 5), st.floats(0, 6.28), NUMBER)
 def test_coulombs_three_cases_have_no_residual(push, mu, speed, angle, share):
     """Open, stick and slide as eq. 27 has them are zeros of the map; the wrong sign is none."""
@@ -60,7 +58,6 @@ def test_coulombs_three_cases_have_no_residual(push, mu, speed, angle, share):
         assert residual([push, *(mu * push * along)], [0, *(speed * along)]) > 1e-4
 
 
-@settings(deadline=None)
 @given(st.floats(1e-6, 1e6), st.floats(1e-6, 1e6))
 def test_the_residual_has_no_units(mass: float, length: float) -> None:
     """Scaling forces and velocities changes it by round-off only."""

@@ -55,7 +55,7 @@ def nearest_corners(name: str, seed: int, form: str, gap: float) -> tuple[Pair, 
     return (shapes, position, turns, np.zeros((0, 3))), normal
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.sampled_from(FAMILIES), st.integers(0, 10_000), st.sampled_from(FORMS),
     st.sampled_from([1e-6, 1e-3, 0.3]),
@@ -89,7 +89,7 @@ def test_corners_carry_radii_zero_and_names_last(form: str) -> None:
 
 
 @pytest.mark.long
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(0, 10_000), st.sampled_from(FORMS))
 def test_rates_are_the_derivatives_of_the_gap(seed: int, form: str) -> None:
     """Eqs 13, 14 and 24: ``dg/dt`` and ``d2g/dt2`` of bodies with constant velocity and spin."""
@@ -127,7 +127,7 @@ def test_at_touch_a_plane_parts_the_bodies(form: str, seed: int) -> None:
     assert (second @ normal).min() - (first @ normal).max() > -1e-9
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.sampled_from(["stones", "tetrahedra", "boxes"]), st.integers(0, 10_000))
 @pytest.mark.long
 def test_the_least_gap_is_continuous(name: str, seed: int) -> None:
@@ -167,7 +167,7 @@ def test_edges_are_found_whoever_has_the_margin(margins: list[float]) -> None:
     assert found.gap == pytest.approx([1e-2])
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     st.sampled_from(FAMILIES), st.integers(0, 10_000), st.sampled_from(FORMS),
     st.sampled_from([1e-3, 0.3]),

@@ -58,7 +58,7 @@ def matrix_of_lists(state: Pivots) -> Floats:
 
 
 @given(st.integers(1, 12), st.integers(0, 10**6))
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 def test_bordering_and_dropping_give_the_inverse(size: int, seed: int) -> None:
     """``[[B, c], [r, d]]^-1`` from B^-1, and back: to round-off times the condition."""
     g = np.random.default_rng(seed)

@@ -81,7 +81,7 @@ def test_contacts_that_only_move_along_their_normals_have_an_order():
     np.testing.assert_array_equal(one.bodies.jacobian.toarray(), other.bodies.jacobian.toarray())
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(masses=st.integers(0, 10**6), spread=st.floats(0, 1))
 def test_any_stiffness_frictionless_or_sticking(masses, spread):
     """Unique by order and equal to the least norm wherever nothing opens or slides."""

@@ -12,7 +12,7 @@ from rigid_lcp.unique.micro_displacements import find_free_motion, scale_jacobia
 from tests.rigid_static_problems import pyramid
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seed=st.integers(0, 10**6), dim=st.sampled_from([2, 3]))
 def test_slider_slope_by_differences(seed, dim):
     rng = np.random.default_rng(seed)

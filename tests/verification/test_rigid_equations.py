@@ -124,7 +124,7 @@ def test_tangential_inertial_terms(name: str, seed: int) -> None:
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_relative_velocity_is_j_v(seed: int) -> None:
     """``u = J v``, and J^T f has no resultant on a pair: momentum and angular momentum are kept."""
     world, motion, contacts = touching("vertex on face", seed)

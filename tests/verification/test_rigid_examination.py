@@ -29,7 +29,7 @@ WEIGHT = GRAVITY * beds.STEP  # impulse of the weight of 1 kg in a step [N s]
     index=st.integers(0, 3), seed=st.integers(0, 10**6), scale=st.sampled_from([1e-6, 1.0, 1e6]),
     by_bodies=st.booleans(),
 )  # fmt: skip
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_both_judges_agree(index: int, seed: int, scale: float, by_bodies: bool) -> None:
     """The solver's residual and the one of plain NumPy: round-off of some hundred terms apart."""
     generator = np.random.default_rng(seed)

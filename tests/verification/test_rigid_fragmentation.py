@@ -49,7 +49,7 @@ def moments(scene):
 
 
 @pytest.mark.long
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(seed=st.integers(0, 10**6), dim=st.sampled_from([2, 3]), far=st.sampled_from([0.0, 10.0]))
 def test_a_break_conserves_everything(seed, dim, far):
     """The parts go on as parts of the rigid body: mass, momenta and energy to round-off; their

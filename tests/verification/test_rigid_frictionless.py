@@ -46,7 +46,7 @@ def normals_alone(a: Floats, b: Floats) -> tuple[FrictionSolution, Floats, Float
 
 
 @given(st.integers(1, 7), st.integers(1, 7), st.integers(0, 10**6))
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_against_enumeration(contacts: int, rank: int, seed: int) -> None:
     """A = H H^T of any rank, b in its range: a solution exists, its accelerations are unique."""
     g = np.random.default_rng(seed)

@@ -26,7 +26,7 @@ def gaps_at(arrays: Shapes3D, motion: Motion, t: float) -> dict[int, float]:
 
 
 @pytest.mark.long
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 10_000))
 def test_gap_rate_is_the_derivative_of_the_gap(seed: int) -> None:
     """Eq. 13: ``dg/dt = n . (v_a - v_b)`` at the contact point, for every kind of contact."""
@@ -53,7 +53,7 @@ def test_gap_rate_is_the_derivative_of_the_gap(seed: int) -> None:
 
 
 @pytest.mark.long
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 10_000))
 @example(750)  # a sphere whose centre is 0.025 from an edge
 def test_inertial_terms_are_the_second_derivative_of_the_gap(seed: int) -> None:
@@ -91,7 +91,7 @@ def test_inertial_terms_are_the_second_derivative_of_the_gap(seed: int) -> None:
     assert checked > 0
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(0, 10_000), st.sampled_from(["crossing", "sphere"]))
 def test_inertial_terms_at_edges(seed: int, form: str) -> None:
     """Normals across edges turn with both bodies: a cube's edge over another's, or under a sphere.

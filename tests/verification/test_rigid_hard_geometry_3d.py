@@ -103,7 +103,7 @@ def touching(name: str, seed: int, share: float) -> Pair:
 
 
 @pytest.mark.long
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.sampled_from(FAMILIES), st.integers(0, 10_000), st.sampled_from([1e-6, 1e-3, 3e-2]))
 @example("tetrahedra", 14, 1e-6)
 def test_an_overlap_has_a_contact_with_its_depth(name: str, seed: int, share: float) -> None:
@@ -124,7 +124,7 @@ def test_an_overlap_has_a_contact_with_its_depth(name: str, seed: int, share: fl
     assert (second @ along).min() - (first @ along).max() == pytest.approx(depth, abs=tie)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.sampled_from(FAMILIES), st.integers(0, 10_000), st.sampled_from([1e-6, 1e-3, 3e-2]))
 @pytest.mark.peer("coal")
 def test_the_least_gap_is_the_distance_that_coal_finds(name: str, seed: int, share: float) -> None:

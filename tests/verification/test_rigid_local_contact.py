@@ -31,7 +31,7 @@ def block_of(seed: int, dim: int, rank: int) -> Floats:
     return np.random.default_rng(seed).normal(size=(dim, rank))
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(
     st.integers(0, 10**9),
     st.sampled_from([2, 3]),
@@ -60,7 +60,7 @@ def test_every_symmetric_contact_obeys_the_law(seed, dim, lost, friction):
     }[status]
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.integers(0, 10**9), st.sampled_from([2, 3]), st.sampled_from([0.0, 0.3, 0.8]))
 def test_non_symmetric_blocks(seed: int, dim: int, friction: float) -> None:
     """W of real packages is symmetric to 1e-3 only; the law is obeyed all the same."""
@@ -74,7 +74,7 @@ def test_non_symmetric_blocks(seed: int, dim: int, friction: float) -> None:
         assert law_error(block, offset, friction, force) <= 1e-12
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, 10**9), st.floats(1e-6, 1e6), st.floats(1e-6, 1e6), st.floats(0, 6.3))
 def test_units_and_axes_change_nothing(seed, masses, speeds, angle):
     """With kg -> g, m -> mm, or the tangents turned, r scales and turns along, exactly."""
@@ -155,7 +155,7 @@ def test_painleve_has_no_solution() -> None:
     assert solve_contact(indefinite, offset, 0.5)[1] == "no solution"
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(st.lists(st.floats(-50, 50), min_size=0, max_size=4, unique=True), st.floats(0.1, 5))
 def test_real_roots_of_a_quartic(roots: list[float], width: float) -> None:
     """A quartic of given real roots and pairs of complex ones (t - 1)^2 + width^2.
@@ -171,7 +171,7 @@ def test_real_roots_of_a_quartic(roots: list[float], width: float) -> None:
         np.testing.assert_allclose(found[:count], np.sort(real), atol=1e-4)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, 10**9))
 def test_no_direction_is_missed(seed: int) -> None:
     """As many directions as changes of sign on a fine grid of angles, each exact, found again."""

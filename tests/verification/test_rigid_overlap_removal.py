@@ -33,7 +33,7 @@ def angular_momentum(world: World, motion: Motion) -> float:
     return float((world.mass * cross + world.inertia * motion.spin).sum())
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(depth=st.floats(1e-8, 1e-2), speed=st.floats(-3, 3))
 def test_bodies_in_flight(depth: float, speed: float) -> None:
     """Centre of mass, momentum and energy are kept; angular momentum changes by sum m dx x v."""
@@ -70,7 +70,7 @@ def test_spinning_boxes_in_space_keep_their_energy() -> None:
     )
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(angle=st.floats(0, 3), aside=st.floats(-0.5, 0.5), depth=st.floats(0.01, 0.3))
 def test_a_small_grain_squeezed_between_large_ones(angle, aside, depth):
     """Overlaps of up to a third of the small one, which has to turn to get out: all gone."""

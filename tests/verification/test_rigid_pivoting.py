@@ -95,7 +95,7 @@ OFFSETS = st.floats(-2.0, 2.0).map(lambda x: x if abs(x) > 1e-9 else 0.0)
     st.sampled_from([partial(solve_pivoting, sweeps=0), solve_dantzig]), OFFSETS, OFFSETS,
     st.floats(0.0, 3.0), st.floats(-0.9, 0.9),
 )  # fmt: skip
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 def test_one_contact_by_cases(method, normal, tangential, mu, skew):
     """One contact with W = [[1, k], [k, 1]]: whatever is found obeys eq. 27."""
     skew = skew if method is not solve_dantzig else 0.0  # it may cycle where W couples strongly

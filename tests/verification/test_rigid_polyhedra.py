@@ -38,7 +38,7 @@ def by_delaunay(points: Floats) -> tuple[float, Floats, Floats]:
     return volume, centroid, np.trace(second) * np.eye(3) - second
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seeds)
 def test_integrals_agree_with_a_triangulation(seed: int) -> None:
     shape = stone(seed)
@@ -60,7 +60,7 @@ def test_box_and_tetrahedron_in_closed_form() -> None:
     assert np.allclose(regular.inertia, regular.volume / 20 * np.eye(3), atol=1e-16)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seeds, st.floats(1e-3, 1e3))
 def test_mass_properties_move_and_scale_with_the_points(seed: int, unit: float) -> None:
     """I' = R I R^T; V scales with the cube and I with the fifth power of the unit of length."""
@@ -73,7 +73,7 @@ def test_mass_properties_move_and_scale_with_the_points(seed: int, unit: float) 
     assert np.allclose(moved.centroid, unit * np.array([0.1, -0.2, 0.3]), rtol=1e-11)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(seeds, st.integers(4, 40))
 def test_faces_edges_and_corners_are_a_polyhedron(seed: int, corners: int) -> None:
     """Euler's formula, all corners under all faces, faces anticlockwise from outside."""

@@ -41,7 +41,7 @@ def test_energy_is_given_from_the_friction_that_reaches_where_it_is_negative(mu,
     assert abs(force[1]) <= mu * force[0] * (1 + 1e-12)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.integers(0, 10**6), st.sampled_from([2, 3]), st.floats(0.0, 2.0))
 def test_a_w_of_bodies_never_gives_energy(seed, dim, mu):
     """``r . J M^-1 J^T r = |M^-1/2 J^T r|^2``, whatever its null space."""
@@ -126,7 +126,7 @@ def test_a_light_body_between_heavy_ones_has_a_mass(light: float, mu: float) -> 
     assert not prove_forces_insufficient(problem)
 
 
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=40, derandomize=True)
 @given(seed=st.integers(0, 10**6), dim=st.sampled_from([2, 3]), contacts=st.integers(1, 12))
 def test_no_proof_where_all_can_be_stopped(seed: int, dim: int, contacts: int) -> None:
     """``q = J v``: friction without bound would stop every contact, and W r = -q has an answer in

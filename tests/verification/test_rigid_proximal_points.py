@@ -52,7 +52,7 @@ def test_towers_to_round_off_from_a_few_sweeps(dim: int) -> None:
     assert found.work["factorisations"] < 40
 
 
-@settings(max_examples=30, deadline=None, derandomize=True)
+@settings(max_examples=30, derandomize=True)
 @given(
     method=st.sampled_from([solve_proximal, extrapolate_points]), seed=st.integers(0, 10**6),
     dim=st.sampled_from([2, 3]), contacts=st.integers(1, 20),

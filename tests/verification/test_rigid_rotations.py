@@ -55,7 +55,7 @@ def test_matrix_and_product_agree_with_scipy() -> None:
     assert np.allclose(found, both.as_matrix(), atol=8 * ROUND_OFF)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(vectors)
 def test_turn_by_rotation_vector_agrees_with_scipy(phi):
     found = make_rotation(make_quaternion(phi))

@@ -108,7 +108,7 @@ def test_no_friction_hardly_any_and_huge_friction(mu, dim):
         np.testing.assert_array_equal(found.r.reshape(-1, dim)[:, 1:], 0.0)
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60, derandomize=True)
 @given(
     seed=st.integers(0, 10**6),
     dim=st.sampled_from([2, 3]),

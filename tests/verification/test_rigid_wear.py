@@ -212,7 +212,7 @@ def test_chamfer_by_chamfer_is_one_chamfer_of_the_sum(shape):
     )
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(share=st.floats(1e-12, 0.999))
 def test_depth_of_a_cut_in_closed_form(share):
     """The tip of a triangle (tetrahedron): its share goes with the square (cube) of the depth."""
@@ -243,7 +243,7 @@ SOLIDS = ("stone", "needle", "sliver", "tetrahedron", "plate")
 @pytest.mark.parametrize(
     "form", ["polygon", "triangle", *(pytest.param(one, marks=pytest.mark.long) for one in SOLIDS)]
 )
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(seed=st.integers(0, 10**6), share=st.floats(1e-9, 0.03))
 @example(seed=84489, share=1e-9)  # of the sliver: triangles 1 m long and 1e-8 m high
 def test_worn_shapes_lose_exactly_what_they_shall(form, seed, share):

@@ -111,7 +111,7 @@ def test_table_1_does_not_give_the_papers_weight() -> None:
 # ---------------------------------------------------------------------------------------- start
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     container=st.sampled_from(CONTAINERS),
     count=st.integers(1, 300),
@@ -213,7 +213,7 @@ def test_cap_is_the_integral_of_discs(height: float, centre: float, radius: floa
 
 
 @pytest.mark.long
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 10_000), low=st.floats(1e-3, 0.6), thickness=st.floats(0.05, 1))
 def test_relative_density_is_monte_carlo(seed: int, low: float, thickness: float) -> None:
     """Density of a layer = share of random points inside grains, within five standard errors."""
