@@ -239,7 +239,7 @@ def test_vtk_and_we_read_states(run: Path, tmp_path: Path) -> None:
     exported = read_exported_run(run)
     files = export_run(exported, "vtkhdf", tmp_path)
     for path, instant in zip(files, exported.instants(), strict=True):
-        mesh, state = pyvista.read(path), instant.state
+        mesh, state = pyvista.read(path)["grains"], instant.state
         assert mesh.n_cells == mesh.n_points == 40
         assert np.array_equal(mesh.points, state.position)
         assert np.array_equal(mesh["radius"], state.radius)
@@ -252,17 +252,33 @@ def test_vtk_and_we_read_states(run: Path, tmp_path: Path) -> None:
 
 @pytest.mark.peer("h5py")
 def test_contacts_in_vtkhdf(scene_file: Path, tmp_path: Path) -> None:
-    """As YADE has them: positive where grains push apart, the tangential force on the second."""
+    """As YADE has them: negative where grains push apart, normal and shear force on the second."""
     import h5py
 
     exported = bed(scene_file, 0.5)
     with h5py.File(export_run(exported, "vtkhdf", tmp_path)[1]) as file:
-        contacts = file["ONDEM/Interactions"]
+        contacts = file["ONDEM/Interactions/hertz_mindlin"]
         assert (contacts.attrs["count"], contacts["id2"][:].tolist()) == (2, [5, 9])
-        assert contacts["normal_force"][:] == pytest.approx([Bed.FORCE] * 2)
+        assert contacts["normal_force"][:] == pytest.approx([-Bed.FORCE] * 2)
+        assert contacts["normal"][:] == pytest.approx(np.array([[1, 0, 0], [0, 0, 1]]), abs=1e-15)
         assert np.array_equal(contacts["shear_force"], [[0, -0.1, 0], [-0.03, -0.04, 0]])
-        assert file["ONDEM/Materials/0/friction_coefficient"][()] == 0.5
+        assert file["ONDEM/Materials/0/shear_friction"][()] == 0.5
         assert file["ONDEM/Scene"].attrs["time"] == exported.scene.loading.period
+
+
+@pytest.mark.peer("h5py")
+def test_time_of_stages_in_vtkhdf(scene_file: Path, tmp_path: Path) -> None:
+    """Of nine cycles four last as long as those of the first load, five as those of the second."""
+    import h5py
+
+    second = "loading.stage=[{from_cycle=4, amplitude=9e3, mean=4.5e3, frequency=9.0}]"
+    scene, late = load_scene(scene_file, [second]), replace(Bed(0.5).start(), cycle=9)
+    track = SimpleNamespace(start=lambda: late, windows=[])
+    (path,) = export_run(ExportedRun(scene, track), "vtkhdf", tmp_path)  # type: ignore[arg-type]
+    with h5py.File(path) as file:
+        said = file["ONDEM/Scene"].attrs
+        assert said["time"] == pytest.approx(4 * scene.loading.period + 5 / 9, rel=1e-12)
+        assert said["timestep"] == pytest.approx(1 / (9 * scene.steps_per_cycle), rel=1e-12)
 
 
 def test_without_h5py(

@@ -18,33 +18,71 @@ from adapters.files.states import read_state_file, write_state_file
 
 pytestmark = pytest.mark.peer("h5py")
 SAMPLE = Path(os.environ.get("TRACKBED_DATA", "shared/data"), "ondem/test_box_spheres.vtkhdf")
-GLASS = {"id": 0, "density": 2600.0, "young": 1e7, "poisson": 0.3}
+GLASS = {"density": 2600.0, "young": 1e7, "poisson": 0.3, "friction": 0.5}
 
 
 @pytest.mark.skipif(not SAMPLE.is_file(), reason="no samples of ON-DEM")
 def test_yade_wrote_the_same(tmp_path: Path) -> None:
-    """What ON-DEM's exporter wrote from YADE, read and written, has its names and its numbers.
+    """What ON-DEM's exporter of draft 0.1 wrote from YADE, read and written, keeps its numbers.
 
-    But each point is a vertex, which ParaView shows, and no cells have one offset, as VTK has it.
+    But not the orientations of spheres, which no state has.
     """
     import h5py
 
-    write_bodies(tmp_path / "a.vtkhdf", read_state_file(SAMPLE, 1.0), {"timestep": 1e-5}, GLASS, {})
-    names: list[str] = []
+    write_bodies(tmp_path / "a.vtkhdf", read_state_file(SAMPLE, 1.0), {}, GLASS, {})
     with h5py.File(tmp_path / "a.vtkhdf") as ours, h5py.File(SAMPLE) as theirs:
-        ours.visit(names.append)
-        for name in names:
-            one, other = ours[name], theirs[name]
-            assert set(one.attrs) <= set(other.attrs), name
-            if isinstance(one, h5py.Dataset) and not ("Vertices" in name or "Offsets" in name):
-                assert one.dtype.kind == other.dtype.kind, name
-                text = one.dtype.kind == "O"
-                assert np.all(one[()] == other[()] if text else np.isclose(one, other, 1e-15, 0))
-        assert ours.attrs["file_format_version"] == theirs.attrs["file_format_version"]
+        block, glass = ours["VTKHDF/grains"], ours["ONDEM/Materials/0"]
+        fields = {*block["PointData"]} - {"orientation", "shape_type", "blocked_dofs"}
+        for name in ("Points", *(f"PointData/{field}" for field in fields)):
+            one, other = block[name], theirs[f"VTKHDF/{name}"]
+            assert one.dtype.kind == other.dtype.kind, name
+            assert np.all(np.isclose(one, other, 1e-15, 0)), name
+        for name in ("units", "gravity"):
+            assert np.all(ours[f"ONDEM/Scene/{name}"][()] == theirs[f"ONDEM/Scene/{name}"][()])
+        for name, other in {"density": "density", "normal_stiffness": "young"}.items():
+            assert glass[name][()] == theirs[f"ONDEM/Materials/0/{other}"][()]
+        assert len(fields) == 9
     (frame,) = read_frames(SAMPLE)  # the step is time over time step
     assert (frame.time_step, frame.values.shape) == (8000, (36, 12))
     with pytest.raises(DumpError, match="there is no radius; there are shape_type"):
         list(read_frames(SAMPLE.with_name("test_5spheres.vtkhdf")))
+
+
+def test_what_the_importer_for_yade_asks_for(tmp_path: Path) -> None:
+    """All that it reads of spheres, with `restore_interactions=False`, and the types it compares.
+
+    Source: implementation/vtkhdf/import_yade_vtkhdf.py and hdf5_utils.py of ON-DEM-WG3-FileFormat,
+    October 2026; that VTK shows the block is asked in `test_export`.
+    """
+    import h5py
+
+    place = np.arange(9.0).reshape(3, 3)
+    state = State(np.array([4, 7, 9]), place, place[0] + 1, place[0] + 1, place, place)
+    write_bodies(tmp_path / "a", state, {"iteration": 3, "time": 0.5, "timestep": 1e-5}, GLASS, {})
+    with h5py.File(tmp_path / "a") as file:
+        scene, (material,) = file["ONDEM/Scene"], file["ONDEM/Materials"].values()
+        assert dict(scene.attrs) == {"iteration": 3, "time": 0.5, "timestep": 1e-5}
+        assert (scene["gravity"].shape, len(file["ONDEM/Interactions"])) == ((3,), 0)
+        shapes, (name,) = (scene[key].asstr()[:] for key in ("shape_names", "display_group_names"))
+        found = {key: material[key][()] for key in material}
+        assert found.pop("material_type").decode() == "FrictMat"
+        assert found["shear_stiffness"] / found["normal_stiffness"] == found.pop("yade_poisson")
+        assert found == {
+            "id": 0, "density": 2600.0, "normal_stiffness": 1e7, "shear_stiffness": 3e6,
+            "shear_friction": GLASS["friction"], "shear_damping": 0.0,
+        }  # fmt: skip
+        data = {key: one[:] for key, one in file[f"VTKHDF/Assembly/{name}/PointData"].items()}
+        assert {len(values) for values in data.values()} == {3}
+        assert data["body_id"].tolist() == [4, 7, 9]
+        assert [*shapes[data["shape_type"]]] == ["sphere"] * 3
+        for key, value in {"material_id": 0, "clump_id": -1, "blocked_dofs": 0}.items():
+            assert np.all(data[key] == value), key
+        assert np.all(data["orientation"] == [1, 0, 0, 0])
+        assert file[f"VTKHDF/{name}/PointData/orientation"].attrs["order"] == "wxyz"
+        kinds = {"VTKHDF": b"MultiBlockDataSet", f"VTKHDF/{name}": b"PolyData"}
+        for group, kind in kinds.items():
+            attributes = file[group].attrs
+            assert (attributes["Type"], *attributes["Version"]) == (kind, 2, 5)
 
 
 @pytest.fixture
@@ -60,12 +98,12 @@ def path(tmp_path: Path) -> Path:
     ("name", "value", "said"),
     [
         ("ONDEM/Scene/units", ["second", "millimeter", "gram"], "units are second millimeter gram"),
-        ("VTKHDF/PointData/body_id", None, "no body_id; there are angular_velocity clump_id"),
-        ("VTKHDF/PointData/body_id", [4, 7, 7], "body 7 is there twice"),
-        ("VTKHDF/PointData/radius", [1.0, 0.0, 3.0], "radius of body 7 is 0"),
-        ("VTKHDF/PointData/mass", [1.0, 1.0], r"mass is \(2,\) of float64, not \(3,\)"),
-        ("VTKHDF/Points", [[0.0, np.nan, 0]] * 3, "y of body 4 is nan"),
-        ("VTKHDF/PointData/clump_id", [-1, 8, 8], "2 of 3 spheres are parts of clumps"),
+        ("VTKHDF/grains/PointData/body_id", None, "no body_id; there are shape_type radius"),
+        ("VTKHDF/grains/PointData/body_id", [4, 7, 7], "body 7 is there twice"),
+        ("VTKHDF/grains/PointData/radius", [1.0, 0.0, 3.0], "radius of body 7 is 0"),
+        ("VTKHDF/grains/PointData/mass", [1.0, 1.0], r"mass is \(2,\) of float64, not \(3,\)"),
+        ("VTKHDF/grains/Points", [[0.0, np.nan, 0]] * 3, "y of body 4 is nan"),
+        ("VTKHDF/grains/PointData/clump_id", [-1, 8, 8], "2 of 3 spheres are parts of clumps"),
         ("ONDEM/Bodies/sphere/mass", 1.0, "its clumps stand apart"),
         ("VTKHDF", None, "no whole ON-DEM VTKHDF file"),
     ],
@@ -88,8 +126,8 @@ def test_more_than_the_file_holds(path: Path) -> None:
 
     with h5py.File(path, "a") as file:
         for name, shape in (("Points", (10**7, 3)), ("PointData/radius", (10**7,))):
-            del file[f"VTKHDF/{name}"]
-            file.create_dataset(f"VTKHDF/{name}", shape, float, chunks=True)
+            del file[f"VTKHDF/grains/{name}"]
+            file.create_dataset(f"VTKHDF/grains/{name}", shape, float, chunks=True)
     with pytest.raises(DumpError, match=r"radius is \(10000000,\) of float64"):
         read_state_file(path, 1.0)
 

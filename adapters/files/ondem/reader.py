@@ -45,8 +45,8 @@ def read_bodies(path: Path) -> tuple[int, tuple[str, ...], FloatArray]:
 
     Columns: ``x y z`` [m], and those of `COLUMNS` that are there: radius [m], mass [kg], velocities
     [m/s], angular velocities [rad/s].  The step is the scene's ``iteration``, else time over time
-    step, else 0.  Bodies are one PolyData or, as in later drafts, blocks of it; contacts and walls
-    are left out.  Raises `LibraryMissing` without h5py, `DumpError` for other shapes and units,
+    step, else 0.  Bodies are one PolyData, as in draft 0.1, or blocks of it; contacts and walls are
+    left out.  Raises `LibraryMissing` without h5py, `DumpError` for other shapes and units,
     missing or impossible numbers, and a damaged file.
     """
     h5py, most = load_h5py(path), MOST_PACKED * path.stat().st_size

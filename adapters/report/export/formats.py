@@ -26,6 +26,7 @@ from adapters.report.export.fields import (
     split_columns,
 )
 from adapters.report.export.instants import ExportedRun, Instant
+from adapters.scene import list_stages
 from trackbed.run_files import replace_file, write_pvd
 
 Gather = Callable[[ExportedRun, Instant], dict[str, Array]]
@@ -145,25 +146,37 @@ def write_csv_rows(path: Path, parts: Iterable[Mapping[str, Array]]) -> None:
 
 def export_vtkhdf(run: ExportedRun, into: Path, every: int) -> list[Path]:
     """``vtkhdf/grains_000000.vtkhdf`` and on: an instant a file by `write_bodies`; its iteration is
-    the cycle, its time that under load, jumped cycles too, and not given of stages."""
+    the cycle, its time that under load, jumped cycles too.  Of a deck only its bodies are known."""
     (into / "vtkhdf").mkdir(exist_ok=True)
-    loading, material, written = None, {}, []
-    if run.own:
-        grain, loading = run.scene.material.grain, run.scene.loading
-        material = {name: getattr(grain, name) for name in ("density", "young", "poisson")}
-        material |= {"id": 0, "friction_coefficient": grain.friction}
+    material, written = run.scene.material.grain.model_dump() if run.own else {}, []
     for instant in run.instants(every):
-        scene: dict[str, float] = {"iteration": instant.cycle}
-        if loading is not None and not loading.stage:
-            scene |= {"time": instant.cycle * loading.period, "timestep": run.scene.time_step}
+        scene = {"iteration": instant.cycle} | (_find_time(run, instant) if run.own else {})
+        contacts = _gather_signed_contacts(run, instant) if run.own else {}
         written.append(into / f"vtkhdf/grains_{instant.cycle:06d}.vtkhdf")
-        touching, forces = instant.state.contacts, gather_contacts(run, instant)
-        contacts = {
-            "id1": touching.pair[:, 0], "id2": touching.pair[:, 1], "overlap": touching.overlap,
-            "normal_force": forces["normal_force"], "shear_force": -touching.tangential_force,
-        }  # fmt: skip
         write_bodies(written[-1], instant.state, scene, material, contacts)
     return written
+
+
+def _find_time(run: ExportedRun, instant: Instant) -> dict[str, float]:
+    """Time under load and time step [s], in each stage of the load its own."""
+    time, step = 0.0, run.scene.time_step
+    for begin, stage in list_stages(run.scene):
+        if stage.loading and stage.procedure and instant.cycle > begin:
+            done = min(instant.cycle, stage.procedure.total_cycles) - begin
+            time, step = time + done * stage.loading.period, stage.time_step
+    return {"time": time, "timestep": step}
+
+
+def _gather_signed_contacts(run: ExportedRun, instant: Instant) -> dict[str, Array]:
+    """Contacts as ON-DEM has them: traction is positive, a tangential force acts on grain 2."""
+    touching, (first, second) = instant.state.contacts, list_contacts(instant).T
+    apart = instant.state.position[second] - instant.state.position[first]
+    return {
+        "id1": touching.pair[:, 0], "id2": touching.pair[:, 1], "overlap": touching.overlap,
+        "normal": apart / np.linalg.norm(apart, axis=1)[:, None],
+        "normal_force": -gather_contacts(run, instant)["normal_force"],
+        "shear_force": -touching.tangential_force,
+    }  # fmt: skip
 
 
 FORMATS = {"vtu": export_vtu, "ovito": export_ovito, "csv": export_csv, "vtkhdf": export_vtkhdf}
