@@ -1,4 +1,4 @@
-"""README tells the truth: its code blocks run, its files exist, its make targets are there."""
+"""README and its pages tell the truth: their code blocks run, their make targets are there."""
 
 from __future__ import annotations
 
@@ -11,11 +11,13 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-README = (ROOT / "README.md").read_text()
+PAGES = ("README.md", *(f"docs/{name}.md" for name in ("settle", "vibrate", "hard-grains", "line")))
+TEXTS = {page: (ROOT / page).read_text(encoding="utf-8") for page in PAGES}
 BLOCK = re.compile(
     r"^(?P<engine><!-- runs: engine -->\n)?```(?P<language>bash|python)\n(?P<code>.*?)^```$",
     re.MULTILINE | re.DOTALL,
 )
+BLOCKS = [(page, block) for page in PAGES for block in BLOCK.finditer(TEXTS[page])]
 SHORTER = {"total_cycles": (500, 80)}
 
 
@@ -25,10 +27,10 @@ def blocks() -> list[object]:
         pytest.param(
             block["language"],
             block["code"],
-            id=f"line-{README.count(chr(10), 0, block.start()) + 1}",
+            id=f"{page}-line-{TEXTS[page].count(chr(10), 0, block.start()) + 1}",
             marks=[pytest.mark.engine, pytest.mark.long] if block["engine"] else [],
         )
-        for block in BLOCK.finditer(README)
+        for page, block in BLOCKS
     ]
 
 
@@ -48,7 +50,7 @@ def done() -> set[str]:
 @pytest.mark.parametrize(("language", "code"), blocks())
 def test_block_runs(language: str, code: str, folder: Path, done: set[str]) -> None:
     """Each code block runs as it is printed, in order, in one empty folder."""
-    for earlier in BLOCK.finditer(README):
+    for _, earlier in BLOCKS:
         if earlier["code"] == code:
             break
         if earlier["code"] not in done and not earlier["engine"]:
@@ -77,28 +79,29 @@ def block_run(language: str, code: str, folder: Path, done: set[str]) -> None:
         scene.write_text(text)
 
 
-def test_every_block_is_found() -> None:
+@pytest.mark.parametrize("page", PAGES)
+def test_every_block_is_found(page: str) -> None:
     """No fence with code escapes the reader above; a session to read is fenced as console."""
-    fences = re.findall(r"^```(\w*)$", README, re.MULTILINE)
-    languages = [language for language in fences if language]
-    assert set(languages) <= {"bash", "python", "console"}
-    assert len(blocks()) == sum(language != "console" for language in languages) > 0
+    fences = re.findall(r"^```(\w+)$", TEXTS[page], re.MULTILINE)
+    assert set(fences) <= {"bash", "python", "console"}
+    assert [name for name, _ in BLOCKS].count(page) == len(fences) - fences.count("console") > 0
 
 
 def test_make_targets_exist() -> None:
     """Each ``make`` command of README and CONTRIBUTING is a target of the Makefile."""
     targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
-    named = re.findall(r"(?:\$ |`)make ([a-z-]+)", README + (ROOT / "CONTRIBUTING.md").read_text())
+    text = TEXTS["README.md"] + (ROOT / "CONTRIBUTING.md").read_text()
+    named = re.findall(r"(?:\$ |`)make ([a-z-]+)", text)
     assert {"demo", "test", "lint", "bench", "validate"} <= targets
     assert named
     assert set(named) <= targets
 
 
-def test_readme_names_every_exit_code() -> None:
-    """The table of exit codes is that of ``trackbed --help``."""
+def test_every_exit_code_is_named() -> None:
+    """The table of exit codes in docs/exit-codes.md is that of ``trackbed --help``."""
     from trackbed.errors import EXIT_CODES
 
-    table = README.partition("| exit code |")[2].partition("\n\n")[0]
+    table = (ROOT / "docs" / "exit-codes.md").read_text().partition("| exit code |")[2]
     listed = {
         (code, meaning.strip())
         for row in re.findall(r"^\|(.*)\|$", table, re.MULTILINE)

@@ -365,7 +365,18 @@ def check_references(house: House) -> Iterator[Breach]:
                 yield Breach(file, line, "references", f"there is no {name}")
 
 
+def check_readme(house: House) -> Iterator[Breach]:
+    """README is short, blocks of code aside, and so is each of its sentences and cells."""
+    page, budget = house.root / "README.md", house.budget["readme"]
+    text = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
+    if (words := len(text.split())) > budget["words"]:
+        yield Breach(page.name, 1, "readme", f"{words} words of {budget['words']}")
+    for sentence in re.split(r"[.?!]\s|\n\n|\n[-#]|\|", text):
+        if len(sentence.split()) > budget["words_of_a_sentence"]:
+            yield Breach(page.name, 1, "readme", f"a long sentence: {sentence.strip()}")
+
+
 RULES = (
     check_rooms, check_circles, check_public_words, check_floor, check_studies, check_constants,
-    check_verbs, check_references, check_words,
+    check_verbs, check_references, check_words, check_readme,
 )  # fmt: skip

@@ -44,6 +44,7 @@ def build_house(root: Path, files: dict[str, str]) -> House:
         "adapters/jumps/__init__.py": '"""Jumps."""\n',
         "adapters/jumps/slopes.py": "from adapters.bed import State\n",
         "adapters/jumps/band.py": "from trackbed import one\n",
+        "README.md": "",
         "tests/house/budget.toml": (ROOT / "tests" / "house" / "budget.toml").read_text(),
     }
     for file, text in (sound | files).items():
@@ -102,6 +103,9 @@ def test_a_sound_house_has_no_breach(tmp_path: Path) -> None:
         ("verbs", "adapters/bed/radii.py", "def radii_of(): ...\n", "radii.py:1: verbs"),
         ("references", "adapters/bed/radii.py", '"""As `sift`."""\n', "radii.py:1: references"),
         ("words", "adapters/bed/radii.py", '"""What is made anew."""\n', "radii.py:1: plain"),
+        ("readme", "README.md", "Two words.\n" * 251, "README.md:1: readme: 502 words of 500"),
+        ("readme", "README.md", "```\n" + "code " * 501 + "\n```\n" + "word " * 25, ""),
+        ("readme", "README.md", "word " * 26, "README.md:1: readme: a long sentence"),
     ],
 )  # fmt: skip
 def test_a_breach_is_named(tmp_path: Path, rule: str, file: str, text: str, place: str) -> None:
