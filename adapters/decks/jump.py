@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
 
 from adapters.bed import Container, FloatArray
 from adapters.errors import UsageError
 from adapters.laws import get_law
 from adapters.moves import Jump, get_move
+
+NEIGHBOURS = 6
+"""Nearest grains that a new one went with [-]: as many as a sphere touches in a bed at rest."""
 
 
 def jump(
@@ -21,7 +25,8 @@ def jump(
     after ``first_cycle`` cycles, at 0 before any load.  ``radius``: radii [m], shape (n,), or one
     of all.  ``law``: how a displacement grows with cycles; ``move``: what each grain's own becomes,
     see `adapters.moves`.  Overlaps are left as they come: some cycles heal them.  A grain at one
-    place in all states stays there.
+    place in all states stays there.  Of one that came after the first state, as a fragment, places
+    are nan before; see `follow_neighbours`.
 
     Raises `UsageError` for arrays that do not fit, are not finite, or are too few for the law.
     """
@@ -39,12 +44,40 @@ def jump(
     cycle = first_cycle + np.arange(len(position), dtype=float)
     size = np.ptp(position[-1], axis=0) + 2 * radii.max()
     container = Container("box", size_x=float(size[0]), size_y=float(size[1]))
-    seen = Jump(cycle, position, radii, get_law(law), h, container)
+    seen = Jump(cycle, follow_neighbours(position), radii, get_law(law), h, container)
     return keep_held(position, position[-1] + get_move(move).displacement(seen))
+
+
+def follow_neighbours(position: FloatArray) -> FloatArray:
+    """Places (c, n, 3) [m] in which a grain that came later, nan before, went until then with the
+    mean of its `NEIGHBOURS`.
+
+    So a fragment goes where they do, the more the later it came, and contacts are kept; one that
+    stayed would be pressed by all of their move.  Raises `UsageError` where places are not finite
+    from a grain's first state to the last, or no grain is there in all.
+    """
+    late = np.isnan(position).any(axis=2)
+    came = late.any(axis=0)
+    if late[-1].any() or came.all() or (late[1:] > late[:-1]).any():
+        raise UsageError(
+            "places are not finite", where="jump",
+            remedy="give grains that are there in the last state; nan is for what came later",
+        )  # fmt: skip
+    if not came.any():
+        return position
+    known, count = position[:, ~came], min(NEIGHBOURS, int((~came).sum()))
+    near = cKDTree(known[-1]).query(position[-1, came], range(1, count + 1))[1]
+    path = known[:, near].mean(axis=2)
+    first = late[:, came].sum(axis=0), np.arange(came.sum())
+    position = position.copy()
+    path += (position[:, came] - path)[first]
+    position[:, came] = np.where(late[:, came, None], path, position[:, came])
+    return position
 
 
 def keep_held(seen: FloatArray, target: FloatArray) -> FloatArray:
     """Where grains are to go, (n, 3) [m]; those at one place in all states ``seen`` (c, n, 3) [m]
     are held by the user's own program, and stay."""
-    held = (seen == seen[-1]).all(axis=(0, 2)) & (len(seen) > 1)
+    there = np.isfinite(seen)
+    held = ((seen == seen[-1]) | ~there).all(axis=(0, 2)) & (there[..., 2].sum(axis=0) > 1)
     return np.where(held[:, None], seen[-1], target)

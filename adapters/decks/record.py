@@ -33,10 +33,10 @@ class DeckTrack(Track):
 
 def make_state(states: States, index: int, cycle: int) -> State:
     """One of ``states`` as a state of a bed, at the end of a ``cycle``."""
-    place, velocity = states.position[index], states.velocity[index]
-    still = np.zeros_like(velocity)
+    one = states.at(index)
+    place, velocity = one.position[0], one.velocity[0]
     return State(
-        states.identifier, place, states.radius, states.mass, velocity, still, cycle=cycle
+        one.identifier, place, one.radius, one.mass, velocity, np.zeros_like(velocity), cycle=cycle
     )  # fmt: skip
 
 

@@ -29,7 +29,7 @@ from adapters.decks.scene import load_deck_scene
 from adapters.decks.states import States, find_overlap, load_states, read_states, save_states
 from adapters.engines import allow_interrupts, get_engine
 from adapters.errors import EngineFailed, NotCredible, SceneError
-from adapters.files import Outcome, RunFolder, explain_full_disk
+from adapters.files import EXCHANGE, Outcome, RunFolder, explain_full_disk
 from adapters.files import restart as kept
 from adapters.jumps import SLOPES
 from adapters.procedure import (
@@ -84,7 +84,7 @@ def run_deck_scene(
     """Run the scene of an adopted deck in the folder ``run_path``; with ``control`` all cycles too.
 
     A folder that holds the same is gone on with.  Raises `SceneError` for a deck that can not be
-    cut, `EngineMissing`, `EngineFailed`, and `NotCredible` where grains come or go.
+    cut, `EngineMissing`, `EngineFailed`, and `NotCredible` where grains can not be followed.
     """
     scene, bed = load_deck_scene(path, overrides)
     if stops := [one for one in find_obstacles(bed.deck, bed.engine) if one.kind != "note"]:
@@ -155,13 +155,16 @@ def compute(run: DeckRun, place: Place, cycles: int, healing: int = 0) -> Place:
         folder, before = run.folder.begin(name), start.energy.max()
         start = write_start(run, place, start, folder)
         cost = run_deck(bed, format_run(bed, "window", cycles), folder / "window.in")
-        states = read_states(folder, 1, cycles, bed).behind(start)
+        states = read_states(folder, 1, cycles, bed, start)
         after = states.energy[healing:].max()
         if place.jumped and after > CALM * before:
             what = f"behind the jump the bed moves with {after:.3g} J, and with {before:.3g} before"
             raise NotCredible(what, where=str(folder))
-        first = run.states("preparation")
-        rows = [make_row(first, states, c, place.cycle, healing) for c in range(1, cycles + 1)]
+        first = run.states("preparation").height[0]
+        done = [row for one in run.folder.outcomes() for row in one.rows[-1:]]
+        sunk = done[-1]["settlement"] if done else 0.0
+        ends = range(1, cycles + 1)
+        rows = [make_row(first, sunk, states, c, place.cycle, healing) for c in ends]
         finish(run, folder, place, rows, states, cost, started)
     return Place(place.cycle + cycles, name, healing)
 
@@ -169,6 +172,7 @@ def compute(run: DeckRun, place: Place, cycles: int, healing: int = 0) -> Place:
 def write_start(run: DeckRun, place: Place, states: States, folder: Path) -> States:
     """Write the restart file of the last of ``states``, moved where a jump was made; that state."""
     restart, bed = bytearray((run.folder.path / place.window / "end.restart").read_bytes()), run.bed
+    states = states.at(-1)
     (metre, _), move, drop = bed.deck.units, np.zeros(3), 0.0
     if place.jumped:
         with np.load(run.folder.path / place.jumped / "moved.npz") as data:
@@ -213,23 +217,25 @@ def jump_bed(run: DeckRun, place: Place, h: int, name: str) -> Place:
     if outcome is None or outcome.last_cycle != place.cycle + h:
         started, p, states = time.process_time(), run.procedure, run.states(place.window)
         folder = run.folder.begin(name)
-        seen = states.position[place.healing :]
-        first = place.cycle + 1 - len(seen)
-        target = jump(seen, h, states.radius, law=p.law, move=p.move, first_cycle=first)
         before = make_state(states, -1, place.cycle)
+        there, radius = np.isin(states.identifier, before.identifier), before.radius
+        seen = states.position[place.healing :, there]
+        first = place.cycle + 1 - len(seen)
+        target = jump(seen, h, radius, law=p.law, move=p.move, first_cycle=first)
         # what forecasts ask of a run
         like: Any = SimpleNamespace(procedure=p, folder=run.folder, first_cycle=0)
         at: Any = place
         if p.settlement == "history":
             gain = estimate_gain(like, at, h, run.folder.outcomes(), SLOPES)
             target = keep_held(seen, settle_by(gain, before, target))
-        pressed = [find_overlap(x, states.radius) for x in (seen[-1], target)]
-        if not run.bed.stones and pressed[1] > pressed[0] + PRESSED * states.radius.min():
+        pressed = [find_overlap(x, radius) for x in (seen[-1], target)]
+        if not run.bed.stones and pressed[1] > pressed[0] + PRESSED * radius.min():
             what = f"it presses grains into one another by {pressed[1]:.3g} m"
             raise NotCredible(what, where=str(folder))
         drop = estimate_sinking(like, at, h) if run.bed.loaded else 0.0
         np.savez(folder / "moved.npz", move=target - seen[-1], drop=drop)
         row = run.folder.outcomes()[-1].rows[-1] | {"cycle": place.cycle + h, "kind": "jumped"}
+        row |= dict.fromkeys(EXCHANGE)  # in jumped cycles nobody saw what broke
         row["settlement"] -= float((target - seen[-1])[:, 2].mean())
         for key, sign in (("piston_height", -1), ("loaded_body", 1)):
             row[key] = None if row[key] is None else row[key] + sign * drop
@@ -238,19 +244,24 @@ def jump_bed(run: DeckRun, place: Place, h: int, name: str) -> Place:
     return Place(place.cycle + h, place.window, place.healing, name)
 
 
-def make_row(first: States, states: States, c: int, start: int, healing: int) -> dict[str, Any]:
+def make_row(
+    first: float, sunk: float, states: States, c: int, start: int, healing: int
+) -> dict[str, Any]:
     """The row of ``settlement.csv`` at the end of cycle ``c`` of a window from cycle ``start`` on.
 
-    ``first``: the states of the preparation.  None where there is no loaded body.
+    ``first``: height of the loaded body behind the preparation [m]; None where there is none.
+    ``sunk``: settlement of the mean grain before the window [m], to which that of the grains that
+    are there all through it is added.
     """
-    height = float(states.height[c])
+    height, through = float(states.height[c]), states.position[:, states.through, 2]
     loaded = np.isfinite(height)
     return {
         "cycle": start + c, "kind": "healing" if c <= healing else "computed",
-        "settlement": float((first.position[0] - states.position[c])[:, 2].mean()),
-        "loaded_body": float(first.height[0]) - height if loaded else None,
+        "settlement": sunk + float((through[0] - through[c]).mean()),
+        "loaded_body": float(first) - height if loaded else None,
         "piston_height": height if loaded else None, "coordination_number": None,
         "elastic_deflection": None, "kinetic_translational": float(states.energy[c]),
+        **dict(zip(EXCHANGE, states.exchange[c - 1].tolist(), strict=True)),
     }  # fmt: skip
 
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from adapters.bed import FloatArray, IntArray
+from adapters.bed import BoolArray, FloatArray, IntArray
 from adapters.decks.engine import Adopted
+from adapters.decks.exchange import count_exchange, refuse_losses, refuse_strangers
 from adapters.errors import NotCredible
 from adapters.files import read_frames
 from adapters.files import restart as kept
@@ -26,7 +28,8 @@ PER_CYCLE = ("position", "velocity", "height")
 class States:
     """Cycle ends of a deck, the first the state before the window; c of them, n grains.
 
-    A grain of several spheres, a stone, counts as one.
+    A grain of several spheres, a stone, counts as one.  Radius and mass are those at the last end
+    at which a grain is there; where it is not, place and velocity are nan.
     """
 
     identifier: IntArray  # ascending, shape (n,)
@@ -40,45 +43,74 @@ class States:
     velocity; shape (spheres, 7)."""
     period: FloatArray = field(default_factory=lambda: np.full((3, 2), np.nan))
     """Low and high side of the box in the deck's units, nan where it is not periodic, (3, 2)."""
+    exchange: FloatArray = field(default_factory=lambda: np.empty((0, 5)))
+    """What came, went and wore in each cycle, rows of `count_exchange`, shape (c - 1, 5)."""
 
     @property
     def energy(self) -> FloatArray:
         """Translational kinetic energy [J], shape (c,)."""
-        return 0.5 * (self.mass * (self.velocity**2).sum(axis=2)).sum(axis=1)
+        return 0.5 * np.nansum(self.mass * (self.velocity**2).sum(axis=2), axis=1)
 
-    def behind(self, start: States) -> States:
-        """The last state of ``start``, and these behind it."""
-        pairs = ((getattr(start, name)[-1:], getattr(self, name)) for name in PER_CYCLE)
-        return replace(self, **dict(zip(PER_CYCLE, map(np.concatenate, pairs), strict=True)))
+    @property
+    def through(self) -> BoolArray:
+        """Which grains are there at all ends, shape (n,)."""
+        return np.isfinite(self.position[:, :, 2]).all(axis=0)
+
+    def at(self, index: int) -> States:
+        """The end at an ``index`` alone, and the grains that are there."""
+        there = np.isfinite(self.position[index, :, 2])
+        one = slice(index, index + 1 or None)
+        return replace(
+            self, identifier=self.identifier[there], radius=self.radius[there],
+            mass=self.mass[there], position=self.position[one, there],
+            velocity=self.velocity[one, there], height=self.height[one],
+        )  # fmt: skip
 
 
-def read_states(folder: Path, first: int, last: int, bed: Adopted) -> States:
-    """States of a bed in a folder, at the ends of its cycles ``first`` to ``last``.
+def read_states(
+    folder: Path, first: int, last: int, bed: Adopted, start: States | None = None
+) -> States:
+    """States of a bed in a folder, at the ends of its cycles ``first`` to ``last``, with a
+    ``start`` behind the state of that one end.
 
-    Raises `NotCredible` where grains came or went, and what `read_frames` raises.
+    Raises `NotCredible` where there are no grains, where none stays, and where grains were lost or
+    have the identifiers of others; and what `read_frames` raises.
     """
     read = read_scene_end if bed.deck.is_script else read_end
     ends = [read(folder, number, bed) for number in range(first, last + 1)]
-    start, end = ends[0], ends[-1]
-    if not len(start.last):
+    ends, first = ([start, *ends], first - 1) if start else (ends, first)
+    if not len(ends[0].last):
         raise NotCredible("there are no grains where the cycle begins", where=str(bed.deck.path))
-    for number, one in enumerate(ends, first):
-        if not np.array_equal(one.last[:, 0], start.last[:, 0]):
-            raise NotCredible(
-                f"there are {len(one.last)} grains at the end of cycle {number} of this window, "
-                f"and {len(start.last)} before it: grains came or went",
-                where=str(folder), remedy="thermo_modify lost error; no insertion in the cycle",
-            )  # fmt: skip
-    position, velocity, height = (
-        np.concatenate([getattr(one, name) for one in ends]) for name in PER_CYCLE
-    )
-    radius = start.radius
-    if (stone := radius == 0).any():
-        nearest = cKDTree(position[0]).query(position[0], 2)[0][:, 1] / 2
-        radius = np.where(stone, nearest, radius)
+    states = join_ends(ends, first, folder)
+    refuse_losses(states.exchange, bed, folder)
+    if not states.through.any():
+        raise NotCredible(
+            "no grain is there at all cycle ends of this window", where=str(folder),
+            remedy="shorter windows (procedure.k_i and k)",
+        )  # fmt: skip
+    return states
+
+
+def join_ends(ends: Sequence[States], first: int, folder: Path) -> States:
+    """Cycle ends of one state each, from cycle ``first`` on, as those of all grains in any of them;
+    raises `NotCredible` as `refuse_strangers`."""
+    identifier = np.unique(np.concatenate([one.identifier for one in ends]))
+    position, velocity = np.full((2, len(ends), len(identifier), 3), np.nan)
+    radius, last, mass = (*np.empty((2, len(identifier))), position[:, :, 0].copy())
+    for number, one in enumerate(ends):
+        rows = np.searchsorted(identifier, one.identifier)
+        position[number, rows], velocity[number, rows] = one.position[0], one.velocity[0]
+        radius[rows], last[rows], mass[number, rows] = one.radius, one.mass, one.mass
+    there = np.isfinite(mass[-1])
+    if (stone := there & (radius == 0)).any():
+        centres = position[-1, there]
+        radius[stone] = cKDTree(centres).query(position[-1, stone], 2)[0][:, 1] / 2
+    refuse_strangers(identifier, mass, first, folder)
     return replace(
-        end, radius=radius, mass=start.mass, position=position, velocity=velocity, height=height
-    )
+        ends[-1], identifier=identifier, radius=radius, mass=last, position=position,
+        velocity=velocity, height=np.concatenate([one.height for one in ends]),
+        exchange=count_exchange(mass),
+    )  # fmt: skip
 
 
 def read_end(folder: Path, number: int, bed: Adopted) -> States:

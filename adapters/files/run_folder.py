@@ -26,12 +26,15 @@ from adapters.errors import UsageError
 from trackbed import run_files
 from trackbed.memory import read_bounded
 
+EXCHANGE = ("grains_came", "mass_came", "grains_went", "mass_went", "mass_worn")
+"""Columns of a user's deck that has grains come, go and wear in a cycle: numbers, masses [kg]."""
 COLUMNS = {
     "cycle": "cycle", "loaded_body_settlement": "loaded_body", "stiffness": "stiffness",
     "elastic_deflection": "elastic_deflection", "mean_grain_settlement": "settlement",
     **{name: name for name in (
         "kind", "coordination_number", "relative_density", "piston_height", "force_error",
         "maximum_overlap", "kinetic_translational", "kinetic_rotational", "mean_rotation",
+        *EXCHANGE,
     )},
 }  # fmt: skip
 """Columns of ``settlement.csv`` and their names in `Outcome.rows`: SI units, settlement since the

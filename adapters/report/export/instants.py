@@ -20,7 +20,7 @@ class Instant:
     """The bed at the end of a load cycle; at cycle 0 before loading."""
 
     state: State
-    displacement: FloatArray  # of every grain since cycle 0 [m], shape (n, 3)
+    displacement: FloatArray  # of every grain since cycle 0 [m], (n, 3); nan of one that came later
     rotation: FloatArray | None  # of every stone since cycle 0 [rad], shape (n, 3)
     coordination: IntArray
     """Contacts of every grain with other grains, shape (n,); their mean is the run's table's."""
@@ -82,7 +82,10 @@ class ExportedRun:
             rotation = None
             if start.orientation is not None and state.orientation is not None:
                 rotation = find_rotation(start.orientation, state.orientation)
-            yield Instant(state, state.position - start.position, rotation, coordination)
+            row = np.searchsorted(start.identifier[:-1], state.identifier)
+            since = state.position - start.position[row]
+            since[start.identifier[row] != state.identifier] = np.nan
+            yield Instant(state, since, rotation, coordination)
 
     @property
     def last_cycle(self) -> int:
