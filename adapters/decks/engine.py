@@ -29,6 +29,7 @@ SILENT_S = 7200.0
 MEANT = {
     "Atom::grow() callback": "LAMMPS says so where a wall's region is missing: declare the region "
     "above the fix",
+    "with per-atom info": "a window can make grains behind its first run alone: create_atoms there",
     "Lost atoms": "grains left the box: look at the last state, or take a shorter time step",
     "NameError": "of what stands above the cycle, a window has imports, functions and classes not "
     "inside of if or try, numbers, texts, vectors, arrays, bodies and lists of these: make other "

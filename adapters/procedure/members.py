@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from adapters.bed import FloatArray
+from adapters.files import EXCHANGE, Outcome
 from adapters.jumps import BAND_PROBABILITY
 from adapters.procedure.history import History, find_speed_up, list_jumped_spans, sum_cost
 from adapters.procedure.record import Record, estimate_band_of_run, find_comparable_cycle
@@ -138,9 +139,22 @@ def describe_result(record: Record) -> list[str]:
     computed = record.run.history.count_computed(settled.cycle)
     how = "all" if computed == settled.cycle else f"{computed:,}"
     said = f"mean grain settles {format_length(settled.mean_grain)}"
-    said += f"; {how} of {settled.cycle:,} cycles computed"
+    said += f"; {how} of {settled.cycle:,} cycles computed{describe_exchange(record.run.outcomes)}"
     sleeper = [describe_sleeper(settled)] if isfinite(settled.loaded_body.value) else []
     return [said + format_error(settled.mean_grain_error), *sleeper]
+
+
+def describe_exchange(outcomes: Sequence[Outcome]) -> str:
+    """Grains that came, went and wore in the computed cycles of a user's deck; empty for none."""
+    came, new, went, gone, worn = (
+        sum(row.get(key) or 0 for one in outcomes for row in one.rows) for key in EXCHANGE
+    )
+    if not (came or went or worn):
+        return ""
+    return (
+        f", in which {came:.0f} grains of {new:.3g} kg came, {went:.0f} of {gone:.3g} kg went and "
+        f"{worn:.3g} kg wore off (the mean grain is of those there all through a window)"
+    )
 
 
 def describe_sleeper(settled: Settled) -> str:
