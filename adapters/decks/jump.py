@@ -25,8 +25,8 @@ def jump(
     after ``first_cycle`` cycles, at 0 before any load.  ``radius``: radii [m], shape (n,), or one
     of all.  ``law``: how a displacement grows with cycles; ``move``: what each grain's own becomes,
     see `adapters.moves`.  Overlaps are left as they come: some cycles heal them.  A grain at one
-    place in all states stays there.  Of one that came after the first state, as a fragment, places
-    are nan before; see `follow_neighbours`.
+    place in all states stays there.  One that came after the first, as a fragment, has nan before;
+    see `follow_neighbours`.
 
     Raises `UsageError` for arrays that do not fit, are not finite, or are too few for the law.
     """
@@ -49,29 +49,27 @@ def jump(
 
 
 def follow_neighbours(position: FloatArray) -> FloatArray:
-    """Places (c, n, 3) [m] in which a grain that came later, nan before, went until then with the
-    mean of its `NEIGHBOURS`.
+    """Places (c, n, 3) [m] in which a grain that is not there in all states, nan, goes with the
+    mean of its `NEIGHBOURS` that are.
 
-    So a fragment goes where they do, the more the later it came, and contacts are kept; one that
-    stayed would be pressed by all of their move.  Raises `UsageError` where places are not finite
-    from a grain's first state to the last, or no grain is there in all.
+    Its own path is left out: a fragment falls into its gap within some cycles, 20 times as far as
+    others in the first, which no law repeats.  One that a jump left where it is loses contacts: of
+    946 in two beds 660 were kept, 759 so.  Raises `UsageError` where a last place is not finite, or
+    no grain is there in all states.
     """
-    late = np.isnan(position).any(axis=2)
-    came = late.any(axis=0)
-    if late[-1].any() or came.all() or (late[1:] > late[:-1]).any():
+    came = np.isnan(position).any(axis=(0, 2))
+    if not np.isfinite(position[-1]).all() or came.all():
         raise UsageError(
             "places are not finite", where="jump",
-            remedy="give grains that are there in the last state; nan is for what came later",
+            remedy="give the grains of the last state; nan is for those that came later",
         )  # fmt: skip
     if not came.any():
         return position
-    known, count = position[:, ~came], min(NEIGHBOURS, int((~came).sum()))
+    known, position = position[:, ~came], position.copy()
+    count = min(NEIGHBOURS, known.shape[1])
     near = cKDTree(known[-1]).query(position[-1, came], range(1, count + 1))[1]
     path = known[:, near].mean(axis=2)
-    first = late[:, came].sum(axis=0), np.arange(came.sum())
-    position = position.copy()
-    path += (position[:, came] - path)[first]
-    position[:, came] = np.where(late[:, came, None], path, position[:, came])
+    position[:, came] = path + (position[-1, came] - path[-1])
     return position
 
 

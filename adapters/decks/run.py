@@ -51,7 +51,7 @@ CALM = 10.0
 """Kinetic energy behind a jump and its healing over the greatest at cycle ends before it [-]: a
 jump that throws the bed apart leaves thousands of times as much, a calm one about as much."""
 PRESSED = 0.1
-"""By how much a jump may deepen the greatest overlap of two grains, over the least radius [-]."""
+"""By how much a jump may deepen the greatest overlap of two grains, over the smaller radius [-]."""
 
 
 @dataclass(frozen=True)
@@ -229,8 +229,8 @@ def jump_bed(run: DeckRun, place: Place, h: int, name: str) -> Place:
             gain = estimate_gain(like, at, h, run.folder.outcomes(), SLOPES)
             target = keep_held(seen, settle_by(gain, before, target))
         pressed = [find_overlap(x, radius) for x in (seen[-1], target)]
-        if not run.bed.stones and pressed[1] > pressed[0] + PRESSED * radius.min():
-            what = f"it presses grains into one another by {pressed[1]:.3g} m"
+        if not run.bed.stones and pressed[1] > pressed[0] + PRESSED:
+            what = f"it presses grains into one another by {pressed[1]:.3g} of the smaller radius"
             raise NotCredible(what, where=str(folder))
         drop = estimate_sinking(like, at, h) if run.bed.loaded else 0.0
         np.savez(folder / "moved.npz", move=target - seen[-1], drop=drop)

@@ -148,10 +148,12 @@ def read_scene_end(folder: Path, number: int, bed: Adopted) -> States:
 
 
 def find_overlap(position: FloatArray, radius: FloatArray) -> float:
-    """Greatest overlap of two grains [m]: places (n, 3) and radii (n,) [m]; zero without."""
+    """Greatest overlap of two grains over the smaller radius [-]: places (n, 3) and radii (n,)
+    [m]; zero without."""
     pairs = cKDTree(position).query_pairs(2 * radius.max(), output_type="ndarray")
     apart = np.linalg.norm(position[pairs[:, 0]] - position[pairs[:, 1]], axis=1)
-    return float((radius[pairs].sum(axis=1) - apart).max(initial=0.0))
+    both = radius[pairs]
+    return float(((both.sum(axis=1) - apart) / both.min(axis=1)).max(initial=0.0))
 
 
 def save_states(states: States, path: Path) -> None:

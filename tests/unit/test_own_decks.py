@@ -522,5 +522,5 @@ def test_gravity_aside_stops_and_overlaps_are_seen(tmp_path: Path) -> None:
     found = find_obstacles(read_text(tmp_path, text), "lammps")
     assert "gravity is not along -z" in " ".join(one.what for one in found if one.kind == "stops")
     place = np.array([[0, 0, 0], [0, 0, 1.5], [0, 9, 0.0]])
-    assert find_overlap(place, np.array([1.0, 0.75, 1.0])) == pytest.approx(0.25)
+    assert find_overlap(place, np.array([1.0, 0.75, 1.0])) == pytest.approx(0.25 / 0.75)
     assert find_overlap(place[::2], np.ones(2)) == 0.0
