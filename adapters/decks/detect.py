@@ -62,7 +62,7 @@ PATTERNS = (
     ("cycle", r"(?:if .*\b)?delete_atoms (?!.*\bcompress no\b)", "stops",
      "'{all}' gives the grains that are left new numbers, and none can be followed",
      "delete_atoms ... compress no"),
-    ("cycle", r"if ", "note", "'{all}': every cycle must take the same branch", ""),
+    ("cycle", r"if ", "note", "'{all}': every cycle must take the same branch, unless grains break there", ""),
     ("before", rf"if .*(?:{DECLARED}|\b(?:variable|timestep|neighbor)\s)", "stops",
      "'{all}' declares something or not: a window can not know which",
      "write the command that it comes to, without if"),

@@ -16,7 +16,7 @@ from adapters.decks.scene import load_deck_scene
 from adapters.decks.split import format_whole, format_window
 from adapters.decks.states import States, load_states, read_states
 from adapters.errors import SceneError
-from adapters.files import RunFolder, read_frames
+from adapters.files import EXCHANGE, RunFolder, read_frames
 from adapters.files.restart import find_mesh, move_grains, move_stones
 from tests import own_decks
 from tests.unit.test_own_decks import write_deck
@@ -133,3 +133,45 @@ def test_a_deck_is_run_with_jumps_and_a_full_run_beside_it(
     assert [one["event"] for one in run.events()[events:]] == ["engine"]
     with pytest.raises(SceneError, match="differs from the one this run was started with"):
         run_deck_scene(scene, run.path, overrides=["procedure.total_cycles=50"])
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("engine", [
+    pytest.param(name, marks=pytest.mark.engine(name)) for name in ("liggghts", "lammps")
+])  # fmt: skip
+def test_grains_that_break_and_wear_are_followed(engine: str, tmp_path: Path, capsys) -> None:
+    """Grain 7 breaks into 31 and 32 in the second and in the eighth cycle: windows are one process
+    to the last bit; a jump moves who is there, and throws nobody; masses are those of spheres."""
+    (tmp_path / "early").mkdir()
+    early = str(write_deck(tmp_path / "early", own_decks.break_grains(engine, 2)))
+    assert command.main(["adopt", early, "--engine", engine, "--check"]) == 0
+    assert capsys.readouterr().out.count("places differ by 0 m at most") == 2
+    scene = adopt(write_deck(tmp_path, own_decks.break_grains(engine, 8)), engine).scene
+    keys = KEYS | {"h": 2, "total_cycles": 18}
+    words = [word for key, value in keys.items() for word in ("--set", f"procedure.{key}={value}")]
+    assert command.main(["run", str(scene), "--control", *words]) == 0
+    run = RunFolder(scene.parent / "run")
+    assert [(o.stage, o.last_cycle) for o in run.outcomes()][3:5] == [("jump", 12), ("window", 18)]
+    rows = {row["cycle"]: row for one in run.outcomes() for row in one.rows}
+    grain = 2500 * np.pi / 6 * 0.01**3
+    exchange = [rows[8][key] for key in EXCHANGE]
+    worn = grain * (0.994**3 - 0.993**3)  # the seventh cycle's wear was the sixth
+    assert exchange == pytest.approx([2, grain / 4, 1, grain, worn], rel=1e-9)
+    assert not any(rows[cycle]["grains_came"] for cycle in rows.keys() - {8})
+    assert rows[12]["grains_came"] is None
+    before, after = (load_states(run.path / f"window_{n:06d}/states.npz") for n in (6, 12))
+    assert before.identifier.tolist() == [*range(1, 33)]
+    assert after.identifier.tolist() == [n for n in range(1, 33) if n != 7]
+    assert after.radius[4] == pytest.approx(0.005 * (1 - 0.001 * 15), rel=1e-9)
+    assert after.radius[-1] == 0.0025
+    assert after.energy[3:].max() < 3 * before.energy.max()
+    paths = np.linalg.norm(after.position - after.position[0], axis=2)
+    assert paths.max() < 0.01  # within a diameter in six cycles
+    assert command.main(["status", str(run.path)]) == 0
+    said = "2 grains of 0.000327 kg came, 1 of 0.00131 kg went and "
+    assert said in capsys.readouterr().out.splitlines()[-1]
+    export = tmp_path / "export"
+    assert command.main(["export", str(run.path), "--to", "csv", "--into", str(export)]) == 0
+    last = [line.split(",") for line in (export / "grains.csv").read_text().splitlines()[-31:]]
+    unknown = [line[1] for line in last if "nan" in line]
+    assert unknown == ["31", "32"]

@@ -147,6 +147,8 @@ OBSTACLES = {
     "upto": ("liggghts", cut("run 40\nrun 60", "run 300 upto"), "stops", "-> run 200"),
     "no run": ("liggghts", cut("", "fix m all nve\nunfix m"), "stops", "nothing is run"),
     "another bed": ("lammps", cut("", "clear\nrun 5"), "stops", "begins another bed"),
+    "renumbered": ("lammps", cut("", 'if "1 > 0" then "delete_atoms group g"\nrun 5'),
+                   "stops", "compress no"),
     "frozen step": ("lammps", cut("variable a equal step*2\nvariable b equal ${a}+v_a\n"
                                   "fix m all gravity ${b}"), "stops", "comes of step"),
     "frozen compute": ("lammps", cut("variable a equal c_1[1]\nfix m all gravity ${a}"),
