@@ -163,37 +163,27 @@ assert seen["calls"] == len(plot.data["i"]) == unbalancedForce + 8 * seen["cycle
 """Spheres and clumps under a plate; functions, variables, a body, an engine and what is plotted
 are used in the cycle."""
 HELPERS = "def pull(g):\n    return 0, 0, -g\n"
-BROKEN = """\
+FRAGMENTS = """\
+run 400
 variable now equal step
 variable left equal x[7]-0.0025
 variable right equal x[7]+0.0025
-variable along equal y[7]
-variable up equal z[7]
+variable y equal y[7]
+variable z equal z[7]
 variable wide equal 0.01*(1-0.001*floor((step-{start})/800))
-# trackbed: cycle
-"""
-FRAGMENTS = """\
-run 400
 if "${{now}} == {step}" then &
-  "create_atoms 1 single ${{left}} ${{along}} ${{up}} units box" &
-  "create_atoms 1 single ${{right}} ${{along}} ${{up}} units box" &
-  "set atom 31*32 diameter 0.005 density 2500" &
+  "create_atoms 1 single ${{left}} ${{y}} ${{z}} units box" &
+  "create_atoms 1 single ${{right}} ${{y}} ${{z}} units box" &
+  "set atom {new} diameter 0.005 density 2500" &
   "group broken id 7" "delete_atoms group broken compress no"
 set atom 5 diameter ${{wide}} density 2500
 """
 
 
 def break_grains(engine: str, cycle: int) -> str:
-    """A deck of 30 grains on a smaller floor: in a ``cycle`` two fragments of half the diameter
-    take the place of grain 7; grain 5 loses a thousandth of its first diameter in each."""
-    text = {"liggghts": LIGGGHTS, "lammps": LAMMPS}[engine].replace("include walls.in\n", WALLS)
-    for old, new in (
-        ("0.061", "0.037"), ("0.059", "0.035"), ("0.054", "0.03"), ("0.06 ", "0.036 "),
-        ("0.06\n", "0.036\n"), ("in_region 80", "in_region 30"), ("random 60", "random 30"),
-        ("atom_style sphere\n", "atom_style sphere\natom_modify map array\n"),
-    ):  # fmt: skip
-        text = text.replace(old, new)
-    start = 9001 if engine == "liggghts" else 9000
-    cut = FRAGMENTS.format(step=start + 800 * (cycle - 1) + 400)
-    head, tail = text.split("# trackbed: cycle\n")
-    return head + BROKEN.format(start=start) + tail.replace("run 400\n", cut, 1)
+    """A deck in which two fragments of half its diameter take the place of grain 7 in a ``cycle``;
+    grain 5 loses a thousandth of its first diameter in each."""
+    text, start, grains = (LAMMPS, 9000, 60) if engine == "lammps" else (LIGGGHTS, 9001, 80)
+    text = text.replace("atom_style sphere\n", "atom_style sphere\natom_modify map array\n")
+    new, step = f"{grains + 1}*{grains + 2}", start + 800 * (cycle - 1) + 400
+    return text.replace("run 400\n", FRAGMENTS.format(start=start, new=new, step=step), 1)

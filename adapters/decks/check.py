@@ -72,8 +72,7 @@ def is_checked(scene: Path, bed: Adopted) -> bool:
 def check_cut(bed: Adopted, folder: Path, cycles: int = 2) -> Difference:
     """Run ``cycles`` cycles both ways in ``folder`` and compare them.
 
-    Raises `EngineMissing`, `EngineFailed`, `NotCredible` where grains lie still, and as
-    `read_states`.
+    Raises `EngineMissing`, `EngineFailed`, `NotCredible` where grains lie still, or are lost.
     """
     before = folder / "whole"
     before.mkdir()
@@ -92,16 +91,11 @@ def check_cut(bed: Adopted, folder: Path, cycles: int = 2) -> Difference:
         run_deck(bed, format_run(bed, "window", 1), window / "window.in")
         ends.append(read_states(window, 1, 1, bed))
         before = window
-    apart = np.array([measure_apart(end, one.at(c)) for c, end in enumerate(ends, 1)])
+    apart = [np.inf] * cycles  # of other grains
+    for cycle, end in enumerate(ends):
+        if np.array_equal(end.identifier, (whole := one.at(cycle + 1)).identifier):
+            apart[cycle] = np.abs(end.position - whole.position).max()
     height = np.array([end.height[0] for end in ends]) - one.height[1:]
-    through = one.position[:, one.through]
-    way = np.linalg.norm(through[1:] - through[0], axis=2).max(axis=1)
-    digit = np.spacing(np.abs(through).max())
-    return Difference(len(one.identifier), apart, np.abs(height), way, float(digit))
-
-
-def measure_apart(end: States, other: States) -> float:
-    """Greatest difference of a grain's place at an end of two runs [m]; inf for other grains."""
-    if not np.array_equal(end.identifier, other.identifier):
-        return np.inf
-    return float(np.abs(end.position - other.position).max())
+    way = np.nanmax(np.linalg.norm(one.position[1:] - one.position[0], axis=2), axis=1)
+    digit = float(np.spacing(np.nanmax(np.abs(one.position))))
+    return Difference(len(one.identifier), np.array(apart), np.abs(height), way, digit)

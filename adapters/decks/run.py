@@ -160,11 +160,9 @@ def compute(run: DeckRun, place: Place, cycles: int, healing: int = 0) -> Place:
         if place.jumped and after > CALM * before:
             what = f"behind the jump the bed moves with {after:.3g} J, and with {before:.3g} before"
             raise NotCredible(what, where=str(folder))
-        first = run.states("preparation").height[0]
-        done = [row for one in run.folder.outcomes() for row in one.rows[-1:]]
-        sunk = done[-1]["settlement"] if done else 0.0
-        ends = range(1, cycles + 1)
-        rows = [make_row(first, sunk, states, c, place.cycle, healing) for c in ends]
+        done = [{"settlement": 0.0}, *(row for o in run.folder.outcomes() for row in o.rows[-1:])]
+        given = states, done[-1]["settlement"], run.states("preparation").height[0]
+        rows = [make_row(c, place.cycle, healing, *given) for c in range(1, cycles + 1)]
         finish(run, folder, place, rows, states, cost, started)
     return Place(place.cycle + cycles, name, healing)
 
@@ -218,17 +216,16 @@ def jump_bed(run: DeckRun, place: Place, h: int, name: str) -> Place:
         started, p, states = time.process_time(), run.procedure, run.states(place.window)
         folder = run.folder.begin(name)
         before = make_state(states, -1, place.cycle)
-        there, radius = np.isin(states.identifier, before.identifier), before.radius
-        seen = states.position[place.healing :, there]
+        seen = states.position[place.healing :, np.isin(states.identifier, before.identifier)]
         first = place.cycle + 1 - len(seen)
-        target = jump(seen, h, radius, law=p.law, move=p.move, first_cycle=first)
+        target = jump(seen, h, before.radius, law=p.law, move=p.move, first_cycle=first)
         # what forecasts ask of a run
         like: Any = SimpleNamespace(procedure=p, folder=run.folder, first_cycle=0)
         at: Any = place
         if p.settlement == "history":
             gain = estimate_gain(like, at, h, run.folder.outcomes(), SLOPES)
             target = keep_held(seen, settle_by(gain, before, target))
-        pressed = [find_overlap(x, radius) for x in (seen[-1], target)]
+        pressed = [find_overlap(x, before.radius) for x in (seen[-1], target)]
         if not run.bed.stones and pressed[1] > pressed[0] + PRESSED:
             what = f"it presses grains into one another by {pressed[1]:.3g} of the smaller radius"
             raise NotCredible(what, where=str(folder))
@@ -245,19 +242,18 @@ def jump_bed(run: DeckRun, place: Place, h: int, name: str) -> Place:
 
 
 def make_row(
-    first: float, sunk: float, states: States, c: int, start: int, healing: int
+    c: int, start: int, healing: int, states: States, sunk: float, first: float
 ) -> dict[str, Any]:
     """The row of ``settlement.csv`` at the end of cycle ``c`` of a window from cycle ``start`` on.
 
     ``first``: height of the loaded body behind the preparation [m]; None where there is none.
-    ``sunk``: settlement of the mean grain before the window [m], to which that of the grains that
-    are there all through it is added.
+    ``sunk``: settlement of the mean grain before the window [m]; grains there all through it count.
     """
-    height, through = float(states.height[c]), states.position[:, states.through, 2]
+    height, z = float(states.height[c]), states.position[:, :, 2]
     loaded = np.isfinite(height)
     return {
         "cycle": start + c, "kind": "healing" if c <= healing else "computed",
-        "settlement": sunk + float((through[0] - through[c]).mean()),
+        "settlement": sunk + float((z[0] - z[c])[np.isfinite(z).all(axis=0)].mean()),
         "loaded_body": float(first) - height if loaded else None,
         "piston_height": height if loaded else None, "coordination_number": None,
         "elastic_deflection": None, "kinetic_translational": float(states.energy[c]),

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from adapters.bed import BoolArray, FloatArray, IntArray
+from adapters.bed import FloatArray, IntArray
 from adapters.decks.engine import Adopted
 from adapters.decks.exchange import count_exchange, refuse_losses, refuse_strangers
 from adapters.errors import NotCredible
@@ -20,8 +19,6 @@ from trackbed.run_files import replace_file
 
 CENTRE, VELOCITY = ("x", "y", "z"), ("vx", "vy", "vz")
 """Columns of a dump."""
-PER_CYCLE = ("position", "velocity", "height")
-"""What states have of each cycle."""
 
 
 @dataclass(frozen=True)
@@ -51,65 +48,43 @@ class States:
         """Translational kinetic energy [J], shape (c,)."""
         return 0.5 * np.nansum(self.mass * (self.velocity**2).sum(axis=2), axis=1)
 
-    @property
-    def through(self) -> BoolArray:
-        """Which grains are there at all ends, shape (n,)."""
-        return np.isfinite(self.position[:, :, 2]).all(axis=0)
-
     def at(self, index: int) -> States:
         """The end at an ``index`` alone, and the grains that are there."""
-        there = np.isfinite(self.position[index, :, 2])
-        one = slice(index, index + 1 or None)
-        return replace(
-            self, identifier=self.identifier[there], radius=self.radius[there],
-            mass=self.mass[there], position=self.position[one, there],
-            velocity=self.velocity[one, there], height=self.height[one],
-        )  # fmt: skip
+        there, one = np.isfinite(self.position[index, :, 2]), slice(index, index + 1 or None)
+        kept = {name: getattr(self, name)[there] for name in ("identifier", "radius", "mass")}
+        kept |= {name: getattr(self, name)[one, there] for name in ("position", "velocity")}
+        return replace(self, height=self.height[one], **kept)
 
 
 def read_states(
     folder: Path, first: int, last: int, bed: Adopted, start: States | None = None
 ) -> States:
-    """States of a bed in a folder, at the ends of its cycles ``first`` to ``last``, with a
-    ``start`` behind the state of that one end.
+    """States of a bed in a folder, at the ends of its cycles ``first`` to ``last``, behind the one
+    of ``start``, of all grains in any of them.
 
-    Raises `NotCredible` where there are no grains, where none stays, and where grains were lost or
-    have the identifiers of others; and what `read_frames` raises.
+    Raises `NotCredible` where no grain is there in all, and as `refuse_strangers` and
+    `refuse_losses`; and what `read_frames` raises.
     """
     read = read_scene_end if bed.deck.is_script else read_end
-    ends = [read(folder, number, bed) for number in range(first, last + 1)]
-    ends, first = ([start, *ends], first - 1) if start else (ends, first)
-    if not len(ends[0].last):
-        raise NotCredible("there are no grains where the cycle begins", where=str(bed.deck.path))
-    states = join_ends(ends, first, folder)
-    refuse_losses(states.exchange, bed, folder)
-    if not states.through.any():
-        raise NotCredible(
-            "no grain is there at all cycle ends of this window", where=str(folder),
-            remedy="shorter windows (procedure.k_i and k)",
-        )  # fmt: skip
-    return states
-
-
-def join_ends(ends: Sequence[States], first: int, folder: Path) -> States:
-    """Cycle ends of one state each, from cycle ``first`` on, as those of all grains in any of them;
-    raises `NotCredible` as `refuse_strangers`."""
+    ends = [*([start] if start else ()), *(read(folder, n, bed) for n in range(first, last + 1))]
     identifier = np.unique(np.concatenate([one.identifier for one in ends]))
     position, velocity = np.full((2, len(ends), len(identifier), 3), np.nan)
-    radius, last, mass = (*np.empty((2, len(identifier))), position[:, :, 0].copy())
+    radius, last_mass, mass = (*np.empty((2, len(identifier))), position[:, :, 0].copy())
     for number, one in enumerate(ends):
         rows = np.searchsorted(identifier, one.identifier)
         position[number, rows], velocity[number, rows] = one.position[0], one.velocity[0]
-        radius[rows], last[rows], mass[number, rows] = one.radius, one.mass, one.mass
+        radius[rows], last_mass[rows], mass[number, rows] = one.radius, one.mass, one.mass
+    if not np.isfinite(mass).all(axis=0).any():
+        what = "there are no grains where the cycle begins, or none stays as long as the window"
+        raise NotCredible(what, where=str(bed.deck.path))
     there = np.isfinite(mass[-1])
     if (stone := there & (radius == 0)).any():
-        centres = position[-1, there]
-        radius[stone] = cKDTree(centres).query(position[-1, stone], 2)[0][:, 1] / 2
-    refuse_strangers(identifier, mass, first, folder)
+        radius[stone] = cKDTree(position[-1, there]).query(position[-1, stone], 2)[0][:, 1] / 2
+    refuse_strangers(identifier, mass, folder)
+    refuse_losses(exchange := count_exchange(mass), bed, folder)
     return replace(
-        ends[-1], identifier=identifier, radius=radius, mass=last, position=position,
-        velocity=velocity, height=np.concatenate([one.height for one in ends]),
-        exchange=count_exchange(mass),
+        ends[-1], identifier=identifier, radius=radius, mass=last_mass, position=position,
+        velocity=velocity, height=np.concatenate([one.height for one in ends]), exchange=exchange,
     )  # fmt: skip
 
 
@@ -142,18 +117,17 @@ def read_scene_end(folder: Path, number: int, bed: Adopted) -> States:
     """The end of a cycle as a script of YADE leaves it; radii of clumps are 0."""
     end = read_arrays(folder / f"cycle_{number}.npz")
     spheres = np.column_stack([end["identifier"], end["position"], end["velocity"]])
-    for name in PER_CYCLE:
+    for name in ("position", "velocity", "height"):
         end[name] = end[name][None]
     return States(**end, last=spheres)
 
 
 def find_overlap(position: FloatArray, radius: FloatArray) -> float:
-    """Greatest overlap of two grains over the smaller radius [-]: places (n, 3) and radii (n,)
-    [m]; zero without."""
+    """Greatest overlap of two grains, places (n, 3) and radii (n,) [m], over the smaller's [-]."""
     pairs = cKDTree(position).query_pairs(2 * radius.max(), output_type="ndarray")
     apart = np.linalg.norm(position[pairs[:, 0]] - position[pairs[:, 1]], axis=1)
-    both = radius[pairs]
-    return float(((both.sum(axis=1) - apart) / both.min(axis=1)).max(initial=0.0))
+    share = (radius[pairs].sum(axis=1) - apart) / radius[pairs].min(axis=1)
+    return float(share.max(initial=0.0))
 
 
 def save_states(states: States, path: Path) -> None:

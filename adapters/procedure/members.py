@@ -146,15 +146,11 @@ def describe_result(record: Record) -> list[str]:
 
 def describe_exchange(outcomes: Sequence[Outcome]) -> str:
     """Grains that came, went and wore in the computed cycles of a user's deck; empty for none."""
-    came, new, went, gone, worn = (
-        sum(row.get(key) or 0 for one in outcomes for row in one.rows) for key in EXCHANGE
-    )
-    if not (came or went or worn):
-        return ""
-    return (
-        f", in which {came:.0f} grains of {new:.3g} kg came, {went:.0f} of {gone:.3g} kg went and "
-        f"{worn:.3g} kg wore off (the mean grain is of those there all through a window)"
-    )
+    rows = [row for one in outcomes for row in one.rows]
+    came, new, went, gone, worn = (sum(row.get(key) or 0 for row in rows) for key in EXCHANGE)
+    said = f", in which {came:.0f} grains of {new:.3g} kg came, {went:.0f} of {gone:.3g} kg went, "
+    said += f"{worn:.3g} kg wore off; the mean is of grains there all through a window"
+    return said if came or went or worn else ""
 
 
 def describe_sleeper(settled: Settled) -> str:
