@@ -12,7 +12,7 @@ from adapters.decks.engine import Adopted
 from adapters.errors import NotCredible
 
 WORN = 0.1
-"""Greatest change of a grain's mass in a cycle, over it [-]; of two fragments one has half at most."""
+"""Greatest change of the mass of a grain in a cycle, over it [-]; fragments have half at most."""
 DELETED = re.compile(r"^Deleted (\d+) atoms", re.MULTILINE)
 """What LIGGGHTS and LAMMPS say of ``delete_atoms``."""
 DELETING = re.compile(
