@@ -1,8 +1,9 @@
-"""Grains that a deck's own cycles delete, make and wear: counted, and told from lost ones."""
+"""Grains that a deck's own cycles delete, make and wear: counted; and those that are lost."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from adapters.bed import FloatArray, IntArray
 from adapters.decks.engine import Adopted
 from adapters.errors import NotCredible
+from adapters.files import EXCHANGE, Outcome
 
 WORN = 0.1
 """Greatest change of the mass of a grain in a cycle, over it [-]; fragments have half at most."""
@@ -33,9 +35,17 @@ def count_exchange(mass: FloatArray) -> FloatArray:
     return np.column_stack([np.nansum(one, axis=1) for one in parts])
 
 
+def describe_exchange(outcomes: Sequence[Outcome]) -> str:
+    """Grains that came, went and wore in the computed cycles of a user's deck; empty for none."""
+    rows = [row for one in outcomes for row in one.rows]
+    came, new, went, gone, worn = (sum(row.get(key) or 0 for row in rows) for key in EXCHANGE)
+    said = f", in which {came:.0f} grains of {new:.3g} kg came, {went:.0f} of {gone:.3g} kg went, "
+    said += f"{worn:.3g} kg wore off; the mean is of grains there all through a window"
+    return said if came or went or worn else ""
+
+
 def refuse_strangers(identifier: IntArray, mass: FloatArray, folder: Path) -> None:
-    """Raise `NotCredible` where an ``identifier`` (n,) is that of another grain later on; ``mass``
-    as of `count_exchange`."""
+    """Raise `NotCredible` where an ``identifier`` (n,) is another grain's later, by masses (c, n)."""
     came = np.diff(np.isfinite(mass).astype(int), axis=0, prepend=0) == 1
     other = came & (came.cumsum(axis=0) > 1)
     other[1:] |= abs(np.diff(mass, axis=0)) > WORN * mass[:-1]
@@ -50,10 +60,9 @@ def refuse_strangers(identifier: IntArray, mass: FloatArray, folder: Path) -> No
 def refuse_losses(exchange: FloatArray, bed: Adopted, folder: Path) -> None:
     """Raise `NotCredible` where more grains went than the deck deletes, by `count_exchange`."""
     went, mass = exchange[:, 2:4].sum(axis=0)
-    if not went or any(DELETING.match(one.plain) for one in bed.deck.commands):
-        return
-    said = (folder / "screen.txt").read_text(errors="replace")
-    if went > (deleted := sum(map(int, DELETED.findall(said)))):
+    said = (folder / "screen.txt").read_text(errors="replace") if went else ""
+    silent = any(DELETING.match(one.plain) for one in bed.deck.commands)
+    if went > (deleted := sum(map(int, DELETED.findall(said)))) and not silent:
         raise NotCredible(
             f"{went:.0f} grains of {mass:.3g} kg went in this window, and the deck deletes "
             f"{deleted}: the others were lost", where=str(folder),

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from adapters.bed import State
+from adapters.decks.exchange import describe_exchange
 from adapters.decks.states import States, load_states
 from adapters.files import RunFolder
 from adapters.procedure import CONTROL, Record, Track, read_track
@@ -34,16 +35,15 @@ class DeckTrack(Track):
 def make_state(states: States, index: int, cycle: int) -> State:
     """One of ``states`` as a state of a bed, at the end of a ``cycle``."""
     one = states.at(index)
-    place, velocity = one.position[0], one.velocity[0]
-    return State(
-        one.identifier, place, one.radius, one.mass, velocity, np.zeros_like(velocity), cycle=cycle
-    )  # fmt: skip
+    grains = one.identifier, one.position[0], one.radius, one.mass, one.velocity[0]
+    return State(*grains, np.zeros_like(one.velocity[0]), cycle=cycle)
 
 
 def read_deck_record(path: Path) -> Record:
     """Read the run folder of a deck as `read_run_record` reads those of scenes."""
+    tracks = (vars(read_track(RunFolder(folder))) for folder in (path, path / CONTROL))
     run, beside = (
-        DeckTrack(**vars(read_track(RunFolder(folder)))) for folder in (path, path / CONTROL)
+        DeckTrack(**one | {"exchanged": describe_exchange(one["outcomes"])}) for one in tracks
     )
     manifest = run.folder.manifest()
     scene: Any = SimpleNamespace(  # what is asked of a scene of how far a run is

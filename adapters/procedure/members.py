@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from adapters.bed import FloatArray
-from adapters.files import EXCHANGE, Outcome
 from adapters.jumps import BAND_PROBABILITY
 from adapters.procedure.history import History, find_speed_up, list_jumped_spans, sum_cost
 from adapters.procedure.record import Record, estimate_band_of_run, find_comparable_cycle
@@ -139,18 +138,9 @@ def describe_result(record: Record) -> list[str]:
     computed = record.run.history.count_computed(settled.cycle)
     how = "all" if computed == settled.cycle else f"{computed:,}"
     said = f"mean grain settles {format_length(settled.mean_grain)}"
-    said += f"; {how} of {settled.cycle:,} cycles computed{describe_exchange(record.run.outcomes)}"
+    said += f"; {how} of {settled.cycle:,} cycles computed{record.run.exchanged}"
     sleeper = [describe_sleeper(settled)] if isfinite(settled.loaded_body.value) else []
     return [said + format_error(settled.mean_grain_error), *sleeper]
-
-
-def describe_exchange(outcomes: Sequence[Outcome]) -> str:
-    """Grains that came, went and wore in the computed cycles of a user's deck; empty for none."""
-    rows = [row for one in outcomes for row in one.rows]
-    came, new, went, gone, worn = (sum(row.get(key) or 0 for row in rows) for key in EXCHANGE)
-    said = f", in which {came:.0f} grains of {new:.3g} kg came, {went:.0f} of {gone:.3g} kg went, "
-    said += f"{worn:.3g} kg wore off; the mean is of grains there all through a window"
-    return said if came or went or worn else ""
 
 
 def describe_sleeper(settled: Settled) -> str:

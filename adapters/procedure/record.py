@@ -47,6 +47,7 @@ class Track:
     """Stages whose unfinished or superseded work was moved away; empty folders left out."""
     events: tuple[dict[str, Any], ...]
     damaged: tuple[str, ...] = ()  # stages and records that are not as the run left them
+    exchanged: str = ""  # grains that came, went and wore in a user's deck, for a sentence
 
     @cached_property
     def history(self) -> History:

@@ -1,4 +1,4 @@
-"""Grains that a user's deck deletes, makes and wears: counted, followed, told from lost ones."""
+"""Grains that a user's deck deletes, makes and wears, and those that are lost."""
 
 from __future__ import annotations
 
