@@ -45,7 +45,7 @@ def describe_exchange(outcomes: Sequence[Outcome]) -> str:
 
 
 def refuse_strangers(identifier: IntArray, mass: FloatArray, folder: Path) -> None:
-    """Raise `NotCredible` where an ``identifier`` (n,) is another grain's later, by masses (c, n)."""
+    """Raise `NotCredible` where an ``identifier`` (n,) is another grain's later; masses (c, n)."""
     came = np.diff(np.isfinite(mass).astype(int), axis=0, prepend=0) == 1
     other = came & (came.cumsum(axis=0) > 1)
     other[1:] |= abs(np.diff(mass, axis=0)) > WORN * mass[:-1]
