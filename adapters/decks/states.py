@@ -67,6 +67,9 @@ def read_states(
     """
     read = read_scene_end if bed.deck.is_script else read_end
     ends = [*([start] if start else ()), *(read(folder, n, bed) for n in range(first, last + 1))]
+    if not set.intersection(*(set(one.identifier.tolist()) for one in ends)):
+        what = "there are no grains where the cycle begins, or none stays as long as the window"
+        raise NotCredible(what, where=str(bed.deck.path))
     identifier = np.unique(np.concatenate([one.identifier for one in ends]))
     position, velocity = np.full((2, len(ends), len(identifier), 3), np.nan)
     radius, last_mass, mass = (*np.empty((2, len(identifier))), position[:, :, 0].copy())
@@ -74,9 +77,6 @@ def read_states(
         rows = np.searchsorted(identifier, one.identifier)
         position[number, rows], velocity[number, rows] = one.position[0], one.velocity[0]
         radius[rows], last_mass[rows], mass[number, rows] = one.radius, one.mass, one.mass
-    if not np.isfinite(mass).all(axis=0).any():
-        what = "there are no grains where the cycle begins, or none stays as long as the window"
-        raise NotCredible(what, where=str(bed.deck.path))
     there = np.isfinite(mass[-1])
     if (stone := there & (radius == 0)).any():
         radius[stone] = cKDTree(position[-1, there]).query(position[-1, stone], 2)[0][:, 1] / 2
