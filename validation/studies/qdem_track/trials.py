@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -16,13 +19,13 @@ from qdem_fem.scene.run import RunFolder, run_dynamic
 from qdem_fem.track.bearing import begin_bed, press_sleeper
 from qdem_fem.track.bed import prepare_bed, read_bed
 from qdem_fem.track.enter import TrackPrepared, choose_contact
+from trackbed.errors import NotConverged, SceneError
 from validation.bench.qdem.checks import report
 from validation.bench.track_trials import load_track
 from validation.case import Check
 
 FRICTIONS = (0.577, 1.73)
-SEED = "track.seed=9"
-"""The first packing of 20 that comes to rest: others rock on, or have no room in the cribs."""
+SEEDS = range(1, 20)
 SOFTER = (0.1, 0.01)
 """Springs of the contacts over Table 1's."""
 HEAVIER = (1.2e-6, 2e-6)
@@ -36,6 +39,18 @@ class Quiet:
 
     def report(self, steps: int, total: int, when: float) -> None:
         """Nothing."""
+
+
+@cache
+def find_packing() -> str:
+    """The first packing of 20 that comes to rest: others rock on, which round-off decides, so that
+    processors differ, or have no room in the cribs."""
+    for seed in SEEDS:
+        with TemporaryDirectory() as folder, suppress(NotConverged, SceneError):
+            prepared = load_track(Path(folder), f"track.seed={seed}")
+            prepare_bed(prepared.recipe, prepared.bed_file)
+            return f"track.seed={seed}"
+    raise NotConverged(f"no packing of seeds {SEEDS} comes to rest")
 
 
 @dataclass(frozen=True)
@@ -73,7 +88,9 @@ def run_scene(prepared: TrackPrepared, folder: Path) -> Trial:
 def check_blows(folder: Path) -> tuple[list[Check], Trial]:
     """Equilibrium, both frictions of the paper from the same bed, and rails."""
     trials = [
-        run_scene(load_track(folder, SEED, f"contact.friction={f}"), folder / f"friction-{f}")
+        run_scene(
+            load_track(folder, find_packing(), f"contact.friction={f}"), folder / f"friction-{f}"
+        )
         for f in FRICTIONS
     ]
     rest = trials[0].rests["rest"]
@@ -99,7 +116,7 @@ def check_blows(folder: Path) -> tuple[list[Check], Trial]:
 
 def check_rails(folder: Path) -> list[Check]:
     """What a slow pulse leaves where rails hold the seats along the track, or nothing does."""
-    prepared, checks = load_track(folder, SEED), []
+    prepared, checks = load_track(folder, find_packing()), []
     recipe, file = prepared.recipe, prepared.bed_file
     for name, held in (("held", True), ("free", False)):
         run, _ = begin_bed(recipe, read_bed(file, recipe), choose_contact(prepared), threads=1)
@@ -118,7 +135,7 @@ def check_max(name: str, value: float, bar: float, unit: str = "") -> Check:
 
 def check_resume(folder: Path) -> Check:
     """A run that is saved and taken up again beside one that is not: the same to the bit."""
-    runs = [make_simulation(load_track(folder, SEED))[0] for _ in range(2)]
+    runs = [make_simulation(load_track(folder, find_packing()))[0] for _ in range(2)]
     half = 1000 * runs[0].step
     runs[0].advance(half)
     runs[0].save(folder / "half.npz")
@@ -147,7 +164,7 @@ def check_levers(folder: Path, reference: Trial) -> list[Check]:
     }  # fmt: skip
     checks, known = [], reference.facts["sleeper"]["settlement_greatest"]
     for number, (name, overrides) in enumerate(levers.items()):
-        one = run_scene(load_track(folder, SEED, *overrides), folder / f"lever-{number}")
+        one = run_scene(load_track(folder, find_packing(), *overrides), folder / f"lever-{number}")
         error = one.facts["sleeper"]["settlement_greatest"] / known - 1
         checks += [
             report(f"{name}: step over the reference's", one.step / reference.step),
