@@ -52,7 +52,10 @@ def describe(rows: Sequence[Row]) -> dict[str, str]:
     return {
         "twenty": describe_checks(checks["twenty"], TWENTY),
         "levers": format_table(["what", "step", "processor time", "error of settlement"], levers),
-        "packings": describe_packings([row["run"] for row in rows if "run" in row]),
+        "packings": describe_packings([row["run"] for row in rows if "run" in row])
+        + "".join(
+            f"\n\nRefused, {row['part']}: {row['refused']}." for row in rows if "refused" in row
+        ),
         "made": describe_origin(rows),
     }
 

@@ -9,6 +9,7 @@ from itertools import product
 from pathlib import Path
 
 from qdem_fem.files.errors import StepWarning
+from trackbed.errors import NotConverged
 from validation.bench.qdem.checks import make_row
 from validation.studies.qdem_track.bogie import FRICTIONS, SEEDS, measure_packing
 from validation.studies.qdem_track.trials import check_blows, check_levers, check_resume
@@ -31,7 +32,10 @@ def run_packing(seed: int, friction: float) -> Row:
     Beds stay among the temporary files, for the other friction and after a kill."""
     bed = Path(tempfile.gettempdir()) / f"trackbed-study-bed-{seed}.npz"
     with tempfile.TemporaryDirectory() as name:
-        return make_row([], run=measure_packing(Path(name), bed, seed, friction))
+        try:
+            return make_row([], run=measure_packing(Path(name), bed, seed, friction))
+        except NotConverged as refused:  # a bed that does not bear its sleeper is an answer
+            return make_row([], refused=refused.what.partition(": ")[2])
 
 
 PARTS = {"twenty": run_twenty} | {
