@@ -11,6 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from trackbed.errors import UsageError
 from trackbed.run_files import Progress, add_run_arguments, place_run, time_step
 
 if TYPE_CHECKING:
@@ -42,7 +43,15 @@ def run_qdem(arguments: argparse.Namespace) -> int:
             summary = _preview_run(prepared) | {"warnings": said}
         else:
             summary = _run(prepared, path, arguments, said)
-    _print(summary, arguments.json)
+    try:
+        _print(summary, arguments.json)
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        if not arguments.resume:
+            raise
+        raise UsageError(  # of a finished run the summary is the file's, whatever is in there
+            f"the result lacks or garbles what a finished run has: {error}",
+            where=str(path / "result.json"), remedy="move the folder away and run again",
+        ) from error  # fmt: skip
     return 0
 
 
