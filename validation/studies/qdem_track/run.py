@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import tempfile
 import warnings
 from functools import partial
@@ -10,6 +11,7 @@ from pathlib import Path
 
 from qdem_fem.files.errors import StepWarning
 from trackbed.errors import NotConverged
+from validation.age import digest_rooms
 from validation.bench.qdem.checks import make_row
 from validation.studies.qdem_track.bogie import FRICTIONS, SEEDS, measure_packing
 from validation.studies.qdem_track.trials import check_blows, check_levers, check_resume
@@ -29,8 +31,10 @@ def run_twenty() -> Row:
 def run_packing(seed: int, friction: float) -> Row:
     """300 grains under one bogie: a quarter of an hour of one thread, and the bed once.
 
-    Beds stay among the temporary files, for the other friction and after a kill."""
-    bed = Path(tempfile.gettempdir()) / f"trackbed-study-bed-{seed}.npz"
+    Beds stay among the temporary files, for the other friction and after a kill, each version's
+    by its own name."""
+    code = hashlib.sha256(repr(digest_rooms("qdem-track")).encode()).hexdigest()[:12]
+    bed = Path(tempfile.gettempdir()) / f"trackbed-study-bed-{code}-{seed}.npz"
     with tempfile.TemporaryDirectory() as name:
         try:
             return make_row([], run=measure_packing(Path(name), bed, seed, friction))
