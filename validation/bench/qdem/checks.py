@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 from math import isfinite, nan
 from typing import Any
@@ -114,14 +114,3 @@ def describe_origin(rows: Sequence[Row]) -> str:
     hours = sum(row.get("cpu_s") or 0.0 for row in rows) / 3600
     spent = f", {hours:.2g} h of processor time" if hours else ""
     return f"{days}, {', '.join(machines)}{spent}."
-
-
-def draw_figure(size: tuple[float, float], draw: Callable[[Any], None], picture: Any) -> None:
-    """A matplotlib figure of ``size`` [inch] that ``draw`` fills, written as PNG."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=size, layout="constrained")
-    FigureCanvasAgg(figure)
-    draw(figure)
-    figure.savefig(picture, dpi=90, metadata={"Software": None})

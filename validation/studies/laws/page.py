@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from adapters.laws import get_law
+from validation.figure import draw_figure, label_point
 from validation.studies.laws.bars import check_bars
 from validation.studies.laws.run import MEMBERS
 from validation.studies.laws.series import FIRST_CUT
@@ -119,26 +120,21 @@ def describe(rows: Sequence[Row]) -> dict[str, str]:
 
 def draw(rows: Sequence[Row], picture: Path) -> None:
     """Median (dot) to 90th percentile (end of the line) against cost, ballast and families."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
     found = {row["part"]: row for row in rows}
-    figure, axes = pyplot.subplots(1, 2, figsize=(11, 4.5), layout="constrained")
-    for axis, source in zip(axes, ("ballast", "families"), strict=True):
-        for name, row in {"auto": found[source]["auto"], **found[source]["methods"]}.items():
-            if name == "karrech2007":  # off by orders of magnitude
-                continue
-            colour = "#c8553d" if name == "auto" else "#1b6ca8"
-            cost, error = 1e3 * row["cost_s"], 100 * row["error"]
-            axis.plot([cost] * 2, [error, 100 * row["error_90"]], color=colour, lw=0.8)
-            axis.plot(cost, error, "*" if name == "auto" else "o", color=colour, ms=6)
-            axis.annotate(name, (cost, error), fontsize=7, xytext=(4, -3),
-                          textcoords="offset points")  # fmt: skip
-        axis.set(xscale="log", yscale="log", xlabel="CPU time of a prediction, ms")
-        axis.set_ylabel("error at 10 N_c, %: median to 90th percentile")
-        axis.axhline(8, color="0.6", lw=0.7, ls=":")
-        axis.set_title(NAMES[source], fontsize=9)
-    figure.savefig(picture, dpi=80)
-    pyplot.close(figure)
+
+    def draw_panels(figure: Any) -> None:
+        for axes, source in zip(figure.subplots(1, 2), ("ballast", "families"), strict=True):
+            for name, row in {"auto": found[source]["auto"], **found[source]["methods"]}.items():
+                if name == "karrech2007":  # off by orders of magnitude
+                    continue
+                colour = "#c8553d" if name == "auto" else "#1b6ca8"
+                cost, error = 1e3 * row["cost_s"], 100 * row["error"]
+                axes.plot([cost] * 2, [error, 100 * row["error_90"]], color=colour, lw=0.8)
+                axes.plot(cost, error, "*" if name == "auto" else "o", color=colour, ms=6)
+                label_point(axes, name, (cost, error))
+            axes.set(xscale="log", yscale="log", xlabel="CPU time of a prediction, ms")
+            axes.set_ylabel("error at 10 N_c, %: median to 90th percentile")
+            axes.axhline(8, color="0.6", lw=0.7, ls=":")
+            axes.set_title(NAMES[source], fontsize=9)
+
+    draw_figure((11, 4.5), draw_panels, picture)

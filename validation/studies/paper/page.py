@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 from pathlib import Path
 from typing import Any
 
+from validation.figure import draw_figure
 from validation.studies.paper.bars import check_bars, count_nearer, find_max
 from validation.studies.paper.run import DENOMINATORS, FIRST, LAWS, LENGTHS, NOTHING, OTHER
 from validation.study import format_checks, format_table
@@ -45,26 +47,25 @@ def describe(rows: Sequence[Row]) -> dict[str, str]:
 
 def draw(rows: Sequence[Row], picture: Path) -> None:
     """E_r of coordinates over h, a panel a k_i, a line a window; grey: nothing moved."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
     jumps = next(row for row in rows if row["part"] == "jumps")["jumps"]
-    figure, axes = plt.subplots(2, len(FIRST), figsize=(13, 5), sharey=True, layout="constrained")
-    for (row, law), (column, k_i) in (
-        (a, b) for a in enumerate(LAWS) for b in enumerate(FIRST)
-    ):  # fmt: skip
-        axis = axes[row, column]
-        for number, k in enumerate(LENGTHS):
-            line = sorted((j["h"], j["errors"]) for j in jumps if (j["k_i"], j["k"]) == (k_i, k))
-            h = [place for place, _ in line]
-            axis.plot(h, [100 * e[NOTHING][0] for _, e in line], color="0.75", lw=0.8)
-            axis.plot(h, [100 * e[law][0] for _, e in line], "o-", color=f"C{number}", ms=3,
-                      lw=1, label=f"k = {k}")  # fmt: skip
-        axis.set(xscale="log", yscale="log", title=f"{law}, kᵢ = {k_i}", xlabel="h")
-    for axis in axes[:, 0]:
-        axis.set_ylabel("E_r of coordinates [%]")
-    axes[0, 0].legend(fontsize=7)
-    figure.savefig(picture, dpi=75)
-    plt.close(figure)
+    tried = sorted({one["h"] for one in jumps})
+
+    def draw_panels(figure: Any) -> None:
+        axes = figure.subplots(2, len(FIRST), sharey=True)
+        for (row, law), (column, k_i) in product(enumerate(LAWS), enumerate(FIRST)):
+            axis = axes[row, column]
+            for number, k in enumerate(LENGTHS):
+                of = [j for j in jumps if (j["k_i"], j["k"]) == (k_i, k)]
+                line = sorted((j["h"], j["errors"]) for j in of)
+                h = [place for place, _ in line]
+                axis.plot(h, [100 * e[NOTHING][0] for _, e in line], color="0.75", lw=0.8)
+                axis.plot(h, [100 * e[law][0] for _, e in line], "o-", color=f"C{number}", ms=3,
+                          lw=1, label=f"k = {k}")  # fmt: skip
+            axis.set(xscale="log", yscale="log", title=f"{law}, kᵢ = {k_i}", xlabel="h")
+            axis.minorticks_off()
+            axis.set_xticks(tried, [str(h) for h in tried])
+        for axis in axes[:, 0]:
+            axis.set_ylabel("E_r of coordinates [%]")
+        axes[0, 0].legend(fontsize=7)
+
+    draw_figure((13, 5), draw_panels, picture)

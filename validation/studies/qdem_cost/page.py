@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from validation.bench.qdem.checks import describe_checks, describe_origin, draw_figure
+from validation.bench.qdem.checks import describe_checks, describe_origin
+from validation.figure import draw_figure
 from validation.studies.qdem_cost.bars import check_bars
 from validation.studies.qdem_cost.reading import FAMILIES, LEVELS, find_best, list_costs, list_runs
 from validation.study import Row, format_table

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from validation.bench.qdem.checks import describe_checks, describe_origin, draw_figure, find_check
+from validation.bench.qdem.checks import describe_checks, describe_origin, find_check
 from validation.bench.qdem.hard import RATIOS
 from validation.case import Check
+from validation.figure import draw_figure
 from validation.studies.qdem_hard_cases.bars import check_bars
 from validation.studies.qdem_hard_cases.run import LOCKING
 from validation.study import Row, format_table

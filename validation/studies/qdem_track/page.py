@@ -1,16 +1,19 @@
-"""The page and its figure: spectra of three packings."""
+"""The page and its figure: spectra by packing."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from validation.bench.qdem.checks import describe_checks, describe_origin, draw_figure
+from qdem_fem.report.track import GRAINS
+from validation.bench.qdem.checks import describe_checks, describe_origin
+from validation.figure import draw_figure
 from validation.studies.qdem_track.bars import check_bars
-from validation.studies.qdem_track.bogie import APART, FRICTIONS, POINTS, SEEDS
+from validation.studies.qdem_track.bogie import APART, FRICTIONS, SEEDS
 from validation.study import Row, format_table
 
 TWENTY = {
@@ -44,7 +47,7 @@ def describe(rows: Sequence[Row]) -> dict[str, str]:
     """The text for each mark of the page."""
     parts = {row["part"]: row for row in rows}
     checks = {part: check_bars([row]) for part, row in parts.items()}
-    levers = []
+    runs, levers = [row["run"] for row in rows if "run" in row], []
     for words, name in LEVERS.items():
         found = [check.value for check in checks["twenty"] if check.name.startswith(f"{name}")]
         step, cost, error = found[:3]
@@ -52,36 +55,73 @@ def describe(rows: Sequence[Row]) -> dict[str, str]:
     return {
         "twenty": describe_checks(checks["twenty"], TWENTY),
         "levers": format_table(["what", "step", "processor time", "error of settlement"], levers),
-        "packings": describe_packings([row["run"] for row in rows if "run" in row])
+        "packings": describe_packings(runs)
         + "".join(
             f"\n\nRefused, {row['part']}: {row['refused']}." for row in rows if "refused" in row
         ),
+        "grains": describe_grains(runs),
+        "paper": compare_paper(runs),
         "made": describe_origin(rows),
     }
 
 
 def describe_packings(runs: Sequence[dict[str, Any]]) -> str:
-    """How many runs there are; bed and sleeper of each, and its watched grains [um]."""
-    sleepers, grains = [], []
+    """How many runs there are, and bed and sleeper of each [um]."""
+    rows = []
     for run in runs:
-        head, trial = [str(run["seed"]), f"{run['friction']:g}"], run["trial"]
-        one = run["points"]["sleeper"]
+        trial, one = run["trial"], run["points"]["sleeper"]
         lengths = [trial["way"], trial["sunk"], trial["aside"], *(one[key] for key in MEASURES)]
-        sleepers.append(
-            [*head, str(len(trial["pulses"])), *(f"{1e6 * length:.3g}" for length in lengths)]
-        )
-        for name in POINTS[:-1]:
-            one = run["points"][name]
-            cells = [f"{1e6 * one[key]:.3g}" for key in MEASURES]
-            grains.append([*head, name, *cells, f"{one['lateral_over_vertical']:.2g}"])
-    head = ["packing", "friction"]
-    tables = [
-        format_table([*head, "pulses before", *TRIED, *MEASURES.values()], sleepers),
-        format_table([*head, "grain", *MEASURES.values(), "lateral over vertical"], grains),
-        "![spectra](qdem-track.png)",
+        rows.append([
+            str(run["seed"]), f"{run['friction']:g}", str(len(trial["pulses"])),
+            *(f"{1e6 * length:.3g}" for length in lengths),
+        ])  # fmt: skip
+    head = ["packing", "friction", "pulses before", *TRIED, *MEASURES.values()]
+    counted = f"Runs to the end: {len(runs)} of {len(SEEDS) * len(FRICTIONS)}.  Lengths in µm:"
+    return f"{counted}\n\n{format_table(head, rows)}\n\n![spectra](qdem-track.png)"
+
+
+def describe_grains(runs: Sequence[dict[str, Any]]) -> str:
+    """Medians and ranges over packings, of sleeper and watched grains [um]."""
+    rows = []
+    for friction, name in product(FRICTIONS, ("sleeper", *GRAINS)):
+        found = [run["points"][name] for run in runs if run["friction"] == friction]
+        rows.append([
+            f"{friction:g}", name,
+            *(describe_spread([1e6 * one[key] for one in found]) for key in MEASURES),
+            describe_spread([one["lateral_over_vertical"] for one in found]),
+        ])  # fmt: skip
+    return format_table(["friction", "point", *MEASURES.values(), "lateral over vertical"], rows)
+
+
+def describe_spread(values: Sequence[float]) -> str:
+    """Median, and in brackets the least and the greatest."""
+    middle, least, most = (f"{one:.2g}" for one in np.percentile(values, (50, 0, 100)))
+    return f"{middle} ({least} to {most})"
+
+
+def compare_paper(runs: Sequence[dict[str, Any]]) -> str:
+    """What the paper found, and in how many packings it is so here."""
+    low, high = ({run["seed"]: run["points"] for run in runs if run["friction"] == one}
+                 for one in FRICTIONS)  # fmt: skip
+    both = sorted(low.keys() & high.keys())
+    cells = [
+        ("settlement is greatest under the rail, B2", low,
+         lambda one: one["B2"]["greatest"] >= max(one[g]["greatest"] for g in ("B1", "B3"))),
+        ("lateral motion is larger than vertical, B2", low,
+         lambda one: one["B2"]["lateral_over_vertical"] > 1),
+        ("ballast goes down suddenly under the first car: B2 by half at axle 1", low,
+         lambda one: one["B2"]["first"] > 0.5 * one["B2"]["greatest"]),
+    ]  # fmt: skip
+    rows = [
+        [words, f"{sum(holds(one) for one in points.values())} of {len(points)}"]
+        for words, points, holds in cells
     ]
-    counted = f"Runs measured so far: {len(runs)} of {len(SEEDS) * len(FRICTIONS)}.  Lengths in µm:"
-    return "\n\n".join([counted, *tables * bool(runs)])
+    for (key, words), name in product(
+        {"greatest": "settlement", "lateral": "lateral motion"}.items(), ("sleeper", "B2")
+    ):
+        less = sum(high[seed][name][key] < low[seed][name][key] for seed in both)
+        rows.append([f"the higher friction reduces {words}, {name}", f"{less} of {len(both)}"])
+    return format_table(["found in the paper", "packings in which it is so here"], rows)
 
 
 def draw(rows: Sequence[Row], picture: Path) -> None:

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from validation.bench.qdem.checks import describe_checks, describe_origin, draw_figure, find_check
+from validation.bench.qdem.checks import describe_checks, describe_origin, find_check
+from validation.figure import draw_figure
 from validation.studies.qdem_validation.bars import check_bars
 from validation.study import Row, format_table
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from validation.figure import draw_figure, label_point
 from validation.studies.rigid_ballast.bars import Summary, list_ends, list_runs, summarise
 from validation.studies.rigid_ballast.run import Row
 from validation.study import describe_commits, estimate_mean, format_table
@@ -59,27 +61,27 @@ def _tabulate_levels(rows: Sequence[Row], found: Sequence[Summary]) -> str:
 
 def draw(rows: Sequence[Row], picture: Path) -> None:
     """Error of the mean settlement against cost, and settlement against cycles."""
-    from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(9.6, 4.0), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    for each in summarise(rows):
-        colour, name = COLOURS[each.level.method], each.level.name.partition(", ")[2]
-        error, wide = (100 * value for value in each.error)
-        left.errorbar(each.cost.mean(), error, yerr=wide, color=colour, marker="o", capsize=3,
-                      fillstyle="none" if each.is_limit else "full")  # fmt: skip
-        left.annotate(name, (each.cost.mean(), error), fontsize=7, xytext=(4, 4),
-                      textcoords="offset points", color=colour)  # fmt: skip
-        curve = 1e3 * each.settlement.mean(axis=0)
-        right.plot(np.arange(1, len(curve) + 1), curve, color=colour)
-        if each.is_limit or each.level.method == "soft":
-            right.annotate(name, (len(curve), curve[-1]), fontsize=7, color=colour)
-    left.axhline(0.0, color="0.6", linewidth=0.8)
-    left.set(xscale="log", xlabel="processor time of a run, one thread [s]",
-             ylabel="error of the mean settlement [%]",
-             title="blue rigid, red soft; hollow: finest, judged by the other's")  # fmt: skip
-    right.set(xlabel="load cycle", ylabel="mean residual settlement [mm]")
-    for axes in (left, right):
-        axes.grid(alpha=0.3)
-        axes.title.set_fontsize(8)
-    figure.savefig(picture, dpi=110)
+    def draw_panels(figure: Any) -> None:
+        left, right = figure.subplots(1, 2)
+        for each in summarise(rows):
+            colour, name = COLOURS[each.level.method], each.level.name.partition(", ")[2]
+            error, wide = (100 * value for value in each.error)
+            left.errorbar(each.cost.mean(), error, yerr=wide, color=colour, marker="o", capsize=3,
+                          fillstyle="none" if each.is_limit else "full")  # fmt: skip
+            label_point(left, name, (each.cost.mean(), error), colour)
+            curve = 1e3 * each.settlement.mean(axis=0)
+            right.plot(np.arange(1, len(curve) + 1), curve, color=colour)
+            if each.is_limit or each.level.method == "soft":
+                label_point(right, name, (len(curve), curve[-1]), colour)
+        left.axhline(0.0, color="0.6", linewidth=0.8)
+        left.set(xscale="log", xlabel="processor time of a run, one thread [s]",
+                 ylabel="error of the mean settlement [%]",
+                 title="blue rigid, red soft; hollow: finest, judged by the other's")  # fmt: skip
+        right.set(xlabel="load cycle", ylabel="mean residual settlement [mm]")
+        for axes in (left, right):
+            axes.grid(alpha=0.3)
+            axes.margins(x=0.15)
+            axes.title.set_fontsize(8)
+
+    draw_figure((9.6, 4.0), draw_panels, picture)

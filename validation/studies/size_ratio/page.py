@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from adapters.scene.mechanics import find_wedge_ratio
-from validation.bench.qdem.checks import draw_figure
+from validation.figure import draw_figure
 from validation.studies.size_ratio.bars import check_bars
 from validation.studies.size_ratio.run import ENGINES, FRICTIONS, RATIOS, SHARES
 from validation.study import describe_commits, format_table, summarise_bars

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from validation.bench.qdem.checks import describe_origin, draw_figure
+from validation.bench.qdem.checks import describe_origin
+from validation.figure import draw_figure, label_point
 from validation.studies.track_geometry.bars import check_bars
 from validation.study import format_checks, format_table
 
@@ -49,12 +50,12 @@ def draw(rows: Sequence[Row], picture: Path) -> None:
                 colour = "#0072B2" if row["law"] == "shenton" else "#009E73"
                 axes.loglog(seconds, error, style, color=colour, label=f"{row['law']}: {what}")
                 for place in zip(number, seconds, error, strict=True):
-                    axes.annotate(f"{place[0]:g}", place[1:], fontsize=7)
+                    label_point(axes, f"{place[0]:g}", place[1:])
             if row["part"] == "cost, lines":
                 number, seconds, error = zip(*row["lines"], strict=True)
                 axes.loglog(seconds, error, "^-", color="#D55E00", label="scatter by lines")
                 for place in zip(number, seconds, error, strict=True):
-                    axes.annotate(f"{place[0]:g}", place[1:], fontsize=7)
+                    label_point(axes, f"{place[0]:g}", place[1:])
         axes.set(
             xlabel="processor time [s]; of one line but for the last", ylabel="error of D1 [-]"
         )
