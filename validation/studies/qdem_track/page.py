@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -104,17 +104,19 @@ def compare_paper(runs: Sequence[dict[str, Any]]) -> str:
     low, high = ({run["seed"]: run["points"] for run in runs if run["friction"] == one}
                  for one in FRICTIONS)  # fmt: skip
     both = sorted(low.keys() & high.keys())
-    cells = [
-        ("settlement is greatest under the rail, B2", low,
-         lambda one: one["B2"]["greatest"] >= max(one[g]["greatest"] for g in ("B1", "B3"))),
-        ("lateral motion is larger than vertical, B2", low,
-         lambda one: one["B2"]["lateral_over_vertical"] > 1),
-        ("ballast goes down suddenly under the first car: B2 by half at axle 1", low,
-         lambda one: one["B2"]["first"] > 0.5 * one["B2"]["greatest"]),
-    ]  # fmt: skip
+    claims: dict[str, Callable[[Any], bool]] = {
+        "settlement is greatest under the rail, B2": lambda one: (
+            one["B2"]["greatest"] >= max(one[name]["greatest"] for name in ("B1", "B3"))
+        ),
+        "lateral motion is larger than vertical, B2": lambda one: (
+            one["B2"]["lateral_over_vertical"] > 1
+        ),
+        "ballast goes down suddenly under the first car, B2 by half at axle 1": lambda one: (
+            one["B2"]["first"] > 0.5 * one["B2"]["greatest"]
+        ),
+    }
     rows = [
-        [words, f"{sum(holds(one) for one in points.values())} of {len(points)}"]
-        for words, points, holds in cells
+        [claim, f"{sum(map(holds, low.values()))} of {len(low)}"] for claim, holds in claims.items()
     ]
     for (key, words), name in product(
         {"greatest": "settlement", "lateral": "lateral motion"}.items(), ("sleeper", "B2")
