@@ -88,7 +88,7 @@ def _run(
     from trackbed.run_files import make_manifest, open_run, write_result
 
     folder, manifest = RunFolder(path), make_manifest(file.tables.model_dump(mode="json"))
-    manifest["beds"] = doubts
+    manifest |= {"beds": doubts, "rolling_speed": file.rolling_speed}
     given = {"resume": arguments.resume, "force": arguments.force}
     if finished := folder.look_ahead(manifest, **given):
         return finished | {"folder": str(path)}

@@ -75,7 +75,7 @@ def test_lines_with_memory_do_not_depend_on_their_number() -> None:
 @pytest.mark.long
 def test_another_limit_needs_no_other_run(tmp_path, capsys, monkeypatch):
     """A finished run goes on at its last state, says when a later limit is reached, and its
-    manifest has that limit; another seed is another run."""
+    manifest has that limit; another seed is another run, and another speed where masses roll."""
     scene, folder, begins = tmp_path / "line.toml", tmp_path / "line-run", []
     scene.write_text(read_template("line"))
     sets = ("line.length=60", "line.realisations=2", "line.axles=1e3")
@@ -93,3 +93,7 @@ def test_another_limit_needs_no_other_run(tmp_path, capsys, monkeypatch):
     assert json.loads((folder / "manifest.json").read_text())["scene"]["line"]["limit"] == 1e-6
     assert main([*words, "--resume", "--set", "line.seed=2"]) == 2
     assert "line.seed: 1 there, 2 now" in capsys.readouterr().err
+    rolling = [*words, "--set", "axle.0.unsprung_mass=800.0"]
+    assert main([*rolling, "--force"]) == 0
+    assert main([*rolling, "--resume", "--set", "line.speed=50.0"]) == 2
+    assert "rolling_speed: 40.0 there, 50.0 now" in capsys.readouterr().err

@@ -90,22 +90,24 @@ def rest_wheels(rail: Rail, support: Support, settled: Floats, load: Floats) -> 
 
 
 def roll_axle(
-    rail: Rail, support: Support, settled: Floats, wheel: float, bears: Bools | None = None
-) -> Passage:
+    rail: Rail, support: Support, settled: Floats, wheel: Floats | float,
+    bears: Bools | None = None,
+) -> Passage:  # fmt: skip
     """The peak force of every sleeper and the loaded level under an axle that rolls by.
 
-    ``settled`` (b, n) [m]: how deep each bed lies; ``wheel``: load of a wheel [N]; ``bears``: of
-    the passage before, to begin from.  The wheel stands over each sleeper in turn, slowly; other
-    axles are `Support.period` seats away or more.  Raises `NotConverged`.
+    ``settled`` (b, n) [m]: how deep each bed lies; ``wheel``: load of a wheel, one or over each
+    sleeper (b, n) [N]; ``bears``: of the passage before, to begin from.  The wheel stands over
+    each sleeper in turn, slowly; other axles are `Support.period` seats away or more.  Raises
+    `NotConverged`.
     """
     lines, seats = settled.shape
     bears = np.ones((lines, support.period, seats), bool) if bears is None else bears.copy()
-    level, force = _solve(rail, support, settled, np.full(seats, wheel), bears, support.period)
+    level, force = _solve(rail, support, settled, wheel, bears, support.period)
     return Passage(force, level, bears)
 
 
 def _solve(
-    rail: Rail, support: Support, settled: Floats, load: Floats, bears: Bools, period: int
+    rail: Rail, support: Support, settled: Floats, load: Floats | float, bears: Bools, period: int
 ) -> tuple[Floats, Floats]:
     """Deflection [m] and force [N] of each loaded seat, (b, n) each; ``bears`` is brought along.
 
@@ -114,9 +116,10 @@ def _solve(
     level, force = np.empty_like(settled), np.empty_like(settled)
     rest = support.series * (settled + support.sleeper_weight / support.bed)
     lifted = settled - support.sleeper_weight / support.pad
-    given = rail.diagonal, rail.upper, rail.weight, load, support.sleeper_weight, period, COMB.turns
+    load = np.ascontiguousarray(np.broadcast_to(load, settled.shape), float)
+    given = rail.diagonal, rail.upper, rail.weight, support.sleeper_weight, period, COMB.turns
     threads = numba.get_num_threads()
-    shared = (support.series, rest, lifted, bears, level, force)
+    shared = (load, support.series, rest, lifted, bears, level, force)
     parts = zip(*(np.array_split(each, threads) for each in shared), strict=True)
     with ThreadPoolExecutor(threads) as pool:
         status = list(pool.map(lambda part: pass_comb(*given, *part), parts))

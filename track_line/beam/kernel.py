@@ -86,13 +86,13 @@ def choose_bearing(rail: Floats, lifted: Floats, bears: Bools, most: int) -> int
 
 @compiled
 def pass_comb(
-    diagonal: Floats, upper: Floats, weight: Floats, wheels: Floats, sleeper_weight: float,
-    period: int, turns: int, series: Floats, rest: Floats, lifted: Floats, bears: Bools,
+    diagonal: Floats, upper: Floats, weight: Floats, sleeper_weight: float, period: int,
+    turns: int, wheels: Floats, series: Floats, rest: Floats, lifted: Floats, bears: Bools,
     level: Floats, force: Floats,
 ) -> int:  # fmt: skip
     """Deflection and force of each seat while its wheel is on it, wheels at every ``period``-th.
 
-    ``wheels`` (n,) [N]; ``series``, ``rest``, ``lifted``, ``level``, ``force`` (b, n); ``bears``
+    ``wheels`` (b, n) [N], as ``series``, ``rest``, ``lifted``, ``level``, ``force``; ``bears``
     (b, period, n), kept for the next time.  Returns a status.
     """
     lines, n = series.shape
@@ -100,7 +100,7 @@ def pass_comb(
     for line in range(lines):
         for first in range(min(period, n)):
             load[:] = 0.0
-            load[first::period] = wheels[first::period]
+            load[first::period] = wheels[line, first::period]
             mine = bears[line, first]
             turn = 0
             while True:

@@ -28,6 +28,9 @@ class Track(Table):
     bed: Positive = 28e6  # mean stiffness of the beds, under half a sleeper [N/m]
     sleeper_mass: NonNegative = 150.0  # of half a sleeper [kg]
     spacing: Annotated[Real, Field(ge=0.2, le=1.2)] = 0.6  # from sleeper to sleeper [m]
+    damping: Positive = 55.4e3
+    """Of the track under a wheel [N s/m], for unsprung masses; the British one of the P2 force
+    (Jenkins et al. 1974), from memory."""
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,8 @@ BYTES_A_BED = 250
 """Memory that a sleeper takes, for each realisation and kind of axle [bytes]; 140 measured."""
 
 LEFT_OUT = (
-    "dynamic wheel loads: an uneven line is loaded as a level one is, but for its voids",
+    "dynamic wheel loads but those of an unsprung_mass on an even track: vehicles on their "
+    "springs, wheels that are not round, sleepers as they pass",
     "axles near one another: each rolls by alone",
     "the other rail: no cant, no twist, no lateral forces",
     "unevenness of the rail itself, of welds and joints",
@@ -123,6 +124,12 @@ class SceneFile:
         line = self.tables.line
         return find_alert_limit(line.speed) if line.limit is None else line.limit
 
+    @property
+    def rolling_speed(self) -> float | None:
+        """Speed where forces depend on it [m/s]; None where it decides the limit alone."""
+        dynamic = any(one.unsprung_mass for one in self.tables.axle)
+        return self.tables.line.speed if dynamic else None
+
 
 def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> SceneFile:
     """Read and check a scene file; ``overrides`` such as ``line.axles=1e7`` replace or add keys.
@@ -153,5 +160,5 @@ def build_line(file: SceneFile, lines: int | None = None) -> Line:
     law = get_law(tables.law.name)(**tables.law.parameters)
     return make_line(
         tables.line.length, tables.track, law, tables.axle, tables.scatter, zones=tables.zone,
-        lines=lines, seed=tables.line.seed,
+        lines=lines, seed=tables.line.seed, speed=tables.line.speed,
     )  # fmt: skip

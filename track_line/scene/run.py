@@ -45,7 +45,8 @@ class RunFolder(run_folder.RunFolder):
         "geometry.svg", ".*.partial",
     )  # fmt: skip
     states = STATE
-    free = ("scene.title", "scene.line.limit", "scene.line.speed")  # speed decides the limit alone
+    compared = ("scene", "rolling_speed")
+    free = ("scene.title", "scene.line.limit", "scene.line.speed")
 
 
 def collect_records(records: Sequence[Record], name: str) -> Floats:

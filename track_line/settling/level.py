@@ -42,12 +42,17 @@ def find_alert_limit(speed: float) -> float:
     return next((limit for most, limit in ALERT if 3.6 * speed <= most), ALERT[-1][1])
 
 
+def fade_ends(level: Floats, spacing: float) -> Floats:
+    """Levels (..., n) [m] less their mean, which repeat as a Fourier transform takes them to do."""
+    n = level.shape[-1]
+    ends = np.minimum(np.arange(n), np.arange(n)[::-1]) * spacing / LEVEL.fade
+    level = level - level.mean(axis=-1, keepdims=True)
+    return np.asarray(level * (0.5 - 0.5 * np.cos(np.pi * np.clip(ends, 0.0, 1.0))))
+
+
 def smooth_level(level: Floats, spacing: float) -> Floats:
     """D1 of levels (..., n) [m] at seats ``spacing`` [m] apart, margins at both ends with it."""
-    n = level.shape[-1]
-    level = level - level.mean(axis=-1, keepdims=True)
-    ends = np.minimum(np.arange(n), np.arange(n)[::-1]) * spacing / LEVEL.fade
-    level = level * (0.5 - 0.5 * np.cos(np.pi * np.clip(ends, 0.0, 1.0)))
+    n, level = level.shape[-1], fade_ends(level, spacing)
     band = [1 / LEVEL.longest, 1 / LEVEL.shortest]
     filters = butter(2, band, "bandpass", fs=1 / spacing, output="sos")
     _, gain = sosfreqz(filters, np.fft.rfftfreq(n, spacing), fs=1 / spacing)

@@ -12,7 +12,7 @@ from track_line.beam import GRAVITY, Rail, Support, Track, assemble_rail, make_s
 from track_line.beds import Beds, Scatter, Zone, draw_beds
 from track_line.laws import Law
 from track_line.settling.level import LEVEL
-from trackbed.scene_files import Positive, Table
+from trackbed.scene_files import NonNegative, Positive, Table
 
 
 class Axle(Table):
@@ -20,6 +20,7 @@ class Axle(Table):
 
     load: Positive  # of the axle, both wheels [N]
     share: Positive = 1.0  # of all axles [-]
+    unsprung_mass: NonNegative = 0.0  # of a wheel and its half of the axle [kg]
 
     @property
     def wheel(self) -> float:
@@ -37,6 +38,7 @@ class Line:
     beds: Beds
     law: Law
     axles: tuple[Axle, ...]  # their shares add up to one
+    speed: float  # of all axles, towards greater places [m/s]
 
     @property
     def shares(self) -> Floats:
@@ -64,7 +66,7 @@ def extend_zone(zone: Zone, length: float) -> Zone:
 
 def make_line(
     length: float, track: Track, law: Law, axles: Sequence[Axle], scatter: Scatter, *,
-    zones: Sequence[Zone] = (), lines: int = 1, seed: int = 1,
+    zones: Sequence[Zone] = (), lines: int = 1, seed: int = 1, speed: float = 0.0,
 ) -> Line:  # fmt: skip
     """A line of ``length`` [m] from 0 on, and a margin at each end with beds of the same kind.
 
@@ -76,6 +78,6 @@ def make_line(
     wide = [extend_zone(one, length) for one in zones]
     beds = draw_beds(place, track.bed, scatter, wide, lines, seed)
     whole = sum(one.share for one in axles)
-    kinds = (Axle(load=one.load, share=one.share / whole) for one in axles)
+    kinds = (one.model_copy(update={"share": one.share / whole}) for one in axles)
     rail, support = assemble_rail(place, track), make_support(track, beds.stiffness)
-    return Line(track, rail, support, beds, law, tuple(kinds))
+    return Line(track, rail, support, beds, law, tuple(kinds), speed)

@@ -14,6 +14,7 @@ from track_line.laws import BedLoad
 from track_line.settling.blocks import find_block
 from track_line.settling.level import measure_deviations, measure_spectrum
 from track_line.settling.line import Line
+from track_line.settling.unsprung import find_force
 from trackbed.errors import NotConverged
 
 DEEPEST = 1.0
@@ -73,7 +74,9 @@ def march_line(
         yield state, _take_record(line, state, passages[0])
         if state.cycle >= end:
             return
-        state = _settle_block(line, state, np.stack([one.force for one in passages]), end, finer)
+        ways = zip(line.axles, passages, strict=True)
+        force = np.stack([find_force(line, state.settled, *one) for one in ways])
+        state = _settle_block(line, state, force, end, finer)
 
 
 def _settle_block(line: Line, state: State, force: Floats, end: float, finer: float) -> State:
