@@ -11,7 +11,9 @@ import json
 import os
 import shlex
 import sys
+import tomllib
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -31,16 +33,22 @@ class Kind:
     states: str = ""
     """Pattern of its saved states; empty for a kind whose story has the verbs itself."""
     files: str = ""  # what its folder holds for other programs, as a sentence
+    seed: str = ""  # key of its random numbers, which `trackbed sweep` counts up
+    scenes: str = ""
+    """Where it has both: room with ``load_scene`` of such a file, and ``draw_members`` for what a
+    sweep's members came to."""
 
 
+SETTLEMENT = Kind("sample", "run", seed="sample.seed")
 KINDS = (
-    Kind("sample", "run"),
     Kind("deck", "run"),
+    SETTLEMENT,
     Kind("simulation", "qdem", "checkpoint.npz", "fields.pvd opens in ParaView, probes.csv and "
          "energy.csv in a spreadsheet"),
     Kind("run", "rigid", "frame_*.npz", "history.csv opens in a spreadsheet, movie.gif in a "
          "browser, frame_*.npz in NumPy"),
-    Kind("line", "line", "state.npz", "geometry.csv opens in a spreadsheet, state.npz in NumPy"),
+    Kind("line", "line", "state.npz", "geometry.csv opens in a spreadsheet, state.npz in NumPy",
+         "line.seed", "track_line.scene"),
 )  # fmt: skip
 
 
@@ -54,6 +62,13 @@ def find_kind(path: Path) -> Kind | None:
 def find_scene_kind(scene: dict[str, Any]) -> Kind | None:
     """The kind of a scene, by a table that only it has; None for none of them."""
     return next((kind for kind in KINDS if kind.table in scene), None)
+
+
+def find_file_kind(path: Path) -> Kind:
+    """The kind of a scene file; that of settlement where it is none of them or can not be read."""
+    with suppress(OSError, ValueError, RecursionError):
+        return find_scene_kind(tomllib.loads(path.read_text(encoding="utf-8-sig"))) or SETTLEMENT
+    return SETTLEMENT
 
 
 def choose_command(arguments: argparse.Namespace) -> Callable[[argparse.Namespace], int]:

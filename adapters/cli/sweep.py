@@ -19,7 +19,7 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--seeds", type=int, metavar="N",
-        help="so many samples of each, seeds counted up from the scene's sample.seed",
+        help="so many samples of each, or kilometres of a line, seeds counted up from the scene's",
     )  # fmt: skip
     parser.add_argument(
         "--into", type=Path, required=True, metavar="FOLDER",
@@ -73,7 +73,8 @@ def run_sweep_command(arguments: argparse.Namespace) -> int:
     check_libraries(arguments.scheduler)
     cluster = Cluster(arguments.scheduler, arguments.cluster_config, arguments.workers)
     progress = Progress()
-    for warning in dict.fromkeys(text for one in sweep.members for text in one.scene.warnings):
+    warnings = (text for one in sweep.members for text in getattr(one.scene, "warnings", ()))
+    for warning in dict.fromkeys(warnings):
         progress.print_line(f"warning: {warning}")
     results = run_sweep(sweep, cluster, progress)
     bands, paths = write_results(sweep, results)

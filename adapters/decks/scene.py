@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal
@@ -15,6 +14,7 @@ from adapters.decks.scripts import ENDING, read_marked
 from adapters.laws import get_law
 from adapters.moves import get_move
 from adapters.scene import Procedure, expand_schedule, fill_procedure
+from trackbed.run_verbs import find_file_kind
 from trackbed.scene_files import Guide, Problem, Table, Text, read_scene
 
 GUIDE = Guide("karrech", "procedure.total_cycles=200")
@@ -46,10 +46,7 @@ class DeckScene(Table):
 
 def is_deck_scene(path: Path) -> bool:
     """Whether a scene file has the table ``[deck]``; False where it can not be read."""
-    try:
-        return "deck" in tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except (OSError, ValueError, RecursionError):
-        return False
+    return find_file_kind(path).table == "deck"
 
 
 def load_deck_scene(path: Path, overrides: Sequence[str] = ()) -> tuple[DeckScene, Adopted]:

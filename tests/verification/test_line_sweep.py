@@ -1,9 +1,11 @@
-"""Beds of a sweep as `trackbed sweep` itself writes it go into a line."""
+"""Beds of a sweep as `trackbed sweep` itself writes it go into a line; kilometres are swept."""
 
 from __future__ import annotations
 
 import csv
 import json
+from contextlib import redirect_stdout
+from io import StringIO
 
 import numpy as np
 import pytest
@@ -11,7 +13,10 @@ import pytest
 from adapters.procedure.sweep import member as sweep_member
 from tests.small_bed import read_rows, small_bed
 from track_line.measured import read_beds
+from track_line.scene.file import build_line, load_scene
+from track_line.settling import march_line, start_line
 from trackbed.command import main
+from trackbed.scenes import read_template
 
 pytestmark = [
     pytest.mark.long,
@@ -46,3 +51,33 @@ def test_a_sweep_on_the_fake_engine(tmp_path, monkeypatch, capsys):
     assert main(["line", "--beds", str(into), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert (found["beds"], found["packings"], found["loads"]) == (6, 3, 2)
+
+
+def test_kilometres_of_a_line_are_joined(tmp_path, monkeypatch, capsys):
+    """Each row is the line of its seed, in order; a fourth kilometre is added by itself; another
+    axle is refused before anything runs."""
+    scene, into, ran = tmp_path / "line.toml", tmp_path / "sweep", []
+    small = ("line.length=60", "line.realisations=2", "line.axles=1e3")
+    sets = [word for key in small for word in ("--set", key)]
+    sweep = ["sweep", str(scene), *sets, "--into", str(into), "--workers", "1"]
+
+    def run(words, folder, watch):
+        ran.append(words)
+        with redirect_stdout(StringIO()):
+            return main([*words[words.index("trackbed") + 1 :], "--no-pictures"]), 0.0, 0.0
+
+    monkeypatch.setattr(sweep_member, "run_process", run)
+    scene.write_text(read_template("line"))
+    assert main([*sweep, "--seeds", "3"]) == 0
+    with (into / "members.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    for seed, row in enumerate(rows, 1):
+        line = build_line(load_scene(scene, [*small, f"line.seed={seed}"]))
+        *_, (_, last) = march_line(line, start_line(line), 1e3)
+        assert float(row["d1_median_m"]) == pytest.approx(np.median(last.deviation), rel=1e-12)
+    assert (into / "members.png").read_bytes().startswith(b"\x89PNG")
+    assert main([*sweep, "--seeds", "4"]) == 0
+    assert [words[-1] for words in ran[3:]] == ["line.seed=4"]
+    scene.write_text(read_template("line").replace("load = 200e3", "load = 250e3"))
+    assert main([*sweep, "--seeds", "4"]) == 3
+    assert "axle.0.load: 200000.0 there, 250000.0 now" in capsys.readouterr().err

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -102,4 +102,27 @@ def draw_geometry(
     map_of_voids = voids.pcolormesh(place, tonnage, hanging, cmap="Reds", rasterized=True)
     figure.colorbar(map_of_voids, label="hang [%]")
     voids.set(title="Voids", xlabel="along the line [m]", ylabel="MGT")
+    return figure
+
+
+def draw_members(rows: Sequence[Mapping[str, Any]]) -> Figure:
+    """D1 and the next tamping of lines one behind the other, such as the kilometres of a sweep:
+    medians and bands of the summaries ``rows``, with their limits; a gap where one is missing, and
+    a band of tonnage that has no end goes to that of the run."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9, 5))
+    panels = figure.subplots(2, sharex=True)
+    place, names = np.arange(1, len(rows) + 1), ("low", "median", "high")
+    for axes, key, scale in zip(panels, ("d1_{}_m", "tamping_{}_mgt"), (1e3, 1.0), strict=True):
+        found = (np.array([row.get(key.format(name)) for row in rows], float) for name in names)
+        low, median, high = (scale * one for one in found)
+        end = np.array([row.get("tonnage_mgt") for row in rows], float)
+        axes.vlines(place, low, np.where(np.isnan(high), end, high), color=BLUE, alpha=0.3, lw=4)
+        axes.plot(place, median, "o", color=BLUE)
+    limit = 1e3 * np.array([row.get("limit_m") for row in rows], float)
+    panels[0].step(place, limit, where="mid", color=RED, lw=1)
+    panels[0].set(title="D1 at the end", ylabel="standard deviation [mm]")
+    panels[1].set(title="Next tamping", ylabel="MGT", xlabel="line, in the order of members.csv")
+    panels[1].xaxis.get_major_locator().set_params(integer=True)
     return figure

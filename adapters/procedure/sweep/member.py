@@ -1,4 +1,4 @@
-"""One member of a sweep on the worker that runs it: ``trackbed run`` in a process of its own.
+"""One member of a sweep on the worker that runs it: its verb in a process of its own.
 
 A process, because a member that crashes must take no other with it, and because its CPU time is to
 be its own.  When a worker dies its members die with it; a run that is killed keeps every finished
@@ -32,7 +32,7 @@ class SweepStopped(Exception):
 class Ended:
     """How a member's command ended."""
 
-    exit_code: int  # that of ``trackbed run``; minus the signal when one ended it
+    exit_code: int  # that of its verb; minus the signal when one ended it
     sentence: str  # what it said of its error; empty when it had none
 
     @property
@@ -44,15 +44,18 @@ class Ended:
 STOPPED = Ended(130, "stopped with the sweep; every finished window is saved")
 
 
-def make_member_command(scene: Path, run_folder: Path, overrides: Sequence[str]) -> list[str]:
+def make_member_command(
+    verb: Sequence[str], scene: Path, run_folder: Path, overrides: Sequence[str]
+) -> list[str]:
     """The command line of a member; on a folder with a run it goes on with that."""
-    words = [*COMMAND, "run", str(scene), "--run-folder", str(run_folder)]
+    words = [*COMMAND, *verb, str(scene), "--run-folder", str(run_folder)]
     return words + [word for override in overrides for word in ("--set", override)]
 
 
 def run_member(
-    scene: Path, run_folder: Path, overrides: Sequence[str], log: Path, stop_file: Path
-) -> Ended:
+    verb: Sequence[str], scene: Path, run_folder: Path, overrides: Sequence[str], log: Path,
+    stop_file: Path,
+) -> Ended:  # fmt: skip
     """Run a member to its end, or until ``stop_file`` exists.
 
     What it prints goes to ``screen.txt`` in the folder ``log``.
@@ -64,7 +67,7 @@ def run_member(
 
     threads = [f"{name}=1" for name in THREADS if name not in os.environ]
     log.mkdir(parents=True, exist_ok=True)
-    command = ["env", *threads, *make_member_command(scene, run_folder, overrides)]
+    command = ["env", *threads, *make_member_command(verb, scene, run_folder, overrides)]
     try:
         watch()
         exit_code, _, _ = run_process(command, log, watch)

@@ -11,16 +11,17 @@ import itertools
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from adapters.errors import SceneError, UsageError
 from adapters.files import RunFolder
 from adapters.procedure import record_scene, refuse_differences, refuse_unloaded
-from adapters.scene import Scene, load_scene
+from adapters.scene import flatten_keys, load_scene
+from trackbed.run_files import MANIFEST, read_object
+from trackbed.run_verbs import SETTLEMENT, Kind, find_file_kind
 
-SEED = "sample.seed"
-"""The key that ``--seeds`` counts up."""
 SEEDS_MOST = 10_000
 NAME_LONGEST = 120
 """Longest name of a member's folder [characters]; a longer one is cut, with a digest."""
@@ -35,7 +36,8 @@ class Member:
     """Dotted key -> value as TOML text, of the keys swept over; the seed is kept apart."""
     seed: int
     overrides: tuple[str, ...]  # KEY=VALUE of everything that differs from the scene file
-    scene: Scene  # the scene, checked
+    scene: Any  # the scene, checked: its tables, where it is another story's
+    record: dict[str, Any]  # the scene as the manifest of its run keeps it
 
 
 @dataclass(frozen=True)
@@ -45,6 +47,17 @@ class Sweep:
     scene_path: Path
     folder: Path
     members: tuple[Member, ...]
+    kind: Kind  # of the scene: which verb runs it, and the key that ``--seeds`` counts up
+
+    @property
+    def settles(self) -> bool:
+        """Whether members are runs of this story."""
+        return not self.kind.states
+
+    @property
+    def verb(self) -> list[str]:
+        """The words that run a member, or go on with it: ``run`` does so by itself."""
+        return ["run"] if self.settles else [self.kind.verb, "--resume"]
 
     def run_folder(self, member: Member) -> Path:
         """Where a member runs."""
@@ -122,9 +135,10 @@ def parse_axes(assignments: Sequence[str]) -> dict[str, list[str]]:
     return axes
 
 
-def name_member(settings: Mapping[str, str], seed: int) -> str:
-    """A folder's name: the settings, with a digest where they cannot all be part of it."""
-    text = ",".join([*(f"{key}={value}" for key, value in settings.items()), f"{SEED}={seed}"])
+def name_member(settings: Mapping[str, str], seed: int, key: str = SETTLEMENT.seed) -> str:
+    """A folder's name: the settings and the seed, whose ``key`` is given, with a digest where they
+    cannot all be part of it."""
+    text = ",".join([*(f"{key}={value}" for key, value in settings.items()), f"{key}={seed}"])
     name = re.sub(r"[^\w.,=+-]", "-", text)[:NAME_LONGEST]
     return name if name == text else f"{name}-{hashlib.sha256(text.encode()).hexdigest()[:8]}"
 
@@ -142,45 +156,51 @@ def plan_sweep(
     axes = parse_axes(assignments)
     if seeds is not None and not 1 <= seeds <= SEEDS_MOST:
         raise UsageError(f"there must be 1 to {SEEDS_MOST} seeds, not {seeds}", where="--seeds")
-    if seeds is not None and SEED in axes:
-        raise UsageError(f"--seeds sets {SEED}", where="--set", remedy="give one of the two")
-    own_seeds = axes.pop(SEED, None)
+    kind = find_file_kind(scene_path)
+    if seeds is not None and kind.seed in axes:
+        raise UsageError(f"--seeds sets {kind.seed}", where="--set", remedy="give one of the two")
+    own_seeds = axes.pop(kind.seed, None)
     members = []
     for values in itertools.product(*axes.values()):
         settings = dict(zip(axes, values, strict=True))
         overrides = [*fixed, *(f"{key}={value}" for key, value in settings.items())]
         if own_seeds is None:
-            first = _load_member(scene_path, overrides, settings).sample.seed
+            first = _load_member(kind, scene_path, overrides, settings).seed
             chosen = [str(first + number) for number in range(seeds or 1)]
         else:
             chosen = own_seeds
         for seed in chosen:
-            with_seed = (*overrides, f"{SEED}={seed}")
-            scene = _load_member(scene_path, with_seed, settings)
-            name = name_member(settings, scene.sample.seed)
-            members.append(Member(name, settings, scene.sample.seed, with_seed, scene))
+            with_seed = [*overrides, f"{kind.seed}={seed}"]
+            members.append(_load_member(kind, scene_path, with_seed, settings))
     _refuse_twins(members)
-    return Sweep(scene_path.absolute(), folder, tuple(members))
+    return Sweep(scene_path.absolute(), folder, tuple(members), kind)
 
 
-def _load_member(path: Path, overrides: Sequence[str], settings: Mapping[str, str]) -> Scene:
-    """A member's scene, checked; every member must have load cycles to compare."""
+def _load_member(
+    kind: Kind, path: Path, overrides: Sequence[str], settings: Mapping[str, str]
+) -> Member:
+    """A member, its scene checked; one that settles must have load cycles to compare."""
+    other = import_module(kind.scenes) if kind.scenes else None
     try:
-        scene = load_scene(path, overrides)
+        scene = other.load_scene(path, overrides).tables if other else load_scene(path, overrides)
     except SceneError as error:
         raise SceneError(
             f"member {format_settings(settings)} is not valid: {error.what}",
             where=error.where, remedy=error.remedy,
         ) from error  # fmt: skip
-    refuse_unloaded(scene, path)
-    return scene
+    if other is None:
+        refuse_unloaded(scene, path)
+    record = scene.model_dump(mode="json") if other else record_scene(scene)
+    seed = int(flatten_keys(record)[kind.seed])
+    name = name_member(settings, seed, kind.seed)
+    return Member(name, settings, seed, tuple(overrides), scene, record)
 
 
 def _refuse_twins(members: Sequence[Member]) -> None:
     """Raise `UsageError` for two members with the same scene, such as ``10`` and ``10.0``."""
     seen: dict[str, Member] = {}
     for member in members:
-        twin = seen.setdefault(repr(record_scene(member.scene)), member)
+        twin = seen.setdefault(repr(member.record), member)
         if twin is not member:
             raise UsageError(
                 f"{twin.name} and {member.name} are the same scene", where="--set",
@@ -204,12 +224,15 @@ def check_folder(sweep: Sweep) -> None:
             where=str(folder), remedy="give an empty or new folder: --into FOLDER",
         )  # fmt: skip
     for member in sweep.members:
-        path = sweep.run_folder(member)
-        if not (path / "manifest.json").exists():
+        path, now = sweep.run_folder(member), member.record
+        if not (path / MANIFEST).exists():
             continue
-        before, now = RunFolder(path).manifest()["scene"], record_scene(member.scene)
-        if now["engine"]["name"] == "auto":  # the run has the name it stood for
-            now["engine"]["name"] = before["engine"]["name"]
+        if not sweep.settles:
+            before = (read_object(path / MANIFEST) or {}).get("scene", {})
+        else:
+            before = RunFolder(path).manifest()["scene"]
+            if now["engine"]["name"] == "auto":  # the run has the name it stood for
+                now = now | {"engine": now["engine"] | {"name": before["engine"]["name"]}}
         refuse_differences(before, now, path)
 
 

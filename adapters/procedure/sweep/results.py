@@ -6,6 +6,7 @@
 ``band``         a row for each cycle of each setting: mean over seeds, confidence band
 ================ =====================================================================
 
+Of another story, ``members`` has what each run came to, and the story draws it.
 The tables are derived from the run folders and can be written again at any time.
 """
 
@@ -14,6 +15,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,8 +24,8 @@ import numpy as np
 from adapters.bed import FloatArray
 from adapters.files import COLUMNS, RunFolder
 from adapters.procedure import estimate_mean, make_plain, read_run_record
-from adapters.procedure.sweep.plan import SEED, Member, Sweep
-from adapters.procedure.sweep.run import Result
+from adapters.procedure.sweep.plan import Member, Sweep
+from adapters.procedure.sweep.run import Result, read_summary
 from adapters.scene import flatten_keys
 from trackbed.run_files import replace_file
 
@@ -91,11 +93,13 @@ def estimate_bands(sweep: Sweep, finished: set[str]) -> list[Band]:
 
 def write_results(sweep: Sweep, results: Sequence[Result]) -> tuple[list[Band], dict[str, str]]:
     """Write the tables and the picture; the bands, and the path of every file."""
+    if not sweep.settles:
+        return [], join_summaries(sweep, results)
     by_name = {result.member: result for result in results}
     bands = estimate_bands(sweep, {one.member for one in results if one.state == "finished"})
     member_rows, curve_rows = [], []
     for member in sweep.members:
-        key = {"member": member.name, **convert_settings(member), SEED: member.seed}
+        key = {"member": member.name, **convert_settings(member), sweep.kind.seed: member.seed}
         rows = read_settlement_rows(sweep, member)
         curve_rows += [key | row for row in rows]
         figures = {name: rows[-1].get(name) if rows else None for name in SAMPLE_FIGURES}
@@ -120,6 +124,24 @@ def write_results(sweep: Sweep, results: Sequence[Result]) -> tuple[list[Band], 
         picture = save_figure(lambda: draw_bands(bands), sweep.folder / "settlement.png")
         paths["picture"] = str(picture)
     return bands, paths
+
+
+def join_summaries(sweep: Sweep, results: Sequence[Result]) -> dict[str, str]:
+    """Write what runs of another story came to, a row each, and their picture; paths by name."""
+    rows: list[dict[str, Any]] = []
+    for member, result in zip(sweep.members, results, strict=True):
+        key = {"member": member.name, **convert_settings(member), sweep.kind.seed: member.seed}
+        ended = {name: vars(result)[name] for name in ("state", "exit_code", "run_folder")}
+        figures = {k: v for k, v in read_summary(sweep, member).items() if not isinstance(v, dict)}
+        rows.append(key | ended | figures | {"sentence": result.sentence})
+    names = dict.fromkeys(name for row in rows for name in row)
+    paths = save_table(sweep.folder / "members", [{n: row.get(n) for n in names} for row in rows])
+    if any(row["state"] == "finished" for row in rows):
+        from trackbed.report import save_figure
+
+        draw = import_module(sweep.kind.scenes).draw_members
+        paths["picture"] = str(save_figure(lambda: draw(rows), sweep.folder / "members.png"))
+    return paths
 
 
 def save_table(stem: Path, rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:

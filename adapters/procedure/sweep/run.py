@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,7 @@ from adapters.procedure.sweep.member import (
     run_member,
 )
 from adapters.procedure.sweep.plan import Member, Sweep, check_folder, find_pinned_engine
-from trackbed.run_files import write_whole
+from trackbed.run_files import RESULT, read_object, write_whole
 
 STOP_S = 30
 """How long members may take to stop when the sweep is interrupted [s]."""
@@ -34,9 +35,9 @@ class Result:
     member: str
     seed: int
     state: str  # ``finished``, ``failed``, ``stopped`` or ``waiting``
-    exit_code: int | None  # that of ``trackbed run``; minus the signal when one ended it
-    sentence: str  # what it said of its error
-    cycle: int  # load cycles done
+    exit_code: int | None  # that of its verb; minus the signal when one ended it
+    sentence: str  # what it said of its error; of another story, what it came to
+    cycle: int  # load cycles done; 0 of another story, whose runs write what they came to
     cycles_computed: int
     loaded_body_m: float | None  # permanent settlement of the loaded body
     stiffness_n_per_m: float | None
@@ -58,18 +59,18 @@ class Cluster:
 def find_result(sweep: Sweep, member: Member, ended: Ended | None) -> Result:
     """How far a member is, from its run folder and how its command ended, if it ran."""
     folder = sweep.run_folder(member)
-    here = None
-    try:
-        here = read_status(folder)
-        done = here.state == "finished"
-    except UsageError:  # no run folder yet
-        done = False
+    here, summary = None, read_summary(sweep, member)
+    done = bool(summary)
+    if sweep.settles:
+        with suppress(UsageError):  # no run folder yet
+            here = read_status(folder)
+            done = here.state == "finished"
     state, exit_code, sentence = "waiting", None, ""
     if ended is not None:
         exit_code, sentence = ended.exit_code, ended.sentence
         state = "stopped" if ended == STOPPED else "failed"
     if done and (ended is None or ended.finished):
-        state, exit_code, sentence = "finished", 0, ""
+        state, exit_code, sentence = "finished", 0, str(summary.get("sentence", ""))
     return Result(
         member=member.name, seed=member.seed, state=state, exit_code=exit_code, sentence=sentence,
         cycle=here.cycle if here else 0, cycles_computed=here.cycles_computed if here else 0,
@@ -78,6 +79,11 @@ def find_result(sweep: Sweep, member: Member, ended: Ended | None) -> Result:
         speed_up=here.speed_up_so_far if here else None, cpu_s=here.cpu_s if here else 0.0,
         run_folder=str(folder.relative_to(sweep.folder)),
     )  # fmt: skip
+
+
+def read_summary(sweep: Sweep, member: Member) -> dict[str, Any]:
+    """What a finished run of another story came to, by name; empty for any other run."""
+    return {} if sweep.settles else read_object(sweep.run_folder(member) / RESULT) or {}
 
 
 def run_sweep(sweep: Sweep, cluster: Cluster, progress: Progress) -> list[Result]:
@@ -115,6 +121,7 @@ def _run(
         futures = {
             client.submit(
                 run_member,
+                sweep.verb,
                 sweep.scene_path,
                 sweep.run_folder(member).absolute(),
                 [*member.overrides, *engine],
@@ -154,7 +161,7 @@ def choose_engine(
 
     Asked of a worker: an engine that is here may not be there.  Raises `EngineMissing`.
     """
-    if all(member.scene.engine.name != "auto" for member in pending):
+    if not sweep.settles or all(one.scene.engine.name != "auto" for one in pending):
         return []
     name = find_pinned_engine(sweep)
     if name is None:
@@ -179,7 +186,8 @@ def sum_up_result(result: Result) -> str:
     if result.state == "finished" and result.loaded_body_m is not None:
         return f"{result.member}: the loaded body settles {1e3 * result.loaded_body_m:.4g} mm"
     first = result.sentence.partition("\n")[0]
-    return f"{result.member} {result.state}, exit code {result.exit_code}: {first}"
+    how = f" {result.state}, exit code {result.exit_code}" * (result.state != "finished")
+    return f"{result.member}{how}: {first}"
 
 
 def _write_record(sweep: Sweep, cluster: Cluster, results: dict[str, Result]) -> None:
@@ -210,7 +218,7 @@ def list_dry_run(sweep: Sweep) -> list[str]:
     lines = []
     for member in sweep.members:
         words = make_member_command(
-            sweep.scene_path, sweep.run_folder(member).absolute(), member.overrides
+            sweep.verb, sweep.scene_path, sweep.run_folder(member).absolute(), member.overrides
         )
         state = find_result(sweep, member, None).state
         lines.append(f"# {member.name}: {state}\n{shlex.join(words)}")
