@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from validation.figure import draw_figure
 from validation.studies.contact_law.bars import check_bars
 from validation.studies.contact_law.settings import TEST_4, TEST_5
 from validation.study import format_table
@@ -98,25 +99,21 @@ def describe(rows: Sequence[Row]) -> dict[str, str]:
 
 def draw(rows: Sequence[Row], picture: Path) -> None:
     """Friction impulses of tests 5 and 4 on each engine, and what rigid bodies would have."""
-    import matplotlib
 
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
+    def draw_panels(figure: Any) -> None:
+        axes = figure.subplots(1, 2)
+        for axis, setting in zip(axes, (TEST_5, TEST_4), strict=True):
+            limit = setting.friction * (1 + setting.restitution)
+            slip = np.array([impact.tangential / impact.normal for impact in setting.impacts])
+            for row in rows:
+                impulse = np.array(row["impulses"][setting.label]) / limit
+                axis.plot(slip / limit, impulse, ".-", lw=0.9, ms=5, color=COLOURS[row["part"]],
+                          label=TITLES[row["part"]])  # fmt: skip
+            rigid = np.minimum(slip / limit / 3.5, 1.0)
+            axis.plot(slip / limit, rigid, "k--", lw=0.8, label="rigid bodies")
+            axis.set(xlim=(0, 12), xlabel="slip before, over µ (1 + e) Vₙ")
+            axis.set_ylabel("friction impulse over µ (1 + e) m* Vₙ")
+            axis.set_title(f"{setting.label}, e = {setting.restitution}", fontsize=9)
+        axes[0].legend(frameon=False, fontsize=8)
 
-    figure, axes = plt.subplots(1, 2, figsize=(10, 3.6), layout="constrained")
-    for axis, setting in zip(axes, (TEST_5, TEST_4), strict=True):
-        limit = setting.friction * (1 + setting.restitution)
-        slip = np.array([impact.tangential / impact.normal for impact in setting.impacts])
-        for row in rows:
-            impulse = np.array(row["impulses"][setting.label]) / limit
-            colour = COLOURS[row["part"]]
-            label = TITLES[row["part"]]
-            axis.plot(slip / limit, impulse, ".-", lw=0.9, ms=5, color=colour, label=label)
-        rigid = np.minimum(slip / limit / 3.5, 1.0)
-        axis.plot(slip / limit, rigid, "k--", lw=0.8, label="rigid bodies")
-        axis.set(xlim=(0, 12), xlabel="slip before, over µ (1 + e) Vₙ")
-        axis.set_ylabel("friction impulse over µ (1 + e) m* Vₙ")
-        axis.set_title(f"{setting.label}, e = {setting.restitution}", fontsize=9)
-    axes[0].legend(frameon=False, fontsize=8)
-    figure.savefig(picture, dpi=75)
-    plt.close(figure)
+    draw_figure((10, 3.6), draw_panels, picture)

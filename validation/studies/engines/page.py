@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from validation.figure import draw_figure
 from validation.studies.engines.bars import check_bars
 from validation.studies.engines.packing import CYCLES, SEEDS, WAYS
 from validation.studies.engines.reading import (
@@ -168,33 +169,30 @@ def describe(rows: Sequence[Row]) -> dict[str, str]:
 
 def draw(rows: Sequence[Row], picture: Path) -> None:
     """Settlement curves of the engines, differences bed by bed, and speeds."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
     runs = group_by_way(rows)
-    figure, (left, middle, right) = plt.subplots(
-        1, 3, figsize=(13, 4), layout="constrained", width_ratios=(3, 3, 2)
-    )
-    cycles = np.arange(CYCLES + 1)
-    for name in ENGINES:
-        curves = 1e6 * np.array([row["curve"] for row in runs[name].values()])
-        mean, half = np.array([estimate_mean(column) for column in curves.T]).T
-        left.plot(cycles, mean, color=COLOURS[name], label=TITLES[name])
-        left.fill_between(cycles, mean - half, mean + half, color=COLOURS[name], alpha=0.15, lw=0)
-        speeds = [find_median_speed(rows, name, grains)[0] / 1e6 for grains in (1111, 9999)]
-        right.plot((1111, 9999), speeds, "o-", color=COLOURS[name])
-    left.set(xlabel="load cycle", ylabel="settlement [µm]", title="mean of the beds, 95 %")
-    left.legend(frameon=False)
-    for height, (_, way, other) in enumerate(SHOWN):
-        values = 1e6 * pair(runs, way, other, "settlement")
-        mean, half = estimate_mean(values)
-        middle.plot(values, np.full(len(values), -height), ".", color="0.7", ms=4)
-        middle.errorbar(mean, -height, xerr=half, fmt="o", color="k", capsize=3, ms=4)
-    middle.axvline(0, color="0.5", lw=0.8)
-    middle.set_yticks(-np.arange(len(SHOWN)), [words for words, _, _ in SHOWN], fontsize=7)
-    middle.set(xlabel="difference in settlement [µm]", title="bed by bed, mean and 95 %")
-    right.set(xscale="log", yscale="log", xlabel="grains", title="10⁶ grain-steps a CPU second")
-    figure.savefig(picture, dpi=75)
-    plt.close(figure)
+
+    def draw_panels(figure: Any) -> None:
+        left, middle, right = figure.subplots(1, 3, width_ratios=(3, 3, 2))
+        cycles = np.arange(CYCLES + 1)
+        for name in ENGINES:
+            curves = 1e6 * np.array([row["curve"] for row in runs[name].values()])
+            mean, half = np.array([estimate_mean(column) for column in curves.T]).T
+            left.plot(cycles, mean, color=COLOURS[name], label=TITLES[name])
+            left.fill_between(
+                cycles, mean - half, mean + half, color=COLOURS[name], alpha=0.15, lw=0
+            )
+            speeds = [find_median_speed(rows, name, grains)[0] / 1e6 for grains in (1111, 9999)]
+            right.plot((1111, 9999), speeds, "o-", color=COLOURS[name])
+        left.set(xlabel="load cycle", ylabel="settlement [µm]", title="mean of the beds, 95 %")
+        left.legend(frameon=False)
+        for height, (_, way, other) in enumerate(SHOWN):
+            values = 1e6 * pair(runs, way, other, "settlement")
+            mean, half = estimate_mean(values)
+            middle.plot(values, np.full(len(values), -height), ".", color="0.7", ms=4)
+            middle.errorbar(mean, -height, xerr=half, fmt="o", color="k", capsize=3, ms=4)
+        middle.axvline(0, color="0.5", lw=0.8)
+        middle.set_yticks(-np.arange(len(SHOWN)), [words for words, _, _ in SHOWN], fontsize=7)
+        middle.set(xlabel="difference in settlement [µm]", title="bed by bed, mean and 95 %")
+        right.set(xscale="log", yscale="log", xlabel="grains", title="10⁶ grain-steps a CPU second")
+
+    draw_figure((13, 4), draw_panels, picture)

@@ -10,6 +10,7 @@ import numpy as np
 
 from adapters.bed.state import FloatArray
 from adapters.procedure.history import sum_cost
+from validation.figure import draw_figure
 from validation.studies.settlement.bars import GROWING, MARGINS, check_bars
 from validation.studies.settlement.beds import EVERY, KINDS, Kind, list_methods
 from validation.studies.settlement.reading import (
@@ -142,34 +143,29 @@ def describe(rows: Sequence[Row]) -> dict[str, str]:
 
 def draw(rows: Sequence[Row], picture: Path) -> None:
     """Error of the loaded body's settlement against cost, a panel a bed."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
     from matplotlib.ticker import NullLocator
 
     kinds = [kind for kind in KINDS.values()
              if len(find_errors(rows, kind, GROWING, "loaded_body"))]  # fmt: skip
-    figure, panels = plt.subplots(
-        1, max(len(kinds), 1), figsize=(5 * max(len(kinds), 1), 4.5), squeeze=False,
-        layout="constrained", sharey=True,
-    )  # fmt: skip
-    for axes, kind in zip(panels[0], kinds, strict=False):
-        axes.axhline(0, color="0.5", lw=0.8)
-        for name, family in list_ways(kind):
-            errors = 100 * find_errors(rows, kind, name, "loaded_body")
-            if not len(errors):
-                continue
-            mean, half = estimate_mean(errors, LEVEL)
-            cost = 1 / find_step_speedup(rows, kind, name)
-            mark = "s" if name.endswith(DOUBLED) else "o"
-            axes.errorbar(cost, mean, half if half == half else 0.0, fmt=mark, ms=5, lw=1,
-                          capsize=3, color=COLOURS[family], label=name)  # fmt: skip
-        axes.set(xscale="log", xlim=(0.03, 1.2), ylim=(-120, 120), title=kind.title,
-                 xlabel="cost over that of every cycle")  # fmt: skip
-        axes.set_xticks(SHARES, [f"{share:g}" for share in SHARES])
-        axes.xaxis.set_minor_locator(NullLocator())
-        axes.legend(fontsize=7)
-    panels[0, 0].set_ylabel("error of the loaded body's settlement [%]")
-    figure.savefig(picture, dpi=100)
-    plt.close(figure)
+
+    def draw_panels(figure: Any) -> None:
+        panels = figure.subplots(1, max(len(kinds), 1), squeeze=False, sharey=True)
+        for axes, kind in zip(panels[0], kinds, strict=False):
+            axes.axhline(0, color="0.5", lw=0.8)
+            for name, family in list_ways(kind):
+                errors = 100 * find_errors(rows, kind, name, "loaded_body")
+                if not len(errors):
+                    continue
+                mean, half = estimate_mean(errors, LEVEL)
+                cost = 1 / find_step_speedup(rows, kind, name)
+                mark = "s" if name.endswith(DOUBLED) else "o"
+                axes.errorbar(cost, mean, half if half == half else 0.0, fmt=mark, ms=5, lw=1,
+                              capsize=3, color=COLOURS[family], label=name)  # fmt: skip
+            axes.set(xscale="log", xlim=(0.03, 1.2), ylim=(-120, 120), title=kind.title,
+                     xlabel="cost over that of every cycle")  # fmt: skip
+            axes.set_xticks(SHARES, [f"{share:g}" for share in SHARES])
+            axes.xaxis.set_minor_locator(NullLocator())
+            axes.legend(fontsize=7)
+        panels[0, 0].set_ylabel("error of the loaded body's settlement [%]")
+
+    draw_figure((5 * max(len(kinds), 1), 4.5), draw_panels, picture)
