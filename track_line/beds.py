@@ -45,7 +45,7 @@ class Scatter(Table):
 class Zone(Table):
     """A part of the line, such as the end of a bridge."""
 
-    begin: Real
+    begin: Real  # along the line [m]
     end: Real  # [m]; a zone that reaches an end of the line goes on through its margin
     stiffness: Annotated[Real, Field(ge=1e-3, le=1e3)] = 1.0
     """By which the beds' stiffness is multiplied [-]."""

@@ -29,7 +29,7 @@ class DeckTable(Table):
     """A marked deck of the user's own."""
 
     file: Text  # from the scene's folder
-    engine: Literal["liggghts", "lammps", "yade"]
+    engine: Literal["liggghts", "lammps", "yade"]  # that runs the deck
     loaded_body: str = ""
     """Mesh, or variable of a script that holds a body, whose settlement is asked for, and which a
     jump lowers; none: that of the mean grain."""

@@ -58,12 +58,12 @@ MEMBERS_MOST = 1000
 class GrainRadius(Table):
     """Distribution of the grains' radii."""
 
-    distribution: Literal["normal", "uniform", "constant"]
+    distribution: Literal["normal", "uniform", "constant"]  # of the radii by number
     mean: Positive  # mean radius [m]
     standard_deviation: NonNegative = 0.0
     """Of the normal distribution before it is cut, or of the uniform one [m]."""
     truncation: Annotated[float, Field(ge=0.1, le=10, allow_inf_nan=False)] = 2.0
-    """Standard deviations of a normal distribution kept on either side of the mean."""
+    """Standard deviations of a normal distribution kept on either side of the mean [-]."""
 
     @property
     def law(self) -> RadiusDistribution:
@@ -76,7 +76,7 @@ class GrainRadius(Table):
 class Sample(Table):
     """The grains and the container they are poured into."""
 
-    container: Literal["cylinder", "box"]
+    container: Literal["cylinder", "box"]  # its shape
     radius: Positive | None = None  # radius of the cylinder [m]
     size_x: Positive | None = None  # length of the box along x [m]
     size_y: Positive | None = None  # length of the box along y [m]
@@ -85,10 +85,10 @@ class Sample(Table):
     count: Count | None = None  # number of grains
     fill_height: Positive | None = None  # height of the settled bed [m], instead of ``count``
     relative_density_start: Annotated[float, Field(ge=1e-3, le=0.15, allow_inf_nan=False)] = 0.05
-    """Relative density of the random start, before the rain."""
+    """Relative density of the random start, before the rain [-]."""
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 1  # seed of radii and start positions
     rain_friction: Positive | None = None
-    """Coulomb's coefficient of all contacts while the bed rains and settles: less packs denser."""
+    """Coulomb's coefficient of all contacts while the bed rains [-]: less packs denser."""
     grain_radius: GrainRadius | None = None
     grading: GradingKey | None = None
     """Grading by a standard's name, or sieves [mm] with the mass that passes [%], instead."""
@@ -110,12 +110,12 @@ class GrainMaterial(Table):
     """Material of the grains."""
 
     young: Positive  # Young's modulus [Pa]
-    poisson: Poisson
+    poisson: Poisson  # Poisson's ratio [-]
     density: Positive  # mass density [kg/m^3]
-    viscous_alpha: ViscousAlpha | None = None  # viscous coefficient alpha_n = alpha_t of eq. 7
+    viscous_alpha: ViscousAlpha | None = None  # coefficient alpha_n = alpha_t of eq. 7 [-]
     restitution: Restitution | None = None
-    """Coefficient of restitution, instead of ``viscous_alpha``."""
-    friction: NonNegative  # Coulomb's coefficient between grains
+    """Coefficient of restitution [-], instead of ``viscous_alpha``."""
+    friction: NonNegative  # Coulomb's coefficient between grains [-]
     rolling_friction: Positive | None = None
     """Greatest torque that resists rolling between grains over R* F_n [-]; None: no resistance."""
 
@@ -124,9 +124,9 @@ class WallMaterial(Table):
     """Material of floor, walls and piston; symmetry planes are rigid and frictionless."""
 
     young: Positive  # Young's modulus [Pa]
-    poisson: Poisson
-    friction: NonNegative  # Coulomb's coefficient between grain and wall
-    rolling_friction: Positive | None = None  # as that of grains, at walls, where R* = R
+    poisson: Poisson  # Poisson's ratio [-]
+    friction: NonNegative  # Coulomb's coefficient between grain and wall [-]
+    rolling_friction: Positive | None = None  # as that of grains [-], with R* = R
 
 
 class Material(Table):
@@ -139,12 +139,12 @@ class Material(Table):
 class Loading(Table):
     """The cyclic load on the piston."""
 
-    waveform: Literal["sine", "series"] = "sine"
+    waveform: Literal["sine", "series"] = "sine"  # of the stress over time
     amplitude: Positive | None = None  # stress from trough to peak [Pa] of a sine
     mean: NonNegative | None = None  # mean stress [Pa] of a sine
     frequency: Positive | None = None  # cycles a second [Hz] of a sine
     series: str | None = None  # CSV file with one period; `adapters.files.load_series`
-    area_share: Share = 1.0  # part of the container's section under the piston
+    area_share: Share = 1.0  # part of the section under the piston [-]
     footprint: Annotated[tuple[Positive, Positive], Field(strict=False)] | None = None
     """Lengths along x and y of a rectangle in a box that is loaded instead [m]."""
     stage: Annotated[tuple[Stage, ...], Field(strict=False, min_length=1)] | None = None
@@ -193,7 +193,7 @@ class Procedure(Table):
     ) = None
     """Cycles of the first, second, ... jump; the last repeats; 0 resubmits without a jump."""
     tolerance: Annotated[float, Field(ge=1e-9, le=0.5, allow_inf_nan=False)] | None = None
-    """Error of the settlement gained in a jump over the total settlement, instead of k and h."""
+    """Error of the settlement gained in a jump over all settlement [-], instead of k and h."""
     healing_cycles: Annotated[int, Field(ge=0)] = 5
     """Cycles computed after a jump and kept out of the fit."""
     law: str = "log"  # law of the residual displacement
@@ -246,7 +246,7 @@ class Engine(Table):
     analytic states, for tests."""
     time_step: Positive | None = None  # longest time step [s]
     rayleigh_share: Share | None = None
-    """Longest time step as a share of the smallest grain's Rayleigh time, instead."""
+    """Longest time step over the smallest grain's Rayleigh time [-], instead; or "fast"."""
     launcher: Annotated[tuple[Annotated[str, Field(min_length=1)], ...], Field(strict=False)] = ()
     """Words before the engine's command line, such as ("mpirun", "-np", "4")."""
 

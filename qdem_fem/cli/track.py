@@ -37,7 +37,7 @@ def _register_grains(parser: argparse.ArgumentParser) -> None:
 
 def _register_train(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, required=True, help="the .csv file to write")
-    parser.add_argument("--cars", type=int)
+    parser.add_argument("--cars", type=int, help="of the train (default: 5)")
     parser.add_argument("--speed", type=float, help="m/s")
     parser.add_argument("--axle-load", type=float, help="N")
     parser.add_argument("--first-share", type=float, help="of an axle load on rail seat 1")

@@ -24,16 +24,16 @@ NumberByBody = Annotated[
 class PlaneTable(Table):
     """A rigid wall that does not move."""
 
-    point: Vector  # [m]
-    normal: Vector  # to the side where bodies are
-    friction: NonNegative | None = None  # by default that between bodies
+    point: Vector  # on the wall [m]
+    normal: Vector  # to the side where bodies are [-]
+    friction: NonNegative | None = None  # by default that between bodies [-]
 
 
 class PeriodicTable(Table):
     """A layer that repeats along an axis; bodies touch across its sides."""
 
-    axis: Literal["x", "y", "z"]
-    width: Positive  # [m]
+    axis: Literal["x", "y", "z"]  # across its sides
+    width: Positive  # along the axis [m]
 
 
 class ContactTable(Table):
@@ -41,7 +41,7 @@ class ContactTable(Table):
 
     model: Literal["spheres", "surface"]
     """Spheres at the vertices of the surface, as in the paper, or the surfaces themselves."""
-    friction: NonNegative  # Coulomb's coefficient
+    friction: NonNegative  # Coulomb's coefficient [-]
     contacts: Annotated[int, Field(ge=1, le=1000)] | Literal["near"] | None = None
     """Contacts of a vertex at once that the time step allows for, or those near it at first."""
     plane: Annotated[tuple[PlaneTable, ...], Field(strict=False)] = ()

@@ -43,7 +43,7 @@ class Mesh(Table):
 
     file: Text | None = None
     """Mesh file of any format of meshio; a relative path counts from the scene file."""
-    scale: Positive = 1.0  # metres in one unit of the file: 0.001 where it is in millimetres
+    scale: Positive = 1.0  # one unit of the file [m]: 0.001 where it is in millimetres
     box: BoxMesh | None = None
 
 
@@ -51,26 +51,26 @@ class MaterialTable(Table):
     """Isotropic linear viscoelastic material (eqs 7-8)."""
 
     young: Positive  # Young's modulus [Pa]
-    poisson: Poisson  # Poisson's ratio
+    poisson: Poisson  # Poisson's ratio [-]
     density: Positive  # mass density [kg/m^3]
-    shear_viscosity: NonNegative = 0.0  # [Pa s]
-    bulk_viscosity: NonNegative = 0.0  # [Pa s]
+    shear_viscosity: NonNegative = 0.0  # of a change of shape [Pa s]
+    bulk_viscosity: NonNegative = 0.0  # of a change of volume [Pa s]
 
 
 class Region(Table):
     """Keys of the material that differ in one element set of the mesh."""
 
-    young: Positive | None = None
-    poisson: Poisson | None = None
-    density: Positive | None = None
-    shear_viscosity: NonNegative | None = None
-    bulk_viscosity: NonNegative | None = None
+    young: Positive | None = None  # Young's modulus [Pa]
+    poisson: Poisson | None = None  # Poisson's ratio [-]
+    density: Positive | None = None  # mass density [kg/m^3]
+    shear_viscosity: NonNegative | None = None  # of a change of shape [Pa s]
+    bulk_viscosity: NonNegative | None = None  # of a change of volume [Pa s]
 
 
 class BodyTable(Table):
     """One body, deformable unless it is said to be rigid."""
 
-    name: Name
+    name: Name  # by which other tables name it
     mesh: Mesh
     material: MaterialTable
     rigid: Rigid = False
@@ -89,15 +89,15 @@ class BodyTable(Table):
 class BoxNodes(Table):
     """Nodes inside a box; the bounds belong to it."""
 
-    min: Vector
-    max: Vector
+    min: Vector  # least corner [m]
+    max: Vector  # greatest corner [m]
 
 
 class PlaneNodes(Table):
     """Nodes near a plane."""
 
-    point: Vector
-    normal: Vector
+    point: Vector  # on the plane [m]
+    normal: Vector  # of any length [-]
     tolerance: NonNegative = 1e-6  # greatest distance from the plane [m]
 
 
@@ -109,7 +109,7 @@ class Nodes(Table):
     box: BoxNodes | None = None
     plane: PlaneNodes | None = None
     nearest: Vector | None = None  # the one node nearest to a point [m]
-    all: Literal[True] | None = None
+    all: Literal[True] | None = None  # every node of the body
 
 
 class SeriesTable(Table):
@@ -118,16 +118,16 @@ class SeriesTable(Table):
     ramp: Positive | None = None
     """Duration of the linear growth from zero to ``value``, which then stays [s]."""
     value: NumberVectorName | None = None
-    """Of a ramp: the value at its end.  Of a CSV file: the name of the column."""
+    """Of a ramp: the value at its end [as its table].  Of a CSV file: the name of the column."""
     times: Annotated[tuple[Real, ...], Field(strict=False)] | None = None
     """Instants [s], growing; linear between them, constant before and behind."""
     values: Annotated[tuple[NumberVector, ...], Field(strict=False)] | None = None
-    """Values at the ``times``."""
+    """Values at the ``times`` [as its table]."""
     csv: Text | None = None
     """CSV file with a header line; a relative path counts from the scene file."""
     time: Text = "time"  # column of the instants [s] in the CSV file
     direction: Vector | None = None
-    """Of a force whose values are numbers: the vector that they multiply."""
+    """Of a force whose values are numbers: the vector that they multiply [-]."""
 
 
 ScalarSeries = Annotated[
@@ -143,45 +143,45 @@ VectorSeries = Annotated[
 class Condition(Table):
     """A condition on some nodes of one body."""
 
-    body: Name
+    body: Name  # that has the nodes
     nodes: Nodes
 
 
 class Fix(Condition):
     """Components of the displacement that stay zero."""
 
-    components: Literal["x", "y", "z", "xy", "xz", "yz", "xyz"] = "xyz"
+    components: Literal["x", "y", "z", "xy", "xz", "yz", "xyz"] = "xyz"  # that stay zero
 
 
 class Prescribe(Condition):
     """One component of the displacement [m] that follows a series."""
 
-    component: Literal["x", "y", "z"]
-    value: ScalarSeries
+    component: Literal["x", "y", "z"]  # that is prescribed
+    value: ScalarSeries  # displacement [m]
 
 
 class Roller(Condition):
     """Nodes that stay on a plane."""
 
-    normal: Vector
+    normal: Vector  # of the plane, of any length [-]
 
 
 class Load(Condition):
     """A total force [N], shared equally over the nodes."""
 
-    force: VectorSeries
+    force: VectorSeries  # of all nodes together [N]
 
 
 class Pressure(Condition):
     """A pressure [Pa] on the surface faces whose three nodes are all named."""
 
-    pressure: ScalarSeries
+    pressure: ScalarSeries  # that pushes inwards [Pa]
 
 
 class Periodic(Table):
     """Two sets of nodes that share one displacement, pair by pair."""
 
-    body: Name
+    body: Name  # that has both sets
     nodes_a: Nodes
     nodes_b: Nodes
 
@@ -195,16 +195,16 @@ class Probe(Nodes):
 class SimulationTable(Table):
     """How to compute."""
 
-    method: Literal["dynamic", "static"] = "dynamic"
+    method: Literal["dynamic", "static"] = "dynamic"  # a march in time, or the answer at rest
     duration: Positive | None = None  # simulated time [s] of a dynamic run
     tolerance: Annotated[float, Field(ge=1e-14, le=0.1, allow_inf_nan=False)] = 1e-8
-    """Of a static answer: residual force over the load."""
-    strain: Strain = "finger"
-    precision: Literal["float64", "float32"] = "float64"
+    """Of a static answer: residual force over the load [-]."""
+    strain: Strain = "finger"  # its measure: a file of `qdem_fem.element`
+    precision: Literal["float64", "float32"] = "float64"  # of numbers on the device
     step: Positive | None = None  # time step [s]; by default the critical one times ``safety``
-    safety: Share = 0.9
-    threads: Annotated[int, Field(ge=1, le=1024)] | None = None
-    device: Literal["cpu", "cuda"] = "cpu"
+    safety: Share = 0.9  # time step over the critical one [-]
+    threads: Annotated[int, Field(ge=1, le=1024)] | None = None  # by default one a processor
+    device: Literal["cpu", "cuda"] = "cpu"  # what computes
     gravity: Vector | None = None  # acceleration [m/s^2]; left out of the kernel when not given
     mass_scaling: Positive | None = None  # time step [s] that elements are made heavier for
 
@@ -219,12 +219,12 @@ class Output(Table):
     vtu_interval: Positive | None = None
     """Between VTU files [s]; by default only the end is written."""
     magnification: Positive | None = None
-    """Of displacements in the report's picture; by default a round one that lets them be seen."""
+    """Of displacements in the report's picture [-]; by default a round one that shows them."""
     checkpoint_interval: NonNegative = 300.0  # between checkpoints, by the clock on the wall [s]
     audit: Share | None = None
     """Share of the greatest energy that may be missing in the account of energies, what viscosity
-    takes included; a run stops beyond it.  By default `AUDIT` where bodies touch, and not looked
-    at where none do."""
+    takes included [-]; a run stops beyond it.  By default `AUDIT` where bodies touch, and not
+    looked at where none do."""
     probes: dict[Name, Probe] = Field(default_factory=dict)
     modes: Annotated[int, Field(ge=0, le=20)] = 3
     """Number of modes sought in each probe's free motion."""
@@ -233,7 +233,7 @@ class Output(Table):
 class Scene(Table):
     """A whole scene file."""
 
-    title: str = ""
+    title: str = ""  # of the report
     body: Annotated[tuple[BodyTable, ...], Field(min_length=1, strict=False)]
     simulation: SimulationTable
     fix: Annotated[tuple[Fix, ...], Field(strict=False)] = ()

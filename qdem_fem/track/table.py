@@ -28,10 +28,10 @@ LEAST_SHOULDER = 0.1
 class RoughnessTable(Table):
     """Of wheels and rail (`qdem_fem.track.loads.roughness.Roughness`)."""
 
-    rail: RailKind = "smooth"
-    wheel: WheelKind = "disc"
-    seed: Annotated[int, Field(ge=0)] = 1
-    amplitude: NonNegative = 1.0
+    rail: RailKind = "smooth"  # its spectrum
+    wheel: WheelKind = "disc"  # by its brakes
+    seed: Annotated[int, Field(ge=0)] = 1  # of the phases
+    amplitude: NonNegative = 1.0  # factor on all heights [-]
     highest: Positive = 2000.0  # frequency up to which there is any [Hz]
 
 
@@ -48,7 +48,7 @@ class BogieTable(Table):
     """The first bogie of a train (`qdem_fem.track.loads.train`)."""
 
     axle_load: Positive = 100e3  # of both wheels [N]
-    speed: Positive = 32.0  # [m/s]
+    speed: Positive = 32.0  # of the train [m/s]
     lead: Positive = 3.0
     """From the front axle to the sleeper at first, from it to the rear axle at last [m]."""
     rest: NonNegative = 0.05  # time without load at the end [s]
@@ -76,7 +76,7 @@ class TrackTable(Table):
     width: Positive  # along the track, from one middle between sleepers to the next [m]
     below: Annotated[int, Field(ge=1, le=100_000)]  # grains below the sleeper
     beside: Annotated[int, Field(ge=1, le=100_000)]  # grains that fill the cribs
-    seed: Annotated[int, Field(ge=0)] = 1
+    seed: Annotated[int, Field(ge=0)] = 1  # of the grains
     sizes: Annotated[tuple[Positive, Positive], Field(strict=False)] = (0.026, 0.034)
     """Least and greatest sieve size of the grains' meshes [m]; spheres make them larger."""
     cells: Cells  # of the sleeper's mesh, along, across and up
@@ -88,20 +88,20 @@ class TrackTable(Table):
     ballast: MaterialTable
     sleeper: MaterialTable
     side_friction: NonNegative = 0.0
-    """Of the walls at the sides; without it they are planes of symmetry."""
+    """Of the walls at the sides [-]; without it they are planes of symmetry."""
     bed: Text  # file of the prepared bed, made where it is not there; relative to the scene file
     prepared_friction: NonNegative | None = None
-    """Friction that the bed is prepared with; by default that of the contact."""
+    """Friction that the bed is prepared with [-]; by default that of the contact."""
     rigid: Rigid = False
     """Whether grains are rigid in the run, and with which inertia; the bed is the same."""
-    softness: Share = 1e-4  # of the springs while grains fall, over those of the run
-    unbalanced: Share = 0.05
-    kinetic: Share = 0.01
-    loose: Share = 0.02
+    softness: Share = 1e-4  # of the springs while grains fall, over those of the run [-]
+    unbalanced: Share = 0.05  # force out of balance over mean contact force [-]
+    kinetic: Share = 0.01  # kinetic energy over elastic [-]
+    loose: Share = 0.02  # bodies out of balance over all [-]
     """Greatest shares of `qdem_fem.march.kinetic_damping.Rest` that are equilibrium."""
     stays: Positive = 0.2
     """Greatest share of the sleeper's way under a slow pulse of the load's greatest force that may
-    be left at rest, down or aside: four fifths spring back."""
+    be left at rest, down or aside [-]: four fifths spring back."""
     patience: Positive = 5.0
     """Simulated time after which a stage of the preparation is given up [s]."""
     pressure: SeriesTable | None = None

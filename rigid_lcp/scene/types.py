@@ -32,16 +32,16 @@ def check_shape(name: str) -> str:
 class Surface(Table):
     """What bodies without values of their own get."""
 
-    friction: NonNegative = 0.0
-    restitution: Restitution = 0.0
+    friction: NonNegative = 0.0  # Coulomb's coefficient [-]
+    restitution: Restitution = 0.0  # Newton's coefficient [-]
 
 
 class Run(Table):
     """How long, and how."""
 
-    duration: Positive  # [s]
+    duration: Positive  # simulated time [s]
     step: Positive = 1e-3  # length of a step, the longest one at acceleration level [s]
-    method: Literal["time-stepping", "acceleration"] = "time-stepping"
+    method: Literal["time-stepping", "acceleration"] = "time-stepping"  # second: few bodies
     tolerance: Annotated[Real, Field(ge=1e-14, le=1e-3)] = 1e-10
     """Scale-free residual of the contact forces [-]."""
     frames: Annotated[int, Field(ge=1, le=100_000)] = 20  # states that are kept, at equal times
@@ -60,16 +60,16 @@ class Run(Table):
 class Ground(Table):
     """A half-space: everything with ``normal . x <= offset``."""
 
-    normal: Vector
-    offset: Real = 0.0
-    friction: NonNegative | None = None
-    restitution: Restitution | None = None
+    normal: Vector  # out of it, of any length [-]
+    offset: Real = 0.0  # of its face from the origin along ``normal`` [m]
+    friction: NonNegative | None = None  # by default that of ``surface`` [-]
+    restitution: Restitution | None = None  # by default that of ``surface`` [-]
 
 
 class BodyTable(Table):
     """One body; exactly one of the shapes."""
 
-    name: Name
+    name: Name  # by which loads name it
     box: Vector | None = None  # edge lengths [m]
     radius: Positive | None = None  # of a disc or a sphere [m]
     vertices: list[Vector] | None = None  # of a convex polygon (anticlockwise) or polyhedron [m]
@@ -77,14 +77,14 @@ class BodyTable(Table):
     inertia: Positive | None = None
     """Moment of inertia in place of the shape's own, in 2D [kg m^2]; a huge one holds the body
     upright."""
-    fixed: bool = False
-    position: Vector | None = None
+    fixed: bool = False  # never moves
+    position: Vector | None = None  # of its centre of mass [m]
     angle: Real | Annotated[list[Real], Field(min_length=4, max_length=4)] | None = None
     """[rad]; in 3D a quaternion w, x, y, z."""
-    velocity: Vector | None = None
-    spin: Real | Vector | None = None
-    friction: NonNegative | None = None
-    restitution: Restitution | None = None
+    velocity: Vector | None = None  # of its centre of mass at the start [m/s]
+    spin: Real | Vector | None = None  # angular velocity at the start [rad/s]
+    friction: NonNegative | None = None  # by default that of ``surface`` [-]
+    restitution: Restitution | None = None  # by default that of ``surface`` [-]
 
     @model_validator(mode="after")
     def _check_body(self) -> BodyTable:
@@ -99,20 +99,20 @@ class BodyTable(Table):
 class Grains(Table):
     """Many irregular stones on a loose grid inside a region, to be poured."""
 
-    count: Annotated[int, Field(ge=1, le=100_000)]
+    count: Annotated[int, Field(ge=1, le=100_000)]  # number of stones
     size: Annotated[list[Positive], Field(min_length=2, max_length=2)]
     """Smallest and largest diameter [m], uniform in between."""
-    region_low: Vector
+    region_low: Vector  # least corner [m] of ...
     region_high: Vector
     """Corners of the region that the grid fills from below [m]; higher if it does not suffice."""
-    density: Positive
+    density: Positive  # as that of a body [kg/m^3]
     corners: Annotated[list[Corners], Field(min_length=2, max_length=2)] = Field([5, 9])
     """Fewest and most corners of a stone."""
     shape: Annotated[str, AfterValidator(check_shape)] = "irregular"
     """A file of `rigid_lcp.shapes` that draws stones."""
-    seed: Annotated[int, Field(ge=0)] = 1
-    friction: NonNegative | None = None
-    restitution: Restitution | None = None
+    seed: Annotated[int, Field(ge=0)] = 1  # of the stones
+    friction: NonNegative | None = None  # by default that of ``surface`` [-]
+    restitution: Restitution | None = None  # by default that of ``surface`` [-]
 
     @model_validator(mode="after")
     def _check_order(self) -> Grains:
@@ -130,14 +130,14 @@ class Grains(Table):
 class Load(Table):
     """A force on a named body, constant or cyclic between two values."""
 
-    body: Name
+    body: Name  # that it acts on, at the centre of mass
     force: Vector  # [N]; the greatest one of a cyclic load
     least: Vector | None = None  # the smallest force of a cyclic load [N]; zero if not given
     frequency: Positive | None = None  # [Hz]; without it the load is constant
     phase: Real = 0.0
     """Of a cyclic load at its begin [rad]; at zero it starts from the smallest force."""
-    begin: NonNegative = 0.0
-    end: Positive | None = None
+    begin: NonNegative = 0.0  # instant [s]
+    end: Positive | None = None  # instant [s]; it acts to the end of the run if not given
 
     @model_validator(mode="after")
     def _check_load(self) -> Load:
@@ -158,20 +158,20 @@ class WearTable(Table):
 class StrengthTable(Table):
     """Grains that break under their contact forces."""
 
-    tension: Positive  # [Pa]
+    tension: Positive  # tensile strength [Pa]
     every: Annotated[int, Field(ge=1)] = 20  # steps between judgements
     smallest: NonNegative = 0.0  # volume below which grains do not break [m^3], in 2D area [m^2]
-    modulus: Positive | None = None  # Weibull's modulus; with ``reference_volume``
-    reference_volume: Positive | None = None  # volume (2D: area) of a grain that bears ``tension``
+    modulus: Positive | None = None  # Weibull's modulus [-]; with ``reference_volume``
+    reference_volume: Positive | None = None  # of a grain that bears ``tension`` [m^3], in 2D [m^2]
     unique: bool = False  # judge by the forces of elastic contacts; for piles at rest
 
 
 class SceneTables(Table):
     """A whole scene file."""
 
-    title: str = ""
-    dimensions: Literal[2, 3]
-    gravity: Vector | None = None
+    title: str = ""  # of the report
+    dimensions: Literal[2, 3]  # of space
+    gravity: Vector | None = None  # acceleration [m/s^2]; none if not given
     run: Run
     surface: Surface = Surface()
     ground: list[Ground] = Field([])

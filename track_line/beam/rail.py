@@ -23,7 +23,7 @@ class Track(Table):
     """One rail and its half of every sleeper: a 60E1 rail, concrete sleepers."""
 
     bending: Positive = 6.3798e6  # E I of the rail [N m^2]
-    rail_mass: NonNegative = 60.21  # [kg/m]
+    rail_mass: NonNegative = 60.21  # of one rail [kg/m]
     pad: Positive = 100e6  # stiffness of a rail pad [N/m]
     bed: Positive = 28e6  # mean stiffness of the beds, under half a sleeper [N/m]
     sleeper_mass: NonNegative = 150.0  # of half a sleeper [kg]

@@ -45,25 +45,25 @@ LEFT_OUT = (
 class LineTable(Table):
     """How long, how many axles, how many lines."""
 
-    length: Annotated[Real, Field(ge=60, le=20_000)]  # [m]
-    axles: Annotated[Real, Field(ge=1, le=1e9)]
-    speed: Positive  # [m/s]
-    realisations: Annotated[int, Field(ge=1, le=10_000)] = 200
-    seed: Annotated[int, Field(ge=0)] = 1
+    length: Annotated[Real, Field(ge=60, le=20_000)]  # that counts [m]
+    axles: Annotated[Real, Field(ge=1, le=1e9)]  # that roll by [-]
+    speed: Positive  # of the line, which decides the limit [m/s]
+    realisations: Annotated[int, Field(ge=1, le=10_000)] = 200  # lines with beds of their own
+    seed: Annotated[int, Field(ge=0)] = 1  # of the beds
     limit: Positive | None = None  # standard deviation of D1 at which to tamp [m]
 
 
 class LawTable(Table):
     """How beds settle."""
 
-    name: Name
+    name: Name  # a file of `track_line.laws`
     parameters: dict[Name, NonNegative] = Field({})  # in place of the law's own [SI]
 
 
 class SceneTables(Table):
     """A whole scene file."""
 
-    title: str = ""
+    title: str = ""  # of the report
     line: LineTable
     track: Track = Track()
     axle: Annotated[list[Axle], Field(min_length=1, max_length=20)]

@@ -24,10 +24,10 @@ HEAD = """\
 class Stone(Table):
     """What is in the file."""
 
-    name: str
-    volume: Positive
-    inertia: Annotated[tuple[Positive, Positive, Positive], Field(strict=False)]
-    spheres: list[Annotated[tuple[Real, Real, Real, Positive], Field(strict=False)]]
+    name: str  # for reports
+    volume: Positive  # of the stone [m^3]
+    inertia: Annotated[tuple[Positive, Positive, Positive], Field(strict=False)]  # over mass [m^2]
+    spheres: list[Annotated[tuple[Real, Real, Real, Positive], Field(strict=False)]]  # x y z r [m]
 
 
 def write_form(form: Form, size: float, path: Path) -> None:
