@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-PAGES = ("README.md", *(f"docs/{name}.md" for name in ("settle", "vibrate", "hard-grains", "line")))
+NAMES = ("settle", "vibrate", "hard-grains", "line", "tutorial")
+PAGES = ("README.md", *(f"docs/{name}.md" for name in NAMES))
 TEXTS = {page: (ROOT / page).read_text(encoding="utf-8") for page in PAGES}
 BLOCK = re.compile(
     r"^(?P<engine><!-- runs: engine -->\n)?```(?P<language>bash|python)\n(?P<code>.*?)^```$",
@@ -70,8 +71,8 @@ def block_run(language: str, code: str, folder: Path, done: set[str]) -> None:
     )  # fmt: skip
     assert run.returncode == 0, f"{code}\n{run.stdout[-2000:]}\n{run.stderr[-2000:]}"
     done.add(code)
-    scene = folder / "my-bed" / "scene.toml"
-    if "trackbed new karrech-coarse my-bed" in code:  # fewer cycles test the same
+    if new := re.search(r"trackbed new karrech-coarse (\S+)", code):  # fewer cycles test the same
+        scene = folder / new[1] / "scene.toml"
         text = scene.read_text()
         for key, (printed, short) in SHORTER.items():
             assert f"\n{key} = {printed}\n" in text
