@@ -1,5 +1,5 @@
 # Every target does its own set-up (setup.sh says what it installs) and is quick when all is there.
-.PHONY: setup-peers demo demo-rigid test test-all test-lowest test-rest lint bench validate setup
+.PHONY: setup-peers setup-docs demo demo-rigid docs test test-all test-lowest test-rest lint bench validate setup
 
 bin := .venv/bin
 lowest := .venv-lowest
@@ -44,6 +44,17 @@ setup-peers:
 test-rest: setup-peers # what `make test` left out or skipped, with the newest versions that pip finds
 	$(bin)/python -m pytest $(two) --nothing-missing --begin-until $(until) \
 		-m "(long or studies or engine or peer) and not validate"
+
+pictures := $(patsubst %.py,%.png,$(wildcard docs/gallery/*.py))
+
+docs: setup-docs $(pictures) # build/site/index.html; a link that leads nowhere fails
+	$(bin)/python -m mkdocs build
+
+setup-docs:
+	@./setup.sh docs
+
+docs/gallery/%.png: docs/gallery/%.py | setup-docs
+	PYTHONPATH=. $(bin)/python $< $@
 
 lint:
 	@./setup.sh lint
