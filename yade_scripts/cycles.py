@@ -57,6 +57,16 @@ def renew_friction():
             contact.phys.tangensOfFrictionAngle = found[0]["friction"]
 
 
+def press_surface(forces):
+    """Constant forces down on the grains [N]: weight of the ballast beside a block.
+
+    YADE does not save them: they are told again after each load.
+    """
+    for number, force in enumerate(forces):
+        O.forces.setPermF(number, Vector3(0, 0, -force))
+
+
+press_surface(window.get("crib", []))
 if window.get("renew_friction"):
     renew_friction()
 loop_s = time.process_time()

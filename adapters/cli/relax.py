@@ -49,6 +49,7 @@ def run_relax(arguments: argparse.Namespace) -> int:
     import numpy as np
 
     from adapters.bed import judge_state, make_no_contacts
+    from adapters.engines import find_crib_forces
     from adapters.files import check_state_name, read_state_file, write_state_file
     from adapters.relaxation import relax, relax_bare
     from adapters.scene import flatten_keys, load_scene
@@ -72,6 +73,7 @@ def run_relax(arguments: argparse.Namespace) -> int:
         print(f"warning: {doubt}", file=sys.stderr)
     if arguments.before is None:
         load = float(scene.stress_at(0.0)) * scene.loaded_area
+        load += float(find_crib_forces(scene, state).sum())
         relaxation = relax_bare(state, walls, scene.stiffness, method=arguments.method, load=load)
     else:
         before = read_state_file(arguments.before, density)

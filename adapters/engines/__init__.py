@@ -10,6 +10,7 @@ from adapters.engines.contract import (
     get_engine,
     list_real_engines,
 )
+from adapters.engines.crib import find_crib_forces
 from adapters.engines.decks import bound_section, copy_deck
 from adapters.engines.doctor import has_usable_engine, list_findings
 from adapters.engines.plan import plan_settling
@@ -17,6 +18,6 @@ from adapters.engines.process import run_process
 
 __all__ = [
     "ENGINE_REMEDY", "Engine", "EngineRun", "EngineStart", "allow_interrupts", "bound_section",
-    "copy_deck", "find_engine", "get_engine", "has_usable_engine", "list_findings",
-    "list_real_engines", "plan_settling", "run_process",
+    "copy_deck", "find_crib_forces", "find_engine", "get_engine", "has_usable_engine",
+    "list_findings", "list_real_engines", "plan_settling", "run_process",
 ]  # fmt: skip

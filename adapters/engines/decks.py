@@ -21,6 +21,7 @@ import numpy as np
 
 from adapters.bed import GRAVITY, Container, FloatArray
 from adapters.engines.contract import EngineStart
+from adapters.engines.crib import find_crib_forces, load_settled
 from adapters.engines.plan import PLAN, count_cycle_steps, plan_seating, plan_settling
 from adapters.engines.process import ProcessEngine
 from adapters.scene import Scene
@@ -33,6 +34,9 @@ PISTON_MARGIN = 1.0
 """By how much the piston's mesh is wider than the container, in greatest radii."""
 STATE_COLUMNS = "id x y z vx vy vz omegax omegay omegaz radius mass"
 """Columns of ``states.dump`` before the forces of the walls."""
+
+CRIB_WORDS = {b"include bed.in": b"include bed.in\ninclude crib.in"}
+"""Words of ``in.cycles``, and what ballast beside a block needs in their place."""
 
 Parameters = dict[str, float | int | str]
 
@@ -71,6 +75,8 @@ class DeckEngine(ProcessEngine):
     package: str  # where the static decks are
     loop_time = LOOP_TIME
     stone_words: Mapping[bytes, bytes]  # what stones need in place of words of the static decks
+    crib_words: tuple[str, str, str]
+    """How a number of each grain is declared, set and read."""
 
     @abstractmethod
     def format_scene(self, scene: Scene, piston: bool) -> dict[str, str]:
@@ -107,6 +113,9 @@ class DeckEngine(ProcessEngine):
         """Write a window of load cycles; see `adapters.engines.contract.Engine`."""
         shutil.copyfile(start.restart, folder / "start.restart")
         own = self.write_start(scene, start, folder)
+        if scene.loading and scene.loading.crib:
+            force = find_crib_forces(scene, load_settled(start.restart))
+            (folder / "crib.in").write_text(format_crib(force, *self.crib_words))
         parameters = gather_cycle_parameters(scene, start, cycles, folder, own)
         return self._write(scene, folder, PARTS_CYCLES, parameters, piston=True)
 
@@ -126,6 +135,8 @@ class DeckEngine(ProcessEngine):
             (folder / name).write_text(text)
         named = (str(value) for name, value in parameters.items() if name.endswith("_part"))
         changes = self.stone_words if scene.stones else None
+        if piston and scene.loading and scene.loading.crib:
+            changes = CRIB_WORDS
         return copy_deck(folder, (*parts, *named), self.package, changes)
 
 
@@ -160,6 +171,17 @@ def format_grains_data(
         for lo, hi, axis in zip(low, high, "xyz", strict=True)
     ]
     return "\n".join([*header, "", "Atoms", "", *rows]) + "\n"
+
+
+def format_crib(force: FloatArray, declared: str, set_: str, read: str) -> str:
+    """``crib.in``: constant ``force`` [N] down on each grain, shape (n,), in an engine's words."""
+    return "\n".join([
+        "# crib.in : generated; weight of the ballast beside the block",
+        f"fix crib all property/atom {declared}",
+        *(f"set atom {i} {set_} {-f:.17g}" for i, f in enumerate(force, 1) if f),
+        f"variable crib atom {read}",
+        "fix crib_weight grains addforce 0.0 0.0 v_crib\n",
+    ])  # fmt: skip
 
 
 def bound_box(

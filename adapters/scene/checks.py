@@ -21,7 +21,7 @@ from adapters.bed.stones import SPHERE, find_form
 from adapters.errors import SceneError
 from adapters.files import read_load_series
 from adapters.scene import mechanics
-from adapters.scene.values import Check, NotValid, Values, find_radii
+from adapters.scene.values import Check, NotValid, Values, find_named_form, find_radii
 from trackbed.choices import explain_retired, find_choices
 from trackbed.scene_files import Problem, describe_error, suggest_word
 
@@ -144,6 +144,22 @@ def _check_partial_piston(scene: Values) -> Iterator[Problem]:
         yield Problem("loading.footprint", f"needs a box that holds it, {have}")
 
 
+def _check_crib(scene: Values) -> Iterator[Problem]:
+    key = "loading.crib"
+    if not scene.has(key):
+        return
+    lengths = scene.get("loading.footprint")
+    sizes = [scene.get(f"sample.size_{axis}") or 0.0 for axis in "xy"]
+    if not lengths:
+        yield Problem(key, "is the height of ballast beside a block: give loading.footprint")
+    elif np.subtract(sizes, lengths).max() < 2 * find_radii(scene).mean:
+        yield Problem(key, "no grain has room beside this block: leave it out")
+    if find_named_form(scene) is not SPHERE:
+        yield Problem(key, "lies on spheres alone so far: leave it out")
+    if scene.get("procedure.relaxation") == "karrech2007":
+        yield Problem(key, "eq. 29 knows no weight of it: another procedure.relaxation")
+
+
 def _check_stages(scene: Values) -> Iterator[Problem]:
     key, stages = "loading.stage", scene.need("loading.stage")
     begins = [0, *(one["from_cycle"] for one in stages), scene.need("procedure.total_cycles")]
@@ -244,8 +260,8 @@ def _check_relaxation(scene: Values) -> Iterator[Problem]:
 CHECKS: tuple[Check, ...] = (
     _check_alternatives, *(partial(_check_owned_keys, *row) for row in OWNED), _check_symmetry,
     _check_grain_radius, _check_grading_scale, _check_rain, _check_rolling, _check_form,
-    _check_series, _check_partial_piston, _check_stages, _check_procedure, _check_jumps,
-    _check_settlement, _check_seating, _check_launcher,
+    _check_series, _check_partial_piston, _check_crib, _check_stages, _check_procedure,
+    _check_jumps, _check_settlement, _check_seating, _check_launcher,
     *(partial(_check_choice, *row) for row in CHOICES), _check_relaxation, *mechanics.CHECKS,
 )  # fmt: skip
 

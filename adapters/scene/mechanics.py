@@ -227,6 +227,7 @@ SIZES: tuple[tuple[str, Quantity, float], ...] = (
     ("material.grain.young", "young", 1), ("material.wall.young", "young", 1),
     ("material.grain.density", "density", 1), ("sample.grain_radius.mean", "grain", 2),
     ("sample.radius", "body", 2), ("sample.size_x", "body", 1), ("sample.size_y", "body", 1),
+    ("loading.crib", "body", 1),
 )  # fmt: skip
 """Keys whose values are looked at for a unit that is not SI, and factors from radii to sizes."""
 

@@ -102,6 +102,8 @@ def _list_load(scene: Scene) -> Iterator[str]:
     )
     if scene.loaded_area < scene.container.area:
         yield "A thick piston: it is a plate, and grains may rise beside it and above it."
+    if scene.loading.crib:
+        yield "Strength and interlock of the ballast beside the block: it is weight alone."
 
 
 def _list_jumps(scene: Scene) -> Iterator[str]:

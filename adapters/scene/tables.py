@@ -147,6 +147,8 @@ class Loading(Table):
     area_share: Share = 1.0  # part of the section under the piston [-]
     footprint: Annotated[tuple[Positive, Positive], Field(strict=False)] | None = None
     """Lengths along x and y of a rectangle in a box that is loaded instead [m]."""
+    crib: Positive | None = None
+    """Height of the ballast beside that rectangle [m], whose weight lies on the bed there."""
     stage: Annotated[tuple[Stage, ...], Field(strict=False, min_length=1)] | None = None
     """Loads that follow this one, in the order of their first cycles."""
     piston_mass: Positive  # mass [kg] of the part of the piston inside the scene

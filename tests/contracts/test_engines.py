@@ -25,6 +25,7 @@ SCENES = {
     "cylinders, boxes, mirror planes": ("karrech", ()),
     "resistance to rolling": ("karrech", ("material.grain.rolling_friction=0.2",)),
     "a block on its footprint, a piston on a share of the section": ("karrech-partial", ()),
+    "weight of the ballast beside a block": ("ballast", ("loading.crib=0.15",)),
     "loads in stages, series of stress": ("ballast", (
         "loading.stage=[{from_cycle=9,amplitude=1e5,mean=6e4,frequency=9.0}]",)),
     "less friction while it rains": ("ballast", ("sample.rain_friction=0.1",)),
