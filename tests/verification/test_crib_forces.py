@@ -12,9 +12,6 @@ from adapters.engines.crib import CELL_SHARE, count_seen_cells, find_crib_forces
 from adapters.scene.file import load_scene
 from trackbed.scenes import find_scene_file
 
-OUTSIDE = (-1.0, -0.5, 0.0, 1.0)
-"""Edges of a block beside the box [m]."""
-
 
 def test_seen_areas_are_those_of_circles() -> None:
     """A sphere alone is seen as its circle, one under a higher of its size as a circle less a lens;
@@ -26,36 +23,33 @@ def test_seen_areas_are_those_of_circles() -> None:
     cell = (CELL_SHARE * r) ** 2
     lens = 2 * r**2 * acos(apart / (2 * r)) - apart / 2 * sqrt(4 * r**2 - apart**2)
     circle = pi * r**2
-    seen = cell * count_seen_cells(position, radius, sizes, OUTSIDE)
+    seen = cell * count_seen_cells(position, radius, sizes, (-1.0, -0.5, 0.0, 1.0))
     assert seen == pytest.approx([circle, circle - lens, circle], rel=0.02)
     beside = cell * count_seen_cells(position, radius, sizes, (-np.inf, 0.05, 0.0, 1.0))
     assert beside[0] == pytest.approx(circle / 2, rel=0.02)
     assert beside[1:] == pytest.approx(seen[1:])
 
 
-def make_layers(scale: float) -> State:
-    """A full box of cubic packing, of spheres of 10 mm."""
-    x, y, z = (np.arange(0.01, size, 0.02) for size in (0.3, 0.28, scale))
-    position = np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1).reshape(-1, 3)
-    n = len(position)
-    still = np.zeros((n, 3))
-    radius = np.full(n, 0.01)
-    return State(np.arange(1, n + 1), position, radius, np.ones(n), still, still)
+def make_layers() -> State:
+    """A full box of cubic packing, six layers of spheres of 10 mm."""
+    lines = (np.arange(0.01, size, 0.02) for size in (0.3, 0.28, 0.12))
+    position = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, 3)
+    one, still = np.ones(len(position)), np.zeros_like(position)
+    return State(np.arange(1, len(one) + 1), position, 0.01 * one, one, still, still)
 
 
 def test_forces_are_the_weight_of_the_crib() -> None:
     """Cubic packing fills pi/6: the forces sum to pi/6 rho g h on the section beside the block, to
     the part by which a tenth of a bed of six layers is filled otherwise.  They press the highest
     grains beside the block alone, and each that is wholly beside it as the next."""
-    scene = load_scene(find_scene_file("ballast"), ["loading.crib=0.15"])
-    bed = make_layers(0.12)
+    path = find_scene_file("ballast")
+    scene, twice = (load_scene(path, [f"loading.crib={height}"]) for height in (0.15, 0.3))
+    bed = make_layers()
     force = find_crib_forces(scene, bed)
-    beside = 0.3 * 0.28 - 0.13 * 0.20
-    assert force.sum() == pytest.approx(pi / 6 * 2700 * 9.81 * 0.15 * beside, rel=0.05)
+    section = 0.3 * 0.28 - 0.13 * 0.20
+    assert force.sum() == pytest.approx(pi / 6 * 2700 * 9.81 * 0.15 * section, rel=0.05)
     x, y, z = bed.position.T
     whole = (z > 0.1) & ((x > 0.15) | (y > 0.21))
-    under = (x < 0.12) & (y < 0.19)
     assert force[whole] == pytest.approx(force[whole].mean(), rel=0.01)
-    assert not force[(z < 0.1) | under].any()
-    twice = load_scene(find_scene_file("ballast"), ["loading.crib=0.3"])
+    assert not force[(z < 0.1) | ((x < 0.12) & (y < 0.19))].any()
     assert find_crib_forces(twice, bed) == pytest.approx(2 * force)
