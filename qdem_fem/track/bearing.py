@@ -115,14 +115,17 @@ def run_in(
     """Press a bed until it bears: until a pulse of ``force`` [N] leaves at most ``stays``.
 
     The bed that bears, and that pulse, which is no part of it.  The file ``path`` keeps what each
-    pulse found and left.  Raises `NotConverged` behind `PULSES.most` pulses that leave more.
+    pulse found and left.  Raises `NotConverged` behind `PULSES.most` pulses of this friction and
+    force that leave more.
     """
     name = name_trial(contact, force, rigid)
     while not (name in bed.trials and Pulse(**bed.trials[name]).stays <= stays):
-        if len(bed.pulses) >= PULSES.most:
+        tried = [p for p in (Pulse(**one) for one in bed.pulses)
+                 if (p.friction, p.force) == (contact.friction, force)]  # fmt: skip
+        if len(tried) >= PULSES.most:
             raise NotConverged(
                 "the bed does not bear its sleeper, nor do slow pulses run it in: behind "
-                f"{len(bed.pulses)} of them {Pulse(**bed.pulses[-1]).describe()} ({stays:g} of "
+                f"{len(tried)} of them {tried[-1].describe()} ({stays:g} of "
                 "the way asked)", where=str(path),
                 remedy="remove it, and take another track.seed, more ballast beside the sleeper "
                 "(track.beside) or less load, or allow more (track.stays)",

@@ -92,12 +92,13 @@ def test_a_block_that_slides_finds_no_rest(bed: Bed, tmp_path: Path) -> None:
 @pytest.mark.parametrize("rigid", [False, True])
 def test_a_bed_is_run_in_until_it_bears(rigid: bool, bed: Bed, tmp_path, monkeypatch) -> None:
     """What a pulse leaves is where the next begins; a file from before there were any goes on.  A
-    pulse that leaves much is refused behind the last that is allowed."""
-    path, left = tmp_path / "bed.npz", [SUNK, BORNE, SUNK, SUNK]
+    pulse that leaves much is refused behind the last that is allowed, another friction is not."""
+    path, left = tmp_path / "bed.npz", [BORNE, SUNK, SUNK, SUNK, BORNE, SUNK, SUNK]
 
-    def press(run: q.Simulation, *_: object) -> Pulse:
+    def press(run: q.Simulation, _: object, force: float) -> Pulse:
         run.bodies[1].displacement = run.bodies[1].displacement - 1e-6
-        return left.pop()
+        assert run.contact is not None
+        return replace(left.pop(), friction=run.contact.friction, force=force)
 
     monkeypatch.setattr(bearing, "press_sleeper", press)
     write_bed(path, SLOPING, bed)
@@ -116,7 +117,9 @@ def test_a_bed_is_run_in_until_it_bears(rigid: bool, bed: Bed, tmp_path, monkeyp
     said = r"does not bear .* behind 3 of them .* leaves it 412 µm down and 9 µm aside .0\.1 of the"
     with pytest.raises(NotConverged, match=said):
         run_in(SLOPING, kept, path, contact(0.5), 9e3, 0.1, rigid=rigid)
-    assert read_bed(path, SLOPING).trials == {}
+    sunk = read_bed(path, SLOPING)
+    assert sunk.trials == {}
+    assert run_in(SLOPING, sunk, path, contact(0.9), 9e3, 0.1, rigid=rigid)[1].friction == 0.9
 
 
 def test_rails_hold_the_sleeper_along_the_track(bed: Bed) -> None:

@@ -17,4 +17,4 @@ Driven contacts, closed loops and mirror planes are tested in
 ``tests/engines/test_contact_law_engine.py``.
 """
 
-ROOMS = "adapters: bed.contact_law engines"
+ROOMS = "adapters: bed.contact_law engines.process; tests: golden.digests"

@@ -2,7 +2,7 @@
 
 After Nishiura, Sakaguchi and Aikawa 2017, section 4.  Two sizes: 20 grains under one blow, where
 the balance of energies, resumption and ways to save cost are judged (``twenty``); 300 grains under
-one bogie on a rough rail, packings 1 to 4 at the friction of Table 1, then at three times it, one
+one bogie on a rough rail, packings 1 to 3 at the friction of Table 1, then at three times it, one
 part a run (``packing 1 at 0.577`` and so on), beside what the paper found.
 
 Bars, fixed before: the account of energies closes to .1 %, a resumed run equals the uninterrupted

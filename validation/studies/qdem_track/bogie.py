@@ -24,9 +24,9 @@ from qdem_fem.track.table import BogieTable
 from validation.studies.qdem_track.trials import run_scene
 
 SCENE = Path(__file__).parents[3] / "trackbed" / "scenes" / "track-small.toml"
-SEEDS, FRICTIONS = range(1, 5), (0.577, 1.73)
+SEEDS, FRICTIONS = range(1, 4), (0.577, 1.73)
 """Round-off decides how the same grains fall, so a seed is another packing on another version or
-processor: four are the sample, and no sentence is about one of them."""
+processor: three are the sample, and no sentence is about one of them."""
 POINTS = (*GRAINS, "sleeper")
 QUICKER = (
     "simulation.mass_scaling=1.2e-6", "track.bogie.lead=1.0", "track.bogie.rest=0.01",

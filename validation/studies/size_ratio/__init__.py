@@ -21,4 +21,4 @@ scenes (.2 of the Rayleigh time); its roll is right to 1 %.
 **Answer.** docs/size-ratio.md.
 """
 
-ROOMS = "adapters: bed.contact_law engines"
+ROOMS = "adapters: bed.contact_law engines.process; tests: golden.digests"
