@@ -66,6 +66,11 @@ def run_relax(arguments: argparse.Namespace) -> int:
             "stones are relaxed in jumps alone", where=str(arguments.state),
             remedy="trackbed run does it; give a state of spheres",
         )  # fmt: skip
+    if arguments.method == "karrech2007" and scene.loading and scene.loading.crib is not None:
+        raise UsageError(
+            "karrech2007 does not know the weight of a crib", where="--method",
+            remedy="take smallest-move, or a scene without loading.crib",
+        )  # fmt: skip
     density = scene.material.grain.density
     state = read_state_file(arguments.state, density)
     walls = scene.walls(state.piston_height)
@@ -73,7 +78,8 @@ def run_relax(arguments: argparse.Namespace) -> int:
         print(f"warning: {doubt}", file=sys.stderr)
     if arguments.before is None:
         load = float(scene.stress_at(0.0)) * scene.loaded_area
-        load += float(find_crib_forces(scene, state).sum())
+        if len(state.radius):
+            load += float(find_crib_forces(scene, state).sum())
         relaxation = relax_bare(state, walls, scene.stiffness, method=arguments.method, load=load)
     else:
         before = read_state_file(arguments.before, density)

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from adapters.bed import GRAVITY, FloatArray, State, load_state, measure_sample
+from adapters.errors import NotCredible
 from adapters.scene import Scene
 
 CELL_SHARE = 0.05
@@ -36,6 +37,11 @@ def find_crib_forces(scene: Scene, settled: State) -> FloatArray:
     pressure = density * scene.material.grain.density * GRAVITY * height
     sizes = scene.container.size_x, scene.container.size_y
     seen = count_seen_cells(settled.position, settled.radius, sizes, scene.piston_edges)
+    if not seen.any():
+        raise NotCredible(
+            "no grain is seen from above beside the block", where="loading.crib",
+            remedy="more grains (sample.fill_height), a smaller footprint, or no crib",
+        )  # fmt: skip
     return pressure * (scene.container.area - scene.loaded_area) * seen / seen.sum()
 
 

@@ -52,7 +52,8 @@ def write_words(package: str) -> str:
 def write_gallery() -> str:
     """The page of all pictures, each with its script."""
     parts = [
-        "# Gallery\n\nEach picture is drawn by the script below it: `python SCRIPT PICTURE`.\n"
+        "# Gallery\n\nEach picture is drawn by the script below it, at the top of the repository: "
+        "`PYTHONPATH=. python SCRIPT PICTURE`.\n"
     ]
     for script in sorted(ROOT.glob("docs/gallery/*.py")):
         text = script.read_text(encoding="utf-8")

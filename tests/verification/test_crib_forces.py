@@ -9,6 +9,7 @@ import pytest
 
 from adapters.bed.state import State
 from adapters.engines.crib import CELL_SHARE, count_seen_cells, find_crib_forces
+from adapters.errors import NotCredible
 from adapters.scene.file import load_scene
 from trackbed.scenes import find_scene_file
 
@@ -53,3 +54,10 @@ def test_forces_are_the_weight_of_the_crib() -> None:
     assert force[whole] == pytest.approx(force[whole].mean(), rel=0.01)
     assert not force[(z < 0.1) | ((x < 0.12) & (y < 0.19))].any()
     assert find_crib_forces(twice, bed) == pytest.approx(2 * force)
+
+
+def test_a_bed_that_is_not_seen_beside_the_block_is_a_sentence() -> None:
+    one, still = np.ones(1), np.zeros((1, 3))
+    under = State(np.array([1]), np.array([[0.03, 0.03, 0.01]]), 0.01 * one, one, still, still)
+    with pytest.raises(NotCredible, match="no grain is seen"):
+        find_crib_forces(load_scene(find_scene_file("ballast")), under)

@@ -78,6 +78,17 @@ def test_kilometres_of_a_line_are_joined(tmp_path, monkeypatch, capsys):
     assert (into / "members.png").read_bytes().startswith(b"\x89PNG")
     assert main([*sweep, "--seeds", "4"]) == 0
     assert [words[-1] for words in ran[3:]] == ["line.seed=4"]
+    member = into / "members" / rows[0]["member"]
+    result = (member / "result.json").read_text()
+    (member / "result.json").write_text('{"d1_low_m": "x"}')
+    assert main([*sweep, "--seeds", "4"]) == 8  # not finished, and its run says why
+    assert str(member) in capsys.readouterr().err
+    (member / "result.json").write_text(result)
+    kept = (member / "manifest.json").read_text()
+    (member / "manifest.json").write_text("{")
+    assert main([*sweep, "--seeds", "4"]) == 3
+    assert "manifest of a member can not be read" in capsys.readouterr().err
+    (member / "manifest.json").write_text(kept)
     scene.write_text(read_template("line").replace("load = 200e3", "load = 250e3"))
     assert main([*sweep, "--seeds", "4"]) == 3
     assert "axle.0.load: 200000.0 there, 250000.0 now" in capsys.readouterr().err

@@ -228,7 +228,12 @@ def check_folder(sweep: Sweep) -> None:
         if not (path / MANIFEST).exists():
             continue
         if not sweep.settles:
-            before = (read_object(path / MANIFEST) or {}).get("scene", {})
+            before = (read_object(path / MANIFEST) or {}).get("scene")
+            if not isinstance(before, dict):
+                raise SceneError(
+                    "the manifest of a member can not be read", where=str(path / MANIFEST),
+                    remedy="remove that run folder: the member is computed again",
+                )  # fmt: skip
         else:
             before = RunFolder(path).manifest()["scene"]
             if now["engine"]["name"] == "auto":  # the run has the name it stood for

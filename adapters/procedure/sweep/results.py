@@ -59,7 +59,7 @@ class Band:
 def convert_settings(member: Member) -> dict[str, Any]:
     """Values of the keys swept over, as the checked scene has them; lists as JSON text."""
     values = flatten_keys(member.scene.model_dump(mode="json"))
-    typed = {key: values.get(key) for key in member.settings}
+    typed = {key: values.get(key, asked) for key, asked in member.settings.items()}
     return {k: json.dumps(v) if isinstance(v, list) else v for k, v in typed.items()}
 
 

@@ -22,7 +22,7 @@ from adapters.procedure.sweep.member import (
     run_member,
 )
 from adapters.procedure.sweep.plan import Member, Sweep, check_folder, find_pinned_engine
-from trackbed.run_files import RESULT, read_object, write_whole
+from trackbed.run_files import MANIFEST, RESULT, read_object, write_whole
 
 STOP_S = 30
 """How long members may take to stop when the sweep is interrupted [s]."""
@@ -67,7 +67,8 @@ def find_result(sweep: Sweep, member: Member, ended: Ended | None) -> Result:
             done = here.state == "finished"
     state, exit_code, sentence = "waiting", None, ""
     if ended is not None:
-        exit_code, sentence = ended.exit_code, ended.sentence
+        exit_code = ended.exit_code
+        sentence = ended.sentence or f"its {RESULT} can not be read: remove {folder}"
         state = "stopped" if ended == STOPPED else "failed"
     if done and (ended is None or ended.finished):
         state, exit_code, sentence = "finished", 0, str(summary.get("sentence", ""))
@@ -83,7 +84,12 @@ def find_result(sweep: Sweep, member: Member, ended: Ended | None) -> Result:
 
 def read_summary(sweep: Sweep, member: Member) -> dict[str, Any]:
     """What a finished run of another story came to, by name; empty for any other run."""
-    return {} if sweep.settles else read_object(sweep.run_folder(member) / RESULT) or {}
+    folder = sweep.run_folder(member)
+    if sweep.settles or not (folder / MANIFEST).exists():
+        return {}
+    found = read_object(folder / RESULT) or {}
+    numbers = [value for key, value in found.items() if key.endswith(("_m", "_mgt"))]
+    return found if all(isinstance(one, (int, float, type(None))) for one in numbers) else {}
 
 
 def run_sweep(sweep: Sweep, cluster: Cluster, progress: Progress) -> list[Result]:
