@@ -18,9 +18,13 @@ TIPS = 0.02
 """Between time steps, precisions and strain measures, at one time of the race's warm-up."""
 
 
-def check_max(name: str, value: float, bar: float) -> Check:
-    """A value and its upper bar."""
-    return Check(name, value, f"<= {bar:g}", value <= bar)
+WALL = "two threads are timed by the wall: races of one machine differ by some 5 %"
+CACHED = "the processor's cache holds the mesh: memory is no bound there"
+
+
+def check_max(name: str, value: float, bar: float, why: str = "") -> Check:
+    """A value and its upper bar; ``why`` it does not hold, where that is known."""
+    return Check(name, value, f"<= {bar:g}", value <= bar, why="" if value <= bar else why)
 
 
 def check_min(name: str, value: float, bar: float, unit: str = "") -> Check:
@@ -73,9 +77,9 @@ def check_race(row: Row) -> list[Check]:
         check_min("speed, float64, 2 threads", ours, 110, "Mel/s"),
         check_min("over scipy, float64", ours / speed["scipy float64 1 threads"], 1.5),
         check_min("float32 over float64, 2 threads", single / ours, 1.5),
-        check_max("cost of viscosity, float64, 2 threads", ours / viscous, 1.35),
+        check_max("cost of viscosity, float64, 2 threads", ours / viscous, 1.35, WALL),
         check_min("2 threads over 1, float64", ours / speed["qdem finger float64 1 threads"], 1.9),
-        check_max("traffic over the memory triad, 2 threads", share, 1),
+        check_max("traffic over the memory triad, 2 threads", share, 1, CACHED),
     ]
     if tips:
         checks.append(check_max("tips apart after the warm-up", max(tips) / min(tips) - 1, TIPS))
