@@ -3,7 +3,7 @@
 from importlib import import_module
 from typing import Any
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"
 STORIES = {"jump": "adapters.decks", "settle": "adapters.settle"}
 """Word of the interface for Python -> module of the story that has it, loaded at its first use."""
 

@@ -95,7 +95,9 @@ def describe_grains(runs: Sequence[dict[str, Any]]) -> str:
 
 def describe_spread(values: Sequence[float]) -> str:
     """Median, and in brackets the least and the greatest."""
-    middle, least, most = (f"{one:.2g}" for one in np.percentile(values, (50, 0, 100)))
+    middle, least, most = (
+        f"{float(f'{one:.2g}'):g}" for one in np.percentile(values, (50, 0, 100))
+    )
     return f"{middle} ({least} to {most})"
 
 
