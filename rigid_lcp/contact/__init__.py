@@ -6,6 +6,7 @@ from rigid_lcp.contact.arrays import (
     Contacts,
     build_frames,
     choose_tangents,
+    find_frame,
     match_keys,
 )
 from rigid_lcp.contact.detection_plane import detect_2d, pack_shapes_2d
@@ -14,5 +15,5 @@ from rigid_lcp.contact.placed_solids import MOST_EDGES, pack_shapes_3d
 
 __all__ = [
     "FEATURE_BITS", "MOST_EDGES", "ContactForces", "Contacts", "build_frames", "choose_tangents",
-    "detect_2d", "detect_3d", "match_keys", "pack_shapes_2d", "pack_shapes_3d",
+    "detect_2d", "detect_3d", "find_frame", "match_keys", "pack_shapes_2d", "pack_shapes_3d",
 ]  # fmt: skip

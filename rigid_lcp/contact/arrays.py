@@ -84,18 +84,38 @@ def choose_tangents(normal: Floats) -> Floats:
 
     2D: (-n_y, n_x).  3D: t1 is across n and the axis that n is farthest from.
     """
-    if normal.shape[1] == 2:
-        return np.stack([-normal[:, 1], normal[:, 0]], axis=1)[:, None, :]
-    axis = np.zeros_like(normal)
-    axis[np.arange(len(normal)), np.argmin(np.abs(normal), axis=1)] = 1.0
-    first = np.cross(axis, normal)
-    first /= np.linalg.norm(first, axis=1)[:, None]
-    return np.stack([first, np.cross(normal, first)], axis=1)
+    return build_frames(normal)[:, 1:]
 
 
+@njit(cache=True)
+def find_frame(normal: Floats, frame: Floats) -> None:
+    """Fill ``frame`` (dim, dim) with the rows n, t (n, t1, t2) of a unit normal (dim,)."""
+    frame[0] = normal
+    if len(normal) == 2:
+        frame[1, 0], frame[1, 1] = -normal[1], normal[0]
+        return
+    x, y, z = normal
+    if abs(x) <= abs(y) and abs(x) <= abs(z):
+        t0, t1, t2 = 0.0, -z, y
+    elif abs(y) <= abs(z):
+        t0, t1, t2 = z, 0.0, -x
+    else:
+        t0, t1, t2 = -y, x, 0.0
+    length = np.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
+    frame[1, 0], frame[1, 1], frame[1, 2] = t0 / length, t1 / length, t2 / length
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        frame[2, k] = normal[i] * frame[1, j] - normal[j] * frame[1, i]
+
+
+@njit(cache=True)
 def build_frames(normal: Floats) -> Floats:
     """Unit vectors n, t (n, t1, t2) of every contact as rows, (nc, dim, dim)."""
-    return np.concatenate([normal[:, None, :], choose_tangents(normal)], axis=1)
+    nc, dim = normal.shape
+    frames = np.empty((nc, dim, dim))
+    for c in range(nc):
+        find_frame(normal[c], frames[c])
+    return frames
 
 
 def match_keys(old: Ints, new: Ints) -> tuple[Ints, Bools]:

@@ -95,13 +95,9 @@ def detect_2d(
         pairs, shapes.kind, shapes.first, vertices, normals, shapes.radius, position, margins,
         np.zeros((len(position), 3)) if drift is None else drift,
     )  # fmt: skip
-    order = near_pairs.order_by_pair(shapes.kind, bodies)
-    bodies, numbers, key = bodies[order], numbers[order], key[order]
+    columns = near_pairs.order_contacts(shapes.kind, bodies, numbers, key)
     zero, edges = np.zeros((2, len(key))), np.zeros((2, len(key), 2))
-    return Contacts(
-        bodies[:, 0], bodies[:, 1], numbers[:, 0:2], numbers[:, 2:4], numbers[:, 4], key,
-        numbers[:, 5], numbers[:, 6], zero[0], zero[1], edges[0], edges[1],
-    )  # fmt: skip
+    return Contacts(*columns, zero[0], zero[1], edges[0], edges[1])
 
 
 @njit(cache=True)

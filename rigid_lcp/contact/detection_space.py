@@ -17,11 +17,12 @@ from rigid_lcp.contact.near_pairs import (
     ZERO,
     bound_shapes,
     find_near_pairs,
-    order_by_pair,
+    order_contacts,
 )
 from rigid_lcp.contact.placed_solids import MOST_EDGES, POLYHEDRON, SPHERE, Shapes3D, place_solids
 from rigid_lcp.contact.separation import Solids, dot
 from rigid_lcp.contact.solids import CORNER_EDGE, CORNERS, EDGE_CORNER, find_solid_contacts
+from rigid_lcp.shapes import vectors
 
 
 @njit(cache=True)
@@ -128,44 +129,44 @@ def detect_3d(
         pairs, shapes.kind, solids, shapes.reach, position, margins, boxes,
         np.zeros((len(position), 6)) if drift is None else drift,
     )  # fmt: skip
-    order = order_by_pair(shapes.kind, bodies)
-    bodies, numbers, key = bodies[order], numbers[order], key[order]
-    zero = np.zeros(len(key))
-    return Contacts(
-        bodies[:, 0], bodies[:, 1], numbers[:, 0:3], numbers[:, 3:6], numbers[:, 6], key,
-        numbers[:, 7], numbers[:, 8], zero, zero.copy(),
-        *find_edge_directions(shapes.kind, solids, bodies, key),
-    )  # fmt: skip
+    columns = order_contacts(shapes.kind, bodies, numbers, key)
+    zero = np.zeros((2, len(key)))
+    edges = find_edge_directions(shapes.kind, solids, columns[0], columns[1], columns[5])
+    return Contacts(*columns, zero[0], zero[1], edges[0], edges[1])
 
 
+@njit(cache=True)
 def find_edge_directions(
-    kind: Ints, solids: Solids, bodies: Ints, key: Ints
-) -> tuple[Floats, Floats]:
-    """Unit directions (nc, 3) of the edges of a and of b that the contacts' names tell of.
+    kind: Ints, solids: Solids, body_a: Ints, body_b: Ints, key: Ints
+) -> Floats:
+    """Unit directions (2, nc, 3) of the edges of a and of b that the contacts' names tell of.
 
     Zero at corners, faces and spheres.
     """
-    a, b = bodies[:, 0], bodies[:, 1]
     directions = np.zeros((2, len(key), 3))
-    feature_a = (key >> FEATURE_BITS) & (2 * MOST_EDGES - 1)
-    feature_b = key & (2 * MOST_EDGES - 1)
-    solid = (kind[a] == POLYHEDRON) & (kind[b] == POLYHEDRON)
-    crossing, on_edge = solid & (feature_a >= MOST_EDGES), solid & (feature_b >= MOST_EDGES)
-    on_sphere = key & ((1 << 2 * FEATURE_BITS) - 1)  # a sphere has no features of its own
-    past_faces = on_sphere - np.diff(solids.first_face)[b]
-    edges = np.diff(solids.first_edge)[b]
-    rolling = (kind[a] == SPHERE) & (kind[b] == POLYHEDRON)
-    rolling &= (past_faces >= 0) & (past_faces < edges)
-    for side, rows, body, edge in (
-        (0, crossing, a, feature_a - MOST_EDGES),
-        (1, on_edge, b, feature_b - MOST_EDGES),
-        (1, rolling, b, past_faces),
-    ):
-        ends = solids.edge[solids.first_edge[body[rows]] + edge[rows]]
-        first, second = (solids.first_vertex[body[rows], None] + ends).T
-        along = solids.vertex[second] - solids.vertex[first]
-        directions[side, rows] = along / np.linalg.norm(along, axis=1)[:, None]
-    return directions[0], directions[1]
+    for c in range(len(key)):
+        a, b = body_a[c], body_b[c]
+        if kind[b] != POLYHEDRON:
+            continue
+        edge_a, edge_b = -1, -1
+        if kind[a] == SPHERE:  # it has no features of its own: faces, then edges, then corners of b
+            past_faces = (key[c] & ((1 << 2 * FEATURE_BITS) - 1)) - (
+                solids.first_face[b + 1] - solids.first_face[b]
+            )
+            if past_faces < solids.first_edge[b + 1] - solids.first_edge[b]:
+                edge_b = past_faces
+        else:
+            edge_a = ((key[c] >> FEATURE_BITS) & (2 * MOST_EDGES - 1)) - MOST_EDGES
+            edge_b = (key[c] & (2 * MOST_EDGES - 1)) - MOST_EDGES
+        for side, body, edge in ((0, a, edge_a), (1, b, edge_b)):
+            if edge >= 0:
+                ends, first = solids.edge[solids.first_edge[body] + edge], solids.first_vertex[body]
+                start = vectors.read(solids.vertex, first + ends[0])
+                along = vectors.add(vectors.read(solids.vertex, first + ends[1]), -1.0, start)
+                length = np.sqrt(vectors.dot(along, along))
+                for axis in range(3):
+                    directions[side, c, axis] = along[axis] / length
+    return directions
 
 
 @njit(cache=True)

@@ -100,9 +100,28 @@ def find_near_pairs(kind: Ints, boxes: Floats, movable: Bools) -> Ints:
     return pairs[np.argsort(pairs[:, 0] * len(kind) + pairs[:, 1], kind="mergesort")]
 
 
-def order_by_pair(kind: Ints, bodies: Ints) -> Ints:
-    """Rows of contacts between ``bodies`` (nc, 2) in the order of `find_near_pairs`."""
-    a, b = bodies[:, 0], bodies[:, 1]
-    wall = kind[b] == HALF_SPACE
-    first, second = np.where(wall, a, np.minimum(a, b)), np.where(wall, b, np.maximum(a, b))
-    return np.argsort(first * len(kind) + second, kind="stable")
+@njit(cache=True)
+def order_contacts(
+    kind: Ints, bodies: Ints, numbers: Floats, key: Ints
+) -> tuple[Ints, Ints, Floats, Floats, Floats, Ints, Floats, Floats]:
+    """Contacts in the order of `find_near_pairs`, those of a pair as they come, column by column.
+
+    ``bodies`` (nc, 2) and ``numbers`` (nc, 2 dim + 3): point, normal, gap, radii of curvature.
+    Returns bodies a and b, points, normals, gaps, keys, radii of a and b.
+    """
+    count, dim = len(key), (numbers.shape[1] - 3) // 2
+    pair = np.empty(count, np.int64)
+    for c in range(count):
+        a, b = bodies[c]
+        first, second = (a, b) if a < b or kind[b] == HALF_SPACE else (b, a)
+        pair[c] = first * len(kind) + second
+    order = np.argsort(pair, kind="mergesort")
+    point, normal = np.empty((count, dim)), np.empty((count, dim))
+    for c in range(count):
+        for axis in range(dim):
+            point[c, axis] = numbers[order[c], axis]
+            normal[c, axis] = numbers[order[c], dim + axis]
+    gap, radius_a, radius_b = (
+        numbers[order, 2 * dim], numbers[order, 2 * dim + 1], numbers[order, 2 * dim + 2]
+    )  # fmt: skip
+    return bodies[order, 0], bodies[order, 1], point, normal, gap, key[order], radius_a, radius_b

@@ -6,13 +6,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from rigid_lcp.arrays import Bools, Floats, Ints
 from rigid_lcp.contact.arrays import FEATURE_BITS
 from rigid_lcp.contact.near_pairs import HALF_SPACE
 from rigid_lcp.contact.separation import POLYHEDRA, Solids
 from rigid_lcp.errors import SceneError, ShapeError
-from rigid_lcp.shapes import HalfSpace, Polyhedron, Sphere, make_rotation
+from rigid_lcp.shapes import HalfSpace, Polyhedron, Sphere, vectors
 
 POLYHEDRON, SPHERE = 0, 1
 """Kinds of shapes as the kernels know them, with `HALF_SPACE`."""
@@ -120,15 +121,31 @@ def _join_solids(parts: Sequence[Solids]) -> Solids:
 
 def place_solids(shapes: Shapes3D, position: Floats, quaternion: Floats) -> Solids:
     """Polyhedra in the world frame; half-spaces are there already."""
-    solids = shapes.solids
-    turn = make_rotation(quaternion)
-    still = shapes.kind == HALF_SPACE
-    turn[still], shift = np.eye(3), np.where(still[:, None], 0.0, position)
-    counts = [np.diff(first) for first in (solids.first_vertex, solids.first_face,
-                                           solids.first_edge)]  # fmt: skip
-    body = [np.repeat(np.arange(len(still)), count) for count in counts]
-    vertex = np.einsum("vij,vj->vi", turn[body[0]], solids.vertex) + shift[body[0]]
-    normal = np.einsum("vij,vj->vi", turn[body[1]], solids.normal)
-    offset = solids.offset + (normal * shift[body[1]]).sum(axis=1)
-    bisector = np.einsum("vij,vj->vi", turn[body[2]], solids.bisector)
-    return solids._replace(vertex=vertex, normal=normal, offset=offset, bisector=bisector)
+    vertex, normal, offset, bisector = _place_features(
+        shapes.solids, shapes.kind == HALF_SPACE, position, quaternion
+    )
+    return shapes.solids._replace(vertex=vertex, normal=normal, offset=offset, bisector=bisector)
+
+
+@njit(cache=True)
+def _place_features(
+    solids: Solids, still: Bools, position: Floats, quaternion: Floats
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Corners, normals and offsets of faces, and bisectors of edges, in the world frame."""
+    vertex, normal = solids.vertex.copy(), solids.normal.copy()
+    offset, bisector = solids.offset.copy(), solids.bisector.copy()
+    for body in range(len(still)):
+        if still[body]:
+            continue
+        q = quaternion[body]
+        turn, x = vectors.make_rotation((q[0], q[1], q[2], q[3])), vectors.read(position, body)
+        for v in range(solids.first_vertex[body], solids.first_vertex[body + 1]):
+            corner = vectors.rotate(turn, vectors.read(solids.vertex, v))
+            vertex[v] = vectors.add(corner, 1.0, x)
+        for f in range(solids.first_face[body], solids.first_face[body + 1]):
+            n = vectors.rotate(turn, vectors.read(solids.normal, f))
+            normal[f] = n
+            offset[f] += vectors.dot(n, x)
+        for e in range(solids.first_edge[body], solids.first_edge[body + 1]):
+            bisector[e] = vectors.rotate(turn, vectors.read(solids.bisector, e))
+    return vertex, normal, offset, bisector

@@ -88,6 +88,8 @@ def separate_faces(solids: Solids, own: int, other: int, margin: float) -> tuple
         for v in range(solids.first_vertex[other], solids.first_vertex[other + 1]):
             x = solids.vertex[v]
             nearest = min(nearest, n0 * x[0] + n1 * x[1] + n2 * x[2])
+            if nearest - solids.offset[f] <= separation:  # no better than another face
+                break
         nearest -= solids.offset[f]
         if nearest > separation:
             best, separation = f, nearest

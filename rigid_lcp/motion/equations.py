@@ -9,11 +9,14 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
+from numba import njit
+from numpy.typing import NDArray
 
 from rigid_lcp.arrays import Floats, Ints
-from rigid_lcp.contact import Contacts, build_frames
+from rigid_lcp.contact import Contacts, find_frame
 from rigid_lcp.friction.problem import BodySpace
 from rigid_lcp.motion.state import Motion
+from rigid_lcp.shapes import vectors
 
 
 def make_body_space(
@@ -42,31 +45,44 @@ def build_jacobian(
 
     Row of a direction d: (d, x_a x d) for body a and its negative, with x_b, for body b.
     """
-    dim, nc = contacts.dim, len(contacts)
-    frames = build_frames(contacts.normal)
-    size = 3 if dim == 2 else 6
-    values = np.empty((nc, dim, 2, size))
-    place = np.empty((nc, 2), dtype=np.int64)
-    for side, (bodies, sign) in enumerate(((contacts.body_a, 1.0), (contacts.body_b, -1.0))):
-        lever = contacts.point - position[bodies]
-        values[:, :, side, :dim] = sign * frames
-        values[:, :, side, dim:] = sign * _find_moment(lever[:, None, :], frames)
-        place[:, side] = columns[bodies]
-    swap = place[:, 0] > place[:, 1]  # columns in ascending order
-    values[swap], place[swap] = values[swap][:, :, ::-1], place[swap][:, ::-1]
-    there = np.broadcast_to((place >= 0)[:, None, :, None], values.shape)
-    column = np.broadcast_to(place[:, None, :, None] * size + np.arange(size), values.shape)
-    counts = there.sum(axis=(2, 3)).ravel()
-    pointer = np.concatenate([[0], np.cumsum(counts)])
-    shape = (nc * dim, movable * size)
-    return sp.csr_array((values[there], column[there], pointer), shape=shape)
+    size = 3 if contacts.dim == 2 else 6
+    made = _list_jacobian(
+        contacts.body_a, contacts.body_b, contacts.point, contacts.normal, position, columns
+    )
+    return sp.csr_array(made, shape=(len(contacts) * contacts.dim, movable * size))
 
 
-def _find_moment(lever: Floats, force: Floats) -> Floats:
-    """``x x f``: one number (in a last axis of its own) in 2D, a vector in 3D."""
-    if lever.shape[-1] == 3:
-        return np.cross(lever, force)
-    return (lever[..., 0] * force[..., 1] - lever[..., 1] * force[..., 0])[..., None]
+@njit(cache=True)
+def _list_jacobian(
+    body_a: Ints, body_b: Ints, point: Floats, normal: Floats, position: Floats, columns: Ints
+) -> tuple[Floats, NDArray[np.int32], NDArray[np.int32]]:
+    """Values of J by rows, their columns, and where each row begins."""
+    nc, dim = point.shape
+    size = 3 * (dim - 1)
+    value, column = np.empty(nc * dim * 2 * size), np.empty(nc * dim * 2 * size, np.int32)
+    start, frame = np.zeros(nc * dim + 1, np.int32), np.empty((dim, dim))
+    k = 0
+    for c in range(nc):
+        find_frame(normal[c], frame)
+        x = vectors.read(point, c)
+        sign, first, second = 1.0, body_a[c], body_b[c]
+        if columns[first] > columns[second]:  # columns in ascending order
+            sign, first, second = -1.0, second, first
+        for i in range(dim):
+            d = vectors.read(frame, i)
+            for body, side in ((first, sign), (second, -sign)):
+                if columns[body] < 0:
+                    continue
+                moment = vectors.cross(vectors.add(x, -1.0, vectors.read(position, body)), d)
+                for axis in range(dim):
+                    value[k + axis] = side * d[axis]
+                for axis in range(dim, size):
+                    value[k + axis] = side * moment[axis - dim if dim == 3 else 2]
+                for axis in range(size):
+                    column[k + axis] = columns[body] * size + axis
+                k += size
+            start[c * dim + i + 1] = k
+    return value[:k], column[:k], start
 
 
 def turn_arm(spin: Floats, arm: Floats) -> Floats:
@@ -76,16 +92,39 @@ def turn_arm(spin: Floats, arm: Floats) -> Floats:
     return np.stack([-spin * arm[..., 1], spin * arm[..., 0]], axis=-1)
 
 
-def _find_point_velocities(motion: Motion, bodies: Ints, point: Floats) -> Floats:
-    arm = point - motion.position[bodies]
-    return motion.velocity[bodies] + turn_arm(motion.spin[bodies], arm)
+@njit(cache=True)
+def _find_point_velocity(
+    position: Floats, rates: Floats, body: int, point: vectors.Vector
+) -> vectors.Vector:
+    arm = vectors.add(point, -1.0, vectors.read(position, body))
+    return vectors.add(
+        vectors.read_velocity(rates, body), 1.0, vectors.cross(vectors.read_spin(rates, body), arm)
+    )
 
 
 def find_relative_velocity(contacts: Contacts, motion: Motion) -> Floats:
     """``u = J v`` with all bodies, moving or driven: (nc, dim) along n, t (n, t1, t2) [m/s]."""
-    a = _find_point_velocities(motion, contacts.body_a, contacts.point)
-    b = _find_point_velocities(motion, contacts.body_b, contacts.point)
-    return np.einsum("cij,cj->ci", build_frames(contacts.normal), a - b)
+    found: Floats = _list_relative_velocities(
+        contacts.body_a, contacts.body_b, contacts.point, contacts.normal, motion.position,
+        motion.rates,
+    )  # fmt: skip
+    return found
+
+
+@njit(cache=True)
+def _list_relative_velocities(
+    body_a: Ints, body_b: Ints, point: Floats, normal: Floats, position: Floats, rates: Floats
+) -> Floats:
+    nc, dim = point.shape
+    found, frame = np.empty((nc, dim)), np.empty((dim, dim))
+    for c in range(nc):
+        x = vectors.read(point, c)
+        a = _find_point_velocity(position, rates, body_a[c], x)
+        apart = vectors.add(a, -1.0, _find_point_velocity(position, rates, body_b[c], x))
+        find_frame(normal[c], frame)
+        for i in range(dim):
+            found[c, i] = vectors.project(vectors.read(frame, i), apart)
+    return found
 
 
 def find_inertial_acceleration(contacts: Contacts, motion: Motion) -> Floats:
@@ -106,36 +145,69 @@ def find_inertial_acceleration(contacts: Contacts, motion: Motion) -> Floats:
     In 3D, at edges, see `_find_edge_terms`; crossing edges that slide along each other are taken to
     slide along b's, which matters to no force: friction then has the velocity's direction.
     """
-    a, b, n = contacts.body_a, contacts.body_b, contacts.normal
-    flat = np.isinf(contacts.radius_b)
-    carrier_a = contacts.point + contacts.radius_a[:, None] * n
-    behind = np.where(flat, 0.0, contacts.radius_b)
-    face = contacts.point - contacts.gap[:, None] * n
-    carrier_b = np.where(flat[:, None], carrier_a, face - behind[:, None] * n)
-    carried = _find_point_velocities(motion, a, carrier_a)
-    moving = carried - _find_point_velocities(motion, b, carrier_b)
-    along = moving - (moving * n).sum(axis=1)[:, None] * n
-    apart = contacts.radius_a + behind + contacts.gap
-    apart = np.where(flat | (apart <= 0), 1.0, apart)
-    turning = turn_arm(motion.spin[b], n)
-    pull = _find_centripetal(motion, a, carrier_a) - _find_centripetal(motion, b, carrier_b)
-    normal = (n * pull).sum(axis=1)
-    curved = (along * along).sum(axis=1) / apart
-    normal += np.where(flat, 2 * (turning * moving).sum(axis=1), curved)
-    normal_rate = np.where(flat[:, None], turning, along / apart[:, None])
-    edges = np.flatnonzero(np.any(contacts.edge_b != 0, axis=1))
-    if len(edges):
-        normal[edges], normal_rate[edges] = _find_edge_terms(contacts[edges], motion)
-    rate = carried - contacts.radius_a[:, None] * normal_rate
-    pull = turn_arm(motion.spin[a], rate - motion.velocity[a])
-    pull -= turn_arm(motion.spin[b], rate - motion.velocity[b])
-    result = np.einsum("cij,cj->ci", build_frames(n), pull)
-    result[:, 0] = normal
-    return result
+    c = contacts
+    found: Floats = _list_inertial_accelerations(
+        c.body_a, c.body_b, c.point, c.normal, c.gap, c.radius_a, c.radius_b, c.edge_a, c.edge_b,
+        motion.position, motion.rates,
+    )  # fmt: skip
+    return found
 
 
-def _find_edge_terms(contacts: Contacts, motion: Motion) -> tuple[Floats, Floats]:
-    """Normal part (nc,) [m/s^2] and ``n' = dn/dt`` (nc, 3) [1/s] for contacts at an edge of b.
+@njit(cache=True)
+def _list_inertial_accelerations(
+    body_a: Ints, body_b: Ints, point: Floats, normals: Floats, gaps: Floats, radius_a: Floats,
+    radius_b: Floats, edges_a: Floats, edges_b: Floats, position: Floats, rates: Floats,
+) -> Floats:  # fmt: skip
+    nc, dim = point.shape
+    found, frame = np.empty((nc, dim)), np.empty((dim, dim))
+    for c in range(nc):
+        a, b, n, gap = body_a[c], body_b[c], vectors.read(normals, c), gaps[c]
+        x, e_a, e_b = vectors.read(point, c), vectors.read(edges_a, c), vectors.read(edges_b, c)
+        flat = np.isinf(radius_b[c])
+        behind = 0.0 if flat else radius_b[c]
+        carrier_a = vectors.add(x, radius_a[c], n)
+        foot = vectors.add(x, -gap, n)
+        carrier_b = carrier_a if flat else vectors.add(foot, -behind, n)
+        carried = _find_point_velocity(position, rates, a, carrier_a)
+        moving = vectors.add(carried, -1.0, _find_point_velocity(position, rates, b, carrier_b))
+        along = vectors.add(moving, -vectors.dot(moving, n), n)
+        apart = radius_a[c] + behind + gap
+        if flat or apart <= 0.0:
+            apart = 1.0
+        spin_a, spin_b = vectors.read_spin(rates, a), vectors.read_spin(rates, b)
+        turning = vectors.cross(spin_b, n)
+        pull = vectors.add(
+            _find_centripetal(position, rates, a, carrier_a), -1.0,
+            _find_centripetal(position, rates, b, carrier_b),
+        )  # fmt: skip
+        if vectors.dot(e_b, e_b) > 0.0:
+            normal, normal_rate = _find_edge_terms(
+                position, rates, a, b, n, carrier_a, foot, radius_a[c] + gap, e_a, e_b
+            )
+        elif flat:
+            normal, normal_rate = 2.0 * vectors.dot(turning, moving), turning
+            normal += vectors.dot(n, pull)
+        else:
+            normal = vectors.dot(n, pull) + vectors.dot(along, along) / apart
+            normal_rate = (along[0] / apart, along[1] / apart, along[2] / apart)
+        rate = vectors.add(carried, -radius_a[c], normal_rate)
+        pull = vectors.add(
+            vectors.cross(spin_a, vectors.add(rate, -1.0, vectors.read_velocity(rates, a))), -1.0,
+            vectors.cross(spin_b, vectors.add(rate, -1.0, vectors.read_velocity(rates, b))),
+        )  # fmt: skip
+        find_frame(normals[c], frame)
+        found[c, 0] = normal
+        for i in range(1, dim):
+            found[c, i] = vectors.project(vectors.read(frame, i), pull)
+    return found
+
+
+@njit(cache=True)
+def _find_edge_terms(
+    position: Floats, rates: Floats, a: int, b: int, n: vectors.Vector, carrier: vectors.Vector,
+    foot: vectors.Vector, distance: float, e_a: vectors.Vector, e_b: vectors.Vector,
+) -> tuple[float, vectors.Vector]:  # fmt: skip
+    """Normal part [m/s^2] and ``n' = dn/dt`` [1/s] for a contact at an edge of b.
 
     The normal of two crossing edges is across both, that of a sphere on an edge across the edge:
     both turn with both bodies, and not as a face would.  With ``g + R = n . D``, D from a point of
@@ -145,29 +217,44 @@ def _find_edge_terms(contacts: Contacts, motion: Motion) -> tuple[Floats, Floats
         edge a across edge b:  n || c = e_a x e_b,  n' = (1 - n n^T) c' / (n . c)
         sphere on edge b:      e_b . n' = -n . e_b',  t . n' = t . D' / distance
     """
-    a, b, n = contacts.body_a, contacts.body_b, contacts.normal
-    carrier = contacts.point + contacts.radius_a[:, None] * n
-    foot = contacts.point - contacts.gap[:, None] * n
-    velocity = _find_point_velocities(motion, a, carrier) - _find_point_velocities(motion, b, foot)
-    pull = _find_centripetal(motion, a, carrier) - _find_centripetal(motion, b, foot)
-    e_a, e_b = contacts.edge_a, contacts.edge_b
-    turned_b = np.cross(motion.spin[b], e_b)
-    across = np.cross(e_a, e_b)
-    change = np.cross(np.cross(motion.spin[a], e_a), e_b) + np.cross(e_a, turned_b)
-    signed = _dot(n, across)
-    crossing = (change - _dot(n, change)[:, None] * n) / np.where(signed == 0, 1.0, signed)[:, None]
-    side = np.cross(e_b, n)
-    distance = contacts.radius_a + contacts.gap
-    rolling = _dot(side, velocity) / np.where(distance == 0, 1.0, distance)
-    round_edge = -_dot(n, turned_b)[:, None] * e_b + rolling[:, None] * side
-    sharp = np.any(e_a != 0, axis=1, keepdims=True)
-    rate = np.where(sharp, crossing, round_edge)
-    return _dot(n, pull) + 2 * _dot(rate, velocity) - distance * _dot(rate, rate), rate
+    velocity = vectors.add(
+        _find_point_velocity(position, rates, a, carrier), -1.0,
+        _find_point_velocity(position, rates, b, foot),
+    )  # fmt: skip
+    pull = vectors.add(
+        _find_centripetal(position, rates, a, carrier), -1.0,
+        _find_centripetal(position, rates, b, foot),
+    )  # fmt: skip
+    turned_b = vectors.cross(vectors.read_spin(rates, b), e_b)
+    if vectors.project(e_a, e_a) > 0.0:
+        across = vectors.cross(e_a, e_b)
+        change = vectors.add(
+            vectors.cross(vectors.cross(vectors.read_spin(rates, a), e_a), e_b), 1.0,
+            vectors.cross(e_a, turned_b),
+        )  # fmt: skip
+        signed = vectors.project(n, across)
+        flat = vectors.add(change, -vectors.project(n, change), n)
+        if signed != 0.0:
+            flat = (flat[0] / signed, flat[1] / signed, flat[2] / signed)
+        rate = flat
+    else:
+        side = vectors.cross(e_b, n)
+        rolling = vectors.project(side, velocity)
+        if distance != 0.0:
+            rolling /= distance
+        about = -vectors.project(n, turned_b)
+        rate = vectors.add((about * e_b[0], about * e_b[1], about * e_b[2]), rolling, side)
+    normal = vectors.project(n, pull) + 2 * vectors.project(rate, velocity)
+    return normal - distance * vectors.project(rate, rate), rate
 
 
-def _find_centripetal(motion: Motion, bodies: Ints, point: Floats) -> Floats:
-    spin = motion.spin[bodies]
-    return turn_arm(spin, turn_arm(spin, point - motion.position[bodies]))
+@njit(cache=True)
+def _find_centripetal(
+    position: Floats, rates: Floats, body: int, point: vectors.Vector
+) -> vectors.Vector:
+    arm = vectors.add(point, -1.0, vectors.read(position, body))
+    spin = vectors.read_spin(rates, body)
+    return vectors.cross(spin, vectors.cross(spin, arm))
 
 
 def find_contact_offset(contacts: Contacts, motion: Motion, free: Motion) -> Floats:
@@ -177,7 +264,3 @@ def find_contact_offset(contacts: Contacts, motion: Motion, free: Motion) -> Flo
     """
     loads = find_relative_velocity(contacts, free)
     return (loads + find_inertial_acceleration(contacts, motion)).ravel()
-
-
-def _dot(a: Floats, b: Floats) -> Floats:
-    return np.asarray(np.einsum("ci,ci->c", a, b), dtype=float)

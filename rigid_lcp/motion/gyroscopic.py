@@ -7,10 +7,12 @@ spin w in the world frame.
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike
 
 from rigid_lcp import shapes
 from rigid_lcp.arrays import Floats
+from rigid_lcp.shapes import vectors
 
 
 def find_principal_axes(inertia: ArrayLike) -> tuple[Floats, Floats]:
@@ -22,8 +24,19 @@ def find_principal_axes(inertia: ArrayLike) -> tuple[Floats, Floats]:
 
 def turn_inertia(inertia: Floats, quaternion: Floats) -> Floats:
     """``R I R^T``, (..., 3, 3), of body tensors (..., 3, 3) [kg m^2]."""
-    turn = shapes.make_rotation(quaternion)
-    return np.einsum("...ij,...jk,...lk->...il", turn, inertia, turn)
+    placed: Floats = _turn_tensors(inertia.reshape(-1, 3, 3), quaternion.reshape(-1, 4))
+    return placed.reshape(inertia.shape)
+
+
+@njit(cache=True)
+def _turn_tensors(inertia: Floats, quaternion: Floats) -> Floats:
+    placed = np.zeros(inertia.shape)
+    for body in range(len(inertia)):
+        q = quaternion[body]
+        turn = vectors.make_rotation((q[0], q[1], q[2], q[3]))
+        for i, j, k, m in np.ndindex(3, 3, 3, 3):
+            placed[body, i, m] += turn[i][j] * inertia[body, j, k] * turn[m][k]
+    return placed
 
 
 def find_spin_acceleration(inertia: Floats, quaternion: Floats, spin: Floats) -> Floats:
@@ -47,56 +60,79 @@ def rotate_freely(
     cubes and all bodies with two equal moments move exactly.
     """
     moments, axes = principal
-    frame = shapes.normalise(shapes.multiply_quaternions(quaternion, axes))
-    momentum = moments * shapes.rotate_back(frame, spin)
-    twice_energy = (momentum**2 / moments).sum(axis=-1)
-    world_momentum = shapes.rotate(frame, momentum)
-    rest = 1.0 / moments - 1.0 / moments[..., 1:2]
-    for axis, share in ((0, 0.5), (2, 1.0), (0, 0.5)):
-        turn = np.zeros_like(momentum)
-        turn[..., axis] = share * seconds * rest[..., axis] * momentum[..., axis]
-        step = shapes.make_quaternion(turn)
-        frame = shapes.multiply_quaternions(frame, step)
-        momentum = shapes.rotate_back(step, momentum)
-    back = find_energy_turn(moments, momentum, twice_energy, seconds)
-    frame = shapes.multiply_quaternions(frame, shapes.make_quaternion(back))
-    frame = shapes.turn_quaternion(frame, seconds / moments[..., 1:2] * world_momentum)
-    spin = shapes.rotate(frame, shapes.rotate_back(frame, world_momentum) / moments)
-    body = shapes.multiply_quaternions(frame, axes * [1.0, -1.0, -1.0, -1.0])
-    return shapes.normalise(body), spin
+    turned, spun = _rotate_bodies(
+        moments.reshape(-1, 3), axes.reshape(-1, 4), quaternion.reshape(-1, 4), spin.reshape(-1, 3),
+        seconds,
+    )  # fmt: skip
+    return shapes.normalise(turned.reshape(quaternion.shape)), spun.reshape(spin.shape)
 
 
+@njit(cache=True)
+def _rotate_bodies(
+    moments: Floats, axes: Floats, quaternion: Floats, spin: Floats, seconds: float
+) -> tuple[Floats, Floats]:
+    turned, spun = np.empty_like(quaternion), np.empty_like(spin)
+    for body in range(len(spin)):
+        m = (moments[body, 0], moments[body, 1], moments[body, 2])
+        q, p = quaternion[body], axes[body]
+        own = (p[0], p[1], p[2], p[3])
+        frame = vectors.normalise(vectors.multiply((q[0], q[1], q[2], q[3]), own))
+        placed = vectors.make_rotation(frame)
+        w = vectors.rotate_back(placed, (spin[body, 0], spin[body, 1], spin[body, 2]))
+        momentum = (m[0] * w[0], m[1] * w[1], m[2] * w[2])
+        twice_energy = momentum[0] ** 2 / m[0] + momentum[1] ** 2 / m[1] + momentum[2] ** 2 / m[2]
+        world = vectors.rotate(placed, momentum)
+        for axis, share in ((0, 0.5), (2, 1.0), (0, 0.5)):
+            angle = share * seconds * (1.0 / m[axis] - 1.0 / m[1]) * momentum[axis]
+            step = vectors.make_turn((angle, 0.0, 0.0) if axis == 0 else (0.0, 0.0, angle))
+            frame = vectors.multiply(frame, step)
+            momentum = vectors.rotate_back(vectors.make_rotation(step), momentum)
+        back = find_energy_turn(m, momentum, twice_energy, seconds)
+        frame = vectors.multiply(frame, vectors.make_turn(back))
+        share = seconds / m[1]
+        turn = vectors.make_turn((share * world[0], share * world[1], share * world[2]))
+        frame = vectors.normalise(vectors.multiply(turn, frame))
+        placed = vectors.make_rotation(frame)
+        w = vectors.rotate_back(placed, world)
+        spun[body] = vectors.rotate(placed, (w[0] / m[0], w[1] / m[1], w[2] / m[2]))
+        turned[body] = vectors.multiply(frame, (own[0], -own[1], -own[2], -own[3]))
+    return turned, spun
+
+
+@njit(cache=True)
 def find_energy_turn(
-    moments: Floats, momentum: Floats, twice_energy: Floats, seconds: float
-) -> Floats:
-    """Rotation vectors (..., 3), in the principal frame, by which a frame turns to a given energy.
+    moments: vectors.Vector, momentum: vectors.Vector, twice_energy: float, seconds: float
+) -> vectors.Vector:
+    """Rotation vector, in the principal frame, by which a frame turns to a given energy.
 
-    The angular momentum L (..., 3) stays in the world, and so slides along its sphere in the frame,
+    The angular momentum L stays in the world, and so slides along its sphere in the frame,
     towards where ``L . I^-1 L`` grows fastest:
 
         L(t) = cos t L + sin t |L| g,   g || w - (w . L) L / |L|^2,   L(t) . I^-1 L(t) = 2 E
 
-    ``moments`` (..., 3) [kg m^2], ``twice_energy`` (...,) [J].  The angle t, of third order in the
-    step of ``seconds`` [s], is at most ``(|w| seconds)^2``, so that round-off turns no body at
-    rest, and a tenth of that between L and w: about a principal axis the energy has no slope.
+    ``moments`` [kg m^2], ``twice_energy`` [J].  The angle t, of third order in the step of
+    ``seconds`` [s], is at most ``(|w| seconds)^2``, so that round-off turns no body at rest, and a
+    tenth of that between L and w: about a principal axis the energy has no slope.
     """
-    size = np.linalg.norm(momentum, axis=-1, keepdims=True)
-    along = momentum / np.where(size == 0, 1.0, size)
-    spin = momentum / moments
-    slope = spin - (spin * along).sum(axis=-1, keepdims=True) * along
-    steep = np.linalg.norm(slope, axis=-1, keepdims=True)
-    uphill = slope / np.where(steep == 0, 1.0, steep)
+    m, size = moments, np.sqrt(vectors.dot(momentum, momentum))
+    if size == 0.0:
+        return 0.0, 0.0, 0.0
+    along = (momentum[0] / size, momentum[1] / size, momentum[2] / size)
+    spin = (momentum[0] / m[0], momentum[1] / m[1], momentum[2] / m[2])
+    slope = vectors.add(spin, -vectors.dot(spin, along), along)
+    steep, speed = np.sqrt(vectors.dot(slope, slope)), np.sqrt(vectors.dot(spin, spin))
+    if steep == 0.0:
+        return 0.0, 0.0, 0.0
+    g = (slope[0] / steep, slope[1] / steep, slope[2] / steep)
     # 2 E(t) = c + (a - c) cos^2 t + 2 b sin t cos t
-    a, b, c = (
-        size[..., 0] ** 2 * (first * second / moments).sum(axis=-1)
-        for first, second in ((along, along), (along, uphill), (uphill, uphill))
-    )
-    angle = np.zeros_like(a)
-    speed = np.linalg.norm(spin, axis=-1)
-    most = np.minimum(0.1 * steep[..., 0] / np.maximum(speed, 1e-300), (speed * seconds) ** 2)
+    a = size**2 * (along[0] ** 2 / m[0] + along[1] ** 2 / m[1] + along[2] ** 2 / m[2])
+    b = size**2 * (along[0] * g[0] / m[0] + along[1] * g[1] / m[1] + along[2] * g[2] / m[2])
+    c = size**2 * (g[0] ** 2 / m[0] + g[1] ** 2 / m[1] + g[2] ** 2 / m[2])
+    angle, most = 0.0, min(0.1 * steep / speed, (speed * seconds) ** 2)
     for _ in range(4):  # Newton, from an angle of third order in the step
         sine, cosine = np.sin(angle), np.cos(angle)
         missing = twice_energy - (a * cosine**2 + 2 * b * sine * cosine + c * sine**2)
         rise = 2 * (c - a) * sine * cosine + 2 * b * (cosine**2 - sine**2)
-        angle = np.clip(angle + missing / np.where(rise == 0, np.inf, rise), -most, most)
-    return np.asarray(angle[..., None] * np.cross(uphill, along))
+        angle = min(max(angle + (missing / rise if rise != 0.0 else 0.0), -most), most)
+    turn = vectors.cross(g, along)
+    return angle * turn[0], angle * turn[1], angle * turn[2]

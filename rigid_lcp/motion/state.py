@@ -32,7 +32,10 @@ class Motion:
     @property
     def rates(self) -> Floats:
         """Generalised velocities (n, 3) in 2D, (n, 6) in 3D [m/s, rad/s]."""
-        return np.column_stack([self.velocity, self.spin])
+        bodies, dim = self.position.shape
+        rates = np.empty((bodies, 3 * (dim - 1)))
+        rates[:, :dim], rates[:, dim:] = self.velocity, self.spin.reshape(bodies, -1)
+        return rates
 
 
 def replace_rates(motion: Motion, rates: Floats) -> Motion:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, partial
 from math import isfinite
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from numba import njit
 from numpy.typing import ArrayLike
 
 from rigid_lcp.arrays import Bools, Floats, Ints
@@ -24,7 +25,7 @@ from rigid_lcp.motion.gyroscopic import (
     turn_inertia,
 )
 from rigid_lcp.motion.state import Motion, displace_motion
-from rigid_lcp.shapes import HalfSpace, require_vector
+from rigid_lcp.shapes import HalfSpace, require_vector, vectors
 
 
 @dataclass(frozen=True)
@@ -137,7 +138,7 @@ class World:
     """Contacts of places and angles within a margin [m], one number or (n,), and of how bodies
     will move on (n, 3) or (n, 6) [m, rad]."""
 
-    @property
+    @cached_property
     def movable(self) -> Bools:
         """Bodies whose motion follows from forces, (n,)."""
         return self.columns >= 0
@@ -169,9 +170,7 @@ class World:
 
     def speeds(self, rates: Floats) -> Floats:
         """Bound of the speed of any point of each body [m/s], (n,); ``rates`` (n, size)."""
-        dim = self.scene.dim
-        turning = np.linalg.norm(rates[:, dim:], axis=1) * self.reach
-        return np.asarray(np.linalg.norm(rates[:, :dim], axis=1) + turning)
+        return bound_speeds(rates, self.reach)
 
     def inverse_mass(self, motion: Motion) -> sp.csr_array:
         """M^-1 of the movable bodies (eq. 12), in the world frame."""
@@ -183,7 +182,10 @@ class World:
         blocks = np.zeros((moving.sum(), 6, 6))
         blocks[:, range(3), range(3)] = 1.0 / self.mass[moving][:, None]
         blocks[:, 3:, 3:] = np.linalg.inv(turn_inertia(self.inertia, motion.angle)[moving])
-        return sp.csr_array(sp.block_diag(blocks, format="csr"))
+        first = 6 * np.arange(len(blocks), dtype=np.int32)[:, None, None]
+        column = np.broadcast_to(first + np.arange(6, dtype=np.int32), blocks.shape)
+        start = np.arange(0, blocks.size + 1, 6, dtype=np.int32)
+        return sp.csr_array((blocks.ravel(), column.ravel(), start), shape=(len(start) - 1,) * 2)
 
     @cached_property
     def principal(self) -> tuple[Floats, Floats]:
@@ -239,11 +241,11 @@ class World:
         faces that part a pair (`rigid_lcp.contact.parting_faces`).
         """
         found = self.detect(motion.position, motion.angle, margin, ahead * motion.rates)
-        surface = {  # the smaller; a body without a value leaves it to the other
-            name: np.nan_to_num(np.fmin(value[found.body_a], value[found.body_b]))
-            for name, value in self.surfaces.items()
-        }
-        return replace(found, **surface)
+        surface = {}
+        for name, value in self.surfaces.items():  # the smaller, or what one of them has
+            both = np.fmin(value[found.body_a], value[found.body_b])
+            surface[name] = np.where(np.isnan(both), 0.0, both)
+        return Contacts(**vars(found) | surface)
 
     @cached_property
     def surfaces(self) -> dict[str, Floats]:
@@ -265,6 +267,16 @@ class World:
             inertia, spin = turn_inertia(self.inertia, motion.angle)[moving], motion.spin[moving]
             angular = 0.5 * float(np.einsum("ni,nij,nj->", spin, inertia, spin))
         return linear + angular - height
+
+
+@njit(cache=True)
+def bound_speeds(rates: Floats, reach: Floats) -> Floats:
+    """``|v| + |w| reach``, (n,) [m/s], of generalised velocities (n, 3) or (n, 6)."""
+    bound = np.empty(len(reach))
+    for body in range(len(reach)):
+        v, w = vectors.read_velocity(rates, body), vectors.read_spin(rates, body)
+        bound[body] = np.sqrt(vectors.dot(v, v)) + np.sqrt(vectors.dot(w, w)) * reach[body]
+    return bound
 
 
 def make_world(scene: Scene) -> tuple[World, Motion]:

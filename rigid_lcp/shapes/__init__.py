@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 from numpy.random import Generator
 
+from rigid_lcp.shapes import vectors
 from rigid_lcp.shapes.half_space import HalfSpace
 from rigid_lcp.shapes.numbers import require_real, require_vector
 from rigid_lcp.shapes.polygon import Polygon
@@ -30,7 +31,7 @@ __all__ = [
     "FLATNESS", "Disc", "HalfSpace", "Polygon", "Polyhedron", "Sphere", "extract_quaternion",
     "find_quaternion_rate", "get_shape", "make_box", "make_quaternion", "make_rotation",
     "multiply_quaternions", "normalise", "require_real", "require_vector", "rotate",
-    "rotate_back", "turn_quaternion",
+    "rotate_back", "turn_quaternion", "vectors",
 ]  # fmt: skip
 
 
