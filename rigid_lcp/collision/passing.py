@@ -110,8 +110,6 @@ def find_hit_by_others(closing: Closing, bounce: Bools, found: Impulses, diagona
     ``u_N - W_NN p_N``, taken at the start of the step by the turning of the bodies.
     """
     c = closing
-    if not bounce.any():
-        return bounce
     apart = ~bounce & ((c.gap > c.touching) | (c.before > c.slow)) & (c.restitution > 0)
     push = found.impulse[:, 0]
     alone = found.velocity[:, 0] - 2.0 * c.turning - diagonal * push

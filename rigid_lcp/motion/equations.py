@@ -17,6 +17,9 @@ from rigid_lcp.contact import Contacts, find_frame
 from rigid_lcp.friction.problem import BodySpace
 from rigid_lcp.motion.state import Motion
 from rigid_lcp.shapes import vectors
+from rigid_lcp.sparse import multiply_csr, split_csr
+
+Indices = NDArray[np.int32]
 
 
 def make_body_space(
@@ -34,8 +37,23 @@ def make_body_space(
 
 def find_response(bodies: BodySpace, impulse: Floats) -> Floats:
     """``M^-1 J^T p``, (nb, 3) or (nb, 6), of contact impulses p: what they do to the velocities."""
-    change = bodies.inverse_mass @ (bodies.jacobian.T @ impulse.ravel())
-    return np.asarray(change).reshape(-1, bodies.body_size)
+    change: Floats = _multiply_spread(
+        *split_csr(bodies.jacobian), *split_csr(bodies.inverse_mass), impulse.ravel()
+    )
+    return change.reshape(-1, bodies.body_size)
+
+
+@njit(cache=True)
+def _multiply_spread(
+    start: Indices, index: Indices, value: Floats, mass_start: Indices, mass_index: Indices,
+    inverse_mass: Floats, impulse: Floats,
+) -> Floats:  # fmt: skip
+    """``M^-1 J^T p``, both matrices by rows."""
+    push = np.zeros(len(mass_start) - 1)
+    for i in range(len(impulse)):
+        for k in range(start[i], start[i + 1]):
+            push[index[k]] += value[k] * impulse[i]
+    return multiply_csr(mass_start, mass_index, inverse_mass, push)
 
 
 def build_jacobian(
@@ -55,7 +73,7 @@ def build_jacobian(
 @njit(cache=True)
 def _list_jacobian(
     body_a: Ints, body_b: Ints, point: Floats, normal: Floats, position: Floats, columns: Ints
-) -> tuple[Floats, NDArray[np.int32], NDArray[np.int32]]:
+) -> tuple[Floats, Indices, Indices]:
     """Values of J by rows, their columns, and where each row begins."""
     nc, dim = point.shape
     size = 3 * (dim - 1)

@@ -42,8 +42,23 @@ def _turn_tensors(inertia: Floats, quaternion: Floats) -> Floats:
 def find_spin_acceleration(inertia: Floats, quaternion: Floats, spin: Floats) -> Floats:
     """``-I^-1 (w x I w)`` [rad/s^2], (..., 3): how the spin of a free body changes (eq. 17)."""
     placed = turn_inertia(inertia, quaternion)
-    torque = -np.cross(spin, np.einsum("...ij,...j->...i", placed, spin))
-    return np.asarray(np.linalg.solve(placed, torque[..., None])[..., 0], dtype=float)
+    torque = find_gyroscopic_torque(placed.reshape(-1, 3, 3), spin.reshape(-1, 3))
+    change = np.linalg.solve(placed, torque.reshape(*spin.shape, 1))
+    return np.asarray(change[..., 0], dtype=float)
+
+
+@njit(cache=True)
+def find_gyroscopic_torque(placed: Floats, spin: Floats) -> Floats:
+    """``-w x I w`` [N m], (n, 3), of tensors in the world frame (n, 3, 3) [kg m^2]."""
+    torque = np.empty(spin.shape)
+    for body in range(len(spin)):
+        w, rows = vectors.read(spin, body), placed[body]
+        momentum = (
+            vectors.project(vectors.read(rows, 0), w), vectors.project(vectors.read(rows, 1), w),
+            vectors.project(vectors.read(rows, 2), w),
+        )  # fmt: skip
+        torque[body] = vectors.cross(momentum, w)
+    return torque
 
 
 def rotate_freely(

@@ -79,6 +79,7 @@ class MoreauNumbers:
 
 
 MOREAU = MoreauNumbers()
+STATUS = np.array(["open", "stick", "slide"])
 
 
 @dataclass(frozen=True)
@@ -146,14 +147,17 @@ def solve_step_contacts(
     bodies = make_body_space(contacts, middle.position, world.columns, world.inverse_mass(middle))
     closing = find_closing_contacts(world, contacts, middle, free, h)
     found = find_step_impulses(bodies, closing, solve, carry_impulses(contacts, known, h))
-    velocities = find_relative_velocity(contacts, middle), find_relative_velocity(contacts, free)
-    gained = (free.rates - middle.rates)[world.movable]
     share, full = Share(len(contacts)), closing.restitution
     while (bounce := find_bouncing(closing)).any():
         if found.error > MOREAU.retried_error:  # wedged bodies may have no impulses to bounce with
             share.leave_out()
-        elif not share.bisect(gains_energy(bodies, closing, *velocities, gained, found, bounce)):
-            break
+        else:
+            before, alone = (find_relative_velocity(contacts, each) for each in (middle, free))
+            gained = (free.rates - middle.rates)[world.movable]
+            if not share.bisect(
+                gains_energy(bodies, closing, before, alone, gained, found, bounce)
+            ):
+                break
         closing = replace(closing, restitution=share.now * full)
         found = find_step_impulses(bodies, closing, solve, None)
     restitution = None
@@ -210,9 +214,11 @@ def find_step_impulses(
 ) -> Impulses:  # fmt: skip
     """Impulses of all contacts together, or in turn where collisions are passed on."""
     found = find_impulses_at_once(bodies, closing, solve, start)
-    diagonal = bodies.diagonal[:: closing.offset.shape[1]]
-    if find_hit_by_others(closing, find_bouncing(closing), found, diagonal).any():
-        found = find_impulses_in_turn(bodies, closing, solve)
+    bounce = find_bouncing(closing)
+    if bounce.any():
+        diagonal = bodies.diagonal[:: closing.offset.shape[1]]
+        if find_hit_by_others(closing, bounce, found, diagonal).any():
+            found = find_impulses_in_turn(bodies, closing, solve)
     return found
 
 
@@ -304,7 +310,7 @@ def make_contact_forces(
     if velocity is not None:
         slip = np.linalg.norm(velocity[:, 1:], axis=1)
         sliding &= slip > MOREAU.no_slip * np.abs(velocity).max(initial=0.0)
-    status = np.where(normal <= 0, "open", np.where(sliding, "slide", "stick"))
+    status = STATUS[np.where(normal <= 0, 0, 1 + sliding)]
     if contacts.dim == 3:
         frames = build_frames(contacts.normal)
         tangential = np.einsum("ci,cij->cj", tangential, frames[:, 1:])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property, partial
 from math import isfinite
@@ -19,6 +20,7 @@ from rigid_lcp.errors import SceneError
 from rigid_lcp.friction.problem import MOST_FRICTION
 from rigid_lcp.motion.checks import BOUNDS, check_half_space, require_density, require_number_in
 from rigid_lcp.motion.gyroscopic import (
+    find_gyroscopic_torque,
     find_principal_axes,
     find_spin_acceleration,
     rotate_freely,
@@ -182,10 +184,15 @@ class World:
         blocks = np.zeros((moving.sum(), 6, 6))
         blocks[:, range(3), range(3)] = 1.0 / self.mass[moving][:, None]
         blocks[:, 3:, 3:] = np.linalg.inv(turn_inertia(self.inertia, motion.angle)[moving])
-        first = 6 * np.arange(len(blocks), dtype=np.int32)[:, None, None]
-        column = np.broadcast_to(first + np.arange(6, dtype=np.int32), blocks.shape)
-        start = np.arange(0, blocks.size + 1, 6, dtype=np.int32)
-        return sp.csr_array((blocks.ravel(), column.ravel(), start), shape=(len(start) - 1,) * 2)
+        made = copy(self._mass_pattern)
+        made.data = blocks.ravel()
+        return made
+
+    @cached_property
+    def _mass_pattern(self) -> sp.csr_array:
+        """M^-1 in space, of blocks of ones (6, 6)."""
+        count = int(self.movable.sum())
+        return sp.csr_array(sp.block_diag([np.ones((6, 6))] * count, format="csr"))
 
     @cached_property
     def principal(self) -> tuple[Floats, Floats]:
@@ -228,7 +235,7 @@ class World:
         inertia, spin = turn_inertia(self.inertia, motion.angle)[moving], motion.spin[moving]
         torque = np.zeros_like(spin)
         if gyroscopic:
-            torque -= np.cross(spin, np.einsum("nij,nj->ni", inertia, spin))
+            torque += find_gyroscopic_torque(inertia, spin)
         if loads is not None:
             torque += force[moving, 3:]
         result[moving, 3:] = np.linalg.solve(inertia, torque[..., None])[..., 0]
