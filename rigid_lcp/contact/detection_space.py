@@ -206,6 +206,9 @@ def find_pair_contacts(
                 c += 1
             continue
         if kind[j] == HALF_SPACE:
+            height = dot(solids.normal[solids.first_face[j]], position[i]) - reach[j]
+            if height > margin + (1.0 + LENGTH_TIE) * reach[i]:
+                continue
             count = find_corners_on_plane(solids, i, j, margin, reach[i], found)
         else:
             size = min(reach[i], reach[j])

@@ -41,13 +41,14 @@ def find_move_along(normal: Floats, x: Floats, centre: Floats, drift: Floats) ->
 
     ``drift`` (3,) or (6,): its move [m] and turn [rad]; ``centre`` (dim,): centre of mass [m].
     """
-    r = x - centre
+    r0, r1 = x[0] - centre[0], x[1] - centre[1]  # small arrays would cost more than all of this
     if len(x) == 2:
-        return normal[0] * (drift[0] - drift[2] * r[1]) + normal[1] * (drift[1] + drift[2] * r[0])
+        return normal[0] * (drift[0] - drift[2] * r1) + normal[1] * (drift[1] + drift[2] * r0)
+    r2 = x[2] - centre[2]
     return (
-        normal[0] * (drift[0] + drift[4] * r[2] - drift[5] * r[1])
-        + normal[1] * (drift[1] + drift[5] * r[0] - drift[3] * r[2])
-        + normal[2] * (drift[2] + drift[3] * r[1] - drift[4] * r[0])
+        normal[0] * (drift[0] + drift[4] * r2 - drift[5] * r1)
+        + normal[1] * (drift[1] + drift[5] * r0 - drift[3] * r2)
+        + normal[2] * (drift[2] + drift[3] * r1 - drift[4] * r0)
     )
 
 
@@ -124,8 +125,10 @@ def choose_face(
             faces, offsets, vertices = normals_b, offsets_b, vertices_a
         for face in range(len(faces)):
             gap = find_gap_over(faces[face], offsets[face], vertices, -depth)
+            if gap < -depth:
+                continue
             normal = faces[face] * (2.0 * side - 1.0)
-            if gap < -depth or project(normal, widest) > PARALLEL:
+            if project(normal, widest) > PARALLEL:
                 continue
             supported = is_kept_apart(bodies, numbers, count, a, b, normal, gap + tie)
             if count < 0 or (supported and not kept):

@@ -141,17 +141,20 @@ def separate_edges(
             s = solids.vertex[base_b + solids.edge[f, 1]]
             w0, w1, w2 = s[0] - r[0], s[1] - r[1], s[2] - r[2]
             c0, c1, c2 = cross(u0, u1, u2, w0, w1, w2)
+            k = solids.bisector[f]
+            towards_b = c0 * k[0] + c1 * k[1] + c2 * k[2]
+            towards_a = c0 * m[0] + c1 * m[1] + c2 * m[2]
+            if towards_a * towards_b > 0.0 and solids.seen[e] > 0.0:  # it leaves both: no root yet
+                continue
             squares = c0 * c0 + c1 * c1 + c2 * c2
             if squares <= PARALLEL_EDGES**2 * length_a * (w0 * w0 + w1 * w1 + w2 * w2):
                 continue
-            k = solids.bisector[f]
-            towards_b = c0 * k[0] + c1 * k[1] + c2 * k[2]
             scale = 1.0 / np.sqrt(squares)
             if towards_b < 0.0:
                 scale = -scale
             if towards_b * scale < solids.seen[f]:
                 continue
-            if -(c0 * m[0] + c1 * m[1] + c2 * m[2]) * scale < solids.seen[e]:
+            if -towards_a * scale < solids.seen[e]:
                 continue
             gap = scale * (c0 * (p[0] - r[0]) + c1 * (p[1] - r[1]) + c2 * (p[2] - r[2]))
             if gap > separation:

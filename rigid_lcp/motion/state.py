@@ -9,9 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from rigid_lcp.arrays import Floats
-from rigid_lcp.shapes import turn_quaternion
+from rigid_lcp.shapes import vectors
 
 
 @dataclass(frozen=True)
@@ -48,5 +49,15 @@ def replace_rates(motion: Motion, rates: Floats) -> Motion:
 def displace_motion(motion: Motion, move: Floats) -> Motion:
     """Bodies moved by ``move`` (n, 3) [m, rad] or (n, 6) [m, rotation vector]; same velocities."""
     dim = motion.dim
-    turned = motion.angle + move[:, 2] if dim == 2 else turn_quaternion(motion.angle, move[:, 3:])
+    turned = motion.angle + move[:, 2] if dim == 2 else _turn_bodies(motion.angle, move)
     return Motion(motion.position + move[:, :dim], turned, motion.velocity, motion.spin)
+
+
+@njit(cache=True)
+def _turn_bodies(quaternion: Floats, move: Floats) -> Floats:
+    """Orientations (n, 4) turned by the rotation vectors of moves (n, 6), in the world frame."""
+    turned = np.empty_like(quaternion)
+    for body in range(len(move)):
+        q, turn = quaternion[body], vectors.make_turn(vectors.read_spin(move, body))
+        turned[body] = vectors.normalise(vectors.multiply(turn, (q[0], q[1], q[2], q[3])))
+    return turned
