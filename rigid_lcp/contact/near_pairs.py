@@ -109,19 +109,13 @@ def order_contacts(
     ``bodies`` (nc, 2) and ``numbers`` (nc, 2 dim + 3): point, normal, gap, radii of curvature.
     Returns bodies a and b, points, normals, gaps, keys, radii of a and b.
     """
-    count, dim = len(key), (numbers.shape[1] - 3) // 2
-    pair = np.empty(count, np.int64)
-    for c in range(count):
+    pair, dim = np.empty(len(key), np.int64), (numbers.shape[1] - 3) // 2
+    for c in range(len(key)):
         a, b = bodies[c]
         first, second = (a, b) if a < b or kind[b] == HALF_SPACE else (b, a)
         pair[c] = first * len(kind) + second
     order = np.argsort(pair, kind="mergesort")
-    point, normal = np.empty((count, dim)), np.empty((count, dim))
-    for c in range(count):
-        for axis in range(dim):
-            point[c, axis] = numbers[order[c], axis]
-            normal[c, axis] = numbers[order[c], dim + axis]
-    gap, radius_a, radius_b = (
-        numbers[order, 2 * dim], numbers[order, 2 * dim + 1], numbers[order, 2 * dim + 2]
-    )  # fmt: skip
-    return bodies[order, 0], bodies[order, 1], point, normal, gap, key[order], radius_a, radius_b
+    body, number = bodies[order].T.copy(), numbers[order].T.copy()
+    point, normal = number[:dim].T.copy(), number[dim : 2 * dim].T.copy()
+    gap, radius_a, radius_b = number[2 * dim :]
+    return body[0], body[1], point, normal, gap, key[order], radius_a, radius_b

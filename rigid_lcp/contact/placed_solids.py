@@ -137,8 +137,8 @@ def _place_features(
     for body in range(len(still)):
         if still[body]:
             continue
-        q = quaternion[body]
-        turn, x = vectors.make_rotation((q[0], q[1], q[2], q[3])), vectors.read(position, body)
+        turn = vectors.make_rotation(vectors.read_turn(quaternion, body))
+        x = vectors.read(position, body)
         for v in range(solids.first_vertex[body], solids.first_vertex[body + 1]):
             corner = vectors.rotate(turn, vectors.read(solids.vertex, v))
             vertex[v] = vectors.add(corner, 1.0, x)

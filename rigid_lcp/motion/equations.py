@@ -111,13 +111,17 @@ def turn_arm(spin: Floats, arm: Floats) -> Floats:
 
 
 @njit(cache=True)
-def _find_point_velocity(
-    position: Floats, rates: Floats, body: int, point: vectors.Vector
-) -> vectors.Vector:
-    arm = vectors.add(point, -1.0, vectors.read(position, body))
-    return vectors.add(
-        vectors.read_velocity(rates, body), 1.0, vectors.cross(vectors.read_spin(rates, body), arm)
-    )
+def _find_relative_motion(
+    position: Floats, rates: Floats, a: int, x: vectors.Vector, b: int, y: vectors.Vector
+) -> tuple[vectors.Vector, vectors.Vector, vectors.Vector]:
+    """Velocity of a's point x, and it and ``w x (w x r)`` less those of b's point y."""
+    (v_a, spin_a), (v_b, spin_b) = vectors.read_rates(rates, a), vectors.read_rates(rates, b)
+    turn_a = vectors.cross(spin_a, vectors.add(x, -1.0, vectors.read(position, a)))
+    turn_b = vectors.cross(spin_b, vectors.add(y, -1.0, vectors.read(position, b)))
+    carried = vectors.add(v_a, 1.0, turn_a)
+    moving = vectors.add(carried, -1.0, vectors.add(v_b, 1.0, turn_b))
+    pull = vectors.add(vectors.cross(spin_a, turn_a), -1.0, vectors.cross(spin_b, turn_b))
+    return carried, moving, pull
 
 
 def find_relative_velocity(contacts: Contacts, motion: Motion) -> Floats:
@@ -137,8 +141,7 @@ def _list_relative_velocities(
     found, frame = np.empty((nc, dim)), np.empty((dim, dim))
     for c in range(nc):
         x = vectors.read(point, c)
-        a = _find_point_velocity(position, rates, body_a[c], x)
-        apart = vectors.add(a, -1.0, _find_point_velocity(position, rates, body_b[c], x))
+        apart = _find_relative_motion(position, rates, body_a[c], x, body_b[c], x)[1]
         find_frame(normal[c], frame)
         for i in range(dim):
             found[c, i] = vectors.project(vectors.read(frame, i), apart)
@@ -183,36 +186,28 @@ def _list_inertial_accelerations(
         x, e_a, e_b = vectors.read(point, c), vectors.read(edges_a, c), vectors.read(edges_b, c)
         flat = np.isinf(radius_b[c])
         behind = 0.0 if flat else radius_b[c]
-        carrier_a = vectors.add(x, radius_a[c], n)
-        foot = vectors.add(x, -gap, n)
-        carrier_b = carrier_a if flat else vectors.add(foot, -behind, n)
-        carried = _find_point_velocity(position, rates, a, carrier_a)
-        moving = vectors.add(carried, -1.0, _find_point_velocity(position, rates, b, carrier_b))
-        along = vectors.add(moving, -vectors.dot(moving, n), n)
-        apart = radius_a[c] + behind + gap
-        if flat or apart <= 0.0:
-            apart = 1.0
-        spin_a, spin_b = vectors.read_spin(rates, a), vectors.read_spin(rates, b)
-        turning = vectors.cross(spin_b, n)
-        pull = vectors.add(
-            _find_centripetal(position, rates, a, carrier_a), -1.0,
-            _find_centripetal(position, rates, b, carrier_b),
-        )  # fmt: skip
+        carrier, foot = vectors.add(x, radius_a[c], n), vectors.add(x, -gap, n)
+        carrier_b = carrier if flat else vectors.add(foot, -behind, n)
+        carried, moving, pull = _find_relative_motion(position, rates, a, carrier, b, carrier_b)
+        (v_a, spin_a), (v_b, spin_b) = vectors.read_rates(rates, a), vectors.read_rates(rates, b)
         if vectors.dot(e_b, e_b) > 0.0:
-            normal, normal_rate = _find_edge_terms(
-                position, rates, a, b, n, carrier_a, foot, radius_a[c] + gap, e_a, e_b
+            distance = radius_a[c] + gap
+            motion = _find_relative_motion(position, rates, a, carrier, b, foot)
+            normal, rate = _find_edge_terms(
+                spin_a, spin_b, motion[1], motion[2], n, distance, e_a, e_b
             )
         elif flat:
-            normal, normal_rate = 2.0 * vectors.dot(turning, moving), turning
-            normal += vectors.dot(n, pull)
+            rate = vectors.cross(spin_b, n)
+            normal = vectors.dot(n, pull) + 2 * vectors.dot(rate, moving)
         else:
+            along = vectors.add(moving, -vectors.dot(moving, n), n)
+            apart = radius_a[c] + behind + gap
+            apart = apart if apart > 0.0 else 1.0
+            rate = vectors.divide(along, apart)
             normal = vectors.dot(n, pull) + vectors.dot(along, along) / apart
-            normal_rate = (along[0] / apart, along[1] / apart, along[2] / apart)
-        rate = vectors.add(carried, -radius_a[c], normal_rate)
-        pull = vectors.add(
-            vectors.cross(spin_a, vectors.add(rate, -1.0, vectors.read_velocity(rates, a))), -1.0,
-            vectors.cross(spin_b, vectors.add(rate, -1.0, vectors.read_velocity(rates, b))),
-        )  # fmt: skip
+        way = vectors.add(carried, -radius_a[c], rate)
+        turn_a = vectors.cross(spin_a, vectors.add(way, -1.0, v_a))
+        pull = vectors.add(turn_a, -1.0, vectors.cross(spin_b, vectors.add(way, -1.0, v_b)))
         find_frame(normals[c], frame)
         found[c, 0] = normal
         for i in range(1, dim):
@@ -222,8 +217,8 @@ def _list_inertial_accelerations(
 
 @njit(cache=True)
 def _find_edge_terms(
-    position: Floats, rates: Floats, a: int, b: int, n: vectors.Vector, carrier: vectors.Vector,
-    foot: vectors.Vector, distance: float, e_a: vectors.Vector, e_b: vectors.Vector,
+    spin_a: vectors.Vector, spin_b: vectors.Vector, velocity: vectors.Vector, pull: vectors.Vector,
+    n: vectors.Vector, distance: float, e_a: vectors.Vector, e_b: vectors.Vector,
 ) -> tuple[float, vectors.Vector]:  # fmt: skip
     """Normal part [m/s^2] and ``n' = dn/dt`` [1/s] for a contact at an edge of b.
 
@@ -235,44 +230,19 @@ def _find_edge_terms(
         edge a across edge b:  n || c = e_a x e_b,  n' = (1 - n n^T) c' / (n . c)
         sphere on edge b:      e_b . n' = -n . e_b',  t . n' = t . D' / distance
     """
-    velocity = vectors.add(
-        _find_point_velocity(position, rates, a, carrier), -1.0,
-        _find_point_velocity(position, rates, b, foot),
-    )  # fmt: skip
-    pull = vectors.add(
-        _find_centripetal(position, rates, a, carrier), -1.0,
-        _find_centripetal(position, rates, b, foot),
-    )  # fmt: skip
-    turned_b = vectors.cross(vectors.read_spin(rates, b), e_b)
-    if vectors.project(e_a, e_a) > 0.0:
-        across = vectors.cross(e_a, e_b)
-        change = vectors.add(
-            vectors.cross(vectors.cross(vectors.read_spin(rates, a), e_a), e_b), 1.0,
-            vectors.cross(e_a, turned_b),
-        )  # fmt: skip
-        signed = vectors.project(n, across)
-        flat = vectors.add(change, -vectors.project(n, change), n)
-        if signed != 0.0:
-            flat = (flat[0] / signed, flat[1] / signed, flat[2] / signed)
-        rate = flat
+    turned_b = vectors.cross(spin_b, e_b)
+    if vectors.dot(e_a, e_a) > 0.0:
+        signed = vectors.project(n, vectors.cross(e_a, e_b))
+        turned_a = vectors.cross(vectors.cross(spin_a, e_a), e_b)
+        change = vectors.add(turned_a, 1.0, vectors.cross(e_a, turned_b))
+        rate = vectors.add(change, -vectors.project(n, change), n)
+        rate = vectors.divide(rate, signed if signed != 0.0 else 1.0)
     else:
-        side = vectors.cross(e_b, n)
-        rolling = vectors.project(side, velocity)
-        if distance != 0.0:
-            rolling /= distance
-        about = -vectors.project(n, turned_b)
+        side, about = vectors.cross(e_b, n), -vectors.project(n, turned_b)
+        rolling = vectors.project(side, velocity) / (distance if distance != 0.0 else 1.0)
         rate = vectors.add((about * e_b[0], about * e_b[1], about * e_b[2]), rolling, side)
     normal = vectors.project(n, pull) + 2 * vectors.project(rate, velocity)
     return normal - distance * vectors.project(rate, rate), rate
-
-
-@njit(cache=True)
-def _find_centripetal(
-    position: Floats, rates: Floats, body: int, point: vectors.Vector
-) -> vectors.Vector:
-    arm = vectors.add(point, -1.0, vectors.read(position, body))
-    spin = vectors.read_spin(rates, body)
-    return vectors.cross(spin, vectors.cross(spin, arm))
 
 
 def find_contact_offset(contacts: Contacts, motion: Motion, free: Motion) -> Floats:

@@ -32,8 +32,7 @@ def turn_inertia(inertia: Floats, quaternion: Floats) -> Floats:
 def _turn_tensors(inertia: Floats, quaternion: Floats) -> Floats:
     placed = np.zeros(inertia.shape)
     for body in range(len(inertia)):
-        q = quaternion[body]
-        turn = vectors.make_rotation((q[0], q[1], q[2], q[3]))
+        turn = vectors.make_rotation(vectors.read_turn(quaternion, body))
         for i, j, k, m in np.ndindex(3, 3, 3, 3):
             placed[body, i, m] += turn[i][j] * inertia[body, j, k] * turn[m][k]
     return placed
@@ -53,11 +52,8 @@ def find_gyroscopic_torque(placed: Floats, spin: Floats) -> Floats:
     torque = np.empty(spin.shape)
     for body in range(len(spin)):
         w, rows = vectors.read(spin, body), placed[body]
-        momentum = (
-            vectors.project(vectors.read(rows, 0), w), vectors.project(vectors.read(rows, 1), w),
-            vectors.project(vectors.read(rows, 2), w),
-        )  # fmt: skip
-        torque[body] = vectors.cross(momentum, w)
+        tensor = vectors.read(rows, 0), vectors.read(rows, 1), vectors.read(rows, 2)
+        torque[body] = vectors.cross(vectors.rotate(tensor, w), w)
     return torque
 
 
@@ -88,12 +84,10 @@ def _rotate_bodies(
 ) -> tuple[Floats, Floats]:
     turned, spun = np.empty_like(quaternion), np.empty_like(spin)
     for body in range(len(spin)):
-        m = (moments[body, 0], moments[body, 1], moments[body, 2])
-        q, p = quaternion[body], axes[body]
-        own = (p[0], p[1], p[2], p[3])
-        frame = vectors.normalise(vectors.multiply((q[0], q[1], q[2], q[3]), own))
+        m, own = vectors.read(moments, body), vectors.read_turn(axes, body)
+        frame = vectors.normalise(vectors.multiply(vectors.read_turn(quaternion, body), own))
         placed = vectors.make_rotation(frame)
-        w = vectors.rotate_back(placed, (spin[body, 0], spin[body, 1], spin[body, 2]))
+        w = vectors.rotate_back(placed, vectors.read(spin, body))
         momentum = (m[0] * w[0], m[1] * w[1], m[2] * w[2])
         twice_energy = momentum[0] ** 2 / m[0] + momentum[1] ** 2 / m[1] + momentum[2] ** 2 / m[2]
         world = vectors.rotate(placed, momentum)
@@ -132,13 +126,13 @@ def find_energy_turn(
     m, size = moments, np.sqrt(vectors.dot(momentum, momentum))
     if size == 0.0:
         return 0.0, 0.0, 0.0
-    along = (momentum[0] / size, momentum[1] / size, momentum[2] / size)
+    along = vectors.divide(momentum, size)
     spin = (momentum[0] / m[0], momentum[1] / m[1], momentum[2] / m[2])
     slope = vectors.add(spin, -vectors.dot(spin, along), along)
     steep, speed = np.sqrt(vectors.dot(slope, slope)), np.sqrt(vectors.dot(spin, spin))
     if steep == 0.0:
         return 0.0, 0.0, 0.0
-    g = (slope[0] / steep, slope[1] / steep, slope[2] / steep)
+    g = vectors.divide(slope, steep)
     # 2 E(t) = c + (a - c) cos^2 t + 2 b sin t cos t
     a = size**2 * (along[0] ** 2 / m[0] + along[1] ** 2 / m[1] + along[2] ** 2 / m[2])
     b = size**2 * (along[0] * g[0] / m[0] + along[1] * g[1] / m[1] + along[2] * g[2] / m[2])

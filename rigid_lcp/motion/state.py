@@ -58,6 +58,7 @@ def _turn_bodies(quaternion: Floats, move: Floats) -> Floats:
     """Orientations (n, 4) turned by the rotation vectors of moves (n, 6), in the world frame."""
     turned = np.empty_like(quaternion)
     for body in range(len(move)):
-        q, turn = quaternion[body], vectors.make_turn(vectors.read_spin(move, body))
-        turned[body] = vectors.normalise(vectors.multiply(turn, (q[0], q[1], q[2], q[3])))
+        turn = vectors.make_turn(vectors.read_rates(move, body)[1])
+        both = vectors.multiply(turn, vectors.read_turn(quaternion, body))
+        turned[body] = vectors.normalise(both)
     return turned

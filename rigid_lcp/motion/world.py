@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 from numpy.typing import ArrayLike
 
 from rigid_lcp.arrays import Bools, Floats, Ints
@@ -27,7 +26,7 @@ from rigid_lcp.motion.gyroscopic import (
     turn_inertia,
 )
 from rigid_lcp.motion.state import Motion, displace_motion
-from rigid_lcp.shapes import HalfSpace, require_vector, vectors
+from rigid_lcp.shapes import HalfSpace, require_vector
 
 
 @dataclass(frozen=True)
@@ -172,7 +171,9 @@ class World:
 
     def speeds(self, rates: Floats) -> Floats:
         """Bound of the speed of any point of each body [m/s], (n,); ``rates`` (n, size)."""
-        return bound_speeds(rates, self.reach)
+        dim = self.scene.dim
+        turning = np.linalg.norm(rates[:, dim:], axis=1) * self.reach
+        return np.asarray(np.linalg.norm(rates[:, :dim], axis=1) + turning)
 
     def inverse_mass(self, motion: Motion) -> sp.csr_array:
         """M^-1 of the movable bodies (eq. 12), in the world frame."""
@@ -274,16 +275,6 @@ class World:
             inertia, spin = turn_inertia(self.inertia, motion.angle)[moving], motion.spin[moving]
             angular = 0.5 * float(np.einsum("ni,nij,nj->", spin, inertia, spin))
         return linear + angular - height
-
-
-@njit(cache=True)
-def bound_speeds(rates: Floats, reach: Floats) -> Floats:
-    """``|v| + |w| reach``, (n,) [m/s], of generalised velocities (n, 3) or (n, 6)."""
-    bound = np.empty(len(reach))
-    for body in range(len(reach)):
-        v, w = vectors.read_velocity(rates, body), vectors.read_spin(rates, body)
-        bound[body] = np.sqrt(vectors.dot(v, v)) + np.sqrt(vectors.dot(w, w)) * reach[body]
-    return bound
 
 
 def make_world(scene: Scene) -> tuple[World, Motion]:

@@ -1,7 +1,7 @@
-"""Vectors, quaternions and rotation matrices as tuples of numbers: what compiled kernels reckon by.
+"""Vectors, quaternions and rotation matrices as tuples of numbers, for compiled kernels.
 
-A vector of the plane is one of space with z = 0, so that one kernel serves both.  Quaternions as in
-`rigid_lcp.shapes.rotations`, to the order of the sums.
+A vector of the plane is one of space with z = 0, so that one kernel serves both.  Formulas and the
+order of their sums are those of `rigid_lcp.shapes.rotations`.
 """
 
 from __future__ import annotations
@@ -23,23 +23,30 @@ def read(rows: Floats, i: int) -> Vector:
 
 
 @njit(cache=True)
-def read_spin(rates: Floats, i: int) -> Vector:
-    """Spin of body i [rad/s], of generalised velocities (n, 3) in the plane, (n, 6) in space."""
-    if rates.shape[1] == 3:
-        return 0.0, 0.0, rates[i, 2]
-    return rates[i, 3], rates[i, 4], rates[i, 5]
+def read_rates(rates: Floats, i: int) -> tuple[Vector, Vector]:
+    """Velocity [m/s] and spin [rad/s] of body i, of generalised velocities (n, 3) or (n, 6)."""
+    x = rates[i]
+    if len(x) == 3:
+        return (x[0], x[1], 0.0), (0.0, 0.0, x[2])
+    return (x[0], x[1], x[2]), (x[3], x[4], x[5])
 
 
 @njit(cache=True)
-def read_velocity(rates: Floats, i: int) -> Vector:
-    """Velocity of body i [m/s], of generalised velocities."""
-    return rates[i, 0], rates[i, 1], rates[i, 2] if rates.shape[1] == 6 else 0.0
+def read_turn(rows: Floats, i: int) -> Quaternion:
+    """Row i of quaternions (n, 4)."""
+    return rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3]
 
 
 @njit(cache=True)
 def add(a: Vector, share: float, b: Vector) -> Vector:
     """``a + share b``."""
     return a[0] + share * b[0], a[1] + share * b[1], a[2] + share * b[2]
+
+
+@njit(cache=True)
+def divide(a: Vector, b: float) -> Vector:
+    """``a / b``."""
+    return a[0] / b, a[1] / b, a[2] / b
 
 
 @njit(cache=True)
@@ -50,7 +57,7 @@ def dot(a: Vector, b: Vector) -> float:
 
 @njit(cache=True)
 def project(a: Vector, b: Vector) -> float:
-    """``a . b``, summed as `numpy.einsum` does: so states are to the bit those of NumPy's code."""
+    """``a . b`` in the order of `numpy.einsum`, so that states are to the bit as it made them."""
     return (a[0] * b[0] + a[2] * b[2]) + a[1] * b[1]
 
 
@@ -65,10 +72,8 @@ def multiply(left: Quaternion, right: Quaternion) -> Quaternion:
     """``left right``: the rotation ``right`` first, then ``left``."""
     w, v, s, u = left[0], left[1:], right[0], right[1:]
     x = cross(v, u)
-    return (
-        w * s - dot(v, u),
-        w * u[0] + s * v[0] + x[0], w * u[1] + s * v[1] + x[1], w * u[2] + s * v[2] + x[2],
-    )  # fmt: skip
+    real = w * s - dot(v, u)
+    return real, w * u[0] + s * v[0] + x[0], w * u[1] + s * v[1] + x[1], w * u[2] + s * v[2] + x[2]
 
 
 @njit(cache=True)
@@ -108,8 +113,9 @@ def rotate(r: Matrix, v: Vector) -> Vector:
 @njit(cache=True)
 def rotate_back(r: Matrix, v: Vector) -> Vector:
     """``R^T v``."""
+    x, y, z = r
     return (
-        r[0][0] * v[0] + r[1][0] * v[1] + r[2][0] * v[2],
-        r[0][1] * v[0] + r[1][1] * v[1] + r[2][1] * v[2],
-        r[0][2] * v[0] + r[1][2] * v[1] + r[2][2] * v[2],
+        x[0] * v[0] + y[0] * v[1] + z[0] * v[2],
+        x[1] * v[0] + y[1] * v[1] + z[1] * v[2],
+        x[2] * v[0] + y[2] * v[1] + z[2] * v[2],
     )
