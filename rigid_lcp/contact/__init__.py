@@ -5,7 +5,6 @@ from rigid_lcp.contact.arrays import (
     ContactForces,
     Contacts,
     build_frames,
-    choose_tangents,
     find_frame,
     match_keys,
 )
@@ -14,6 +13,6 @@ from rigid_lcp.contact.detection_space import detect_3d
 from rigid_lcp.contact.placed_solids import MOST_EDGES, pack_shapes_3d
 
 __all__ = [
-    "FEATURE_BITS", "MOST_EDGES", "ContactForces", "Contacts", "build_frames", "choose_tangents",
-    "detect_2d", "detect_3d", "find_frame", "match_keys", "pack_shapes_2d", "pack_shapes_3d",
+    "FEATURE_BITS", "MOST_EDGES", "ContactForces", "Contacts", "build_frames", "detect_2d",
+    "detect_3d", "find_frame", "match_keys", "pack_shapes_2d", "pack_shapes_3d",
 ]  # fmt: skip

@@ -10,6 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rigid_lcp.arrays import Bools, Floats, Ints
+from rigid_lcp.shapes import vectors
 
 FEATURE_BITS, BODY_BITS = 10, 21
 """Digits of the names of contacts that tell features and bodies."""
@@ -75,37 +76,28 @@ class ContactForces(Contacts):
         """Forces on body a as vectors [N], (nc, dim)."""
         tangential = self.tangential_force
         if self.dim == 2:
-            tangential = tangential[:, None] * choose_tangents(self.normal)[:, 0]
+            tangential = tangential[:, None] * build_frames(self.normal)[:, 1]
         return self.normal_force[:, None] * self.normal + tangential
-
-
-def choose_tangents(normal: Floats) -> Floats:
-    """Unit tangents (nc, dim - 1, dim) that make right-handed frames with the normals (nc, dim).
-
-    2D: (-n_y, n_x).  3D: t1 is across n and the axis that n is farthest from.
-    """
-    return build_frames(normal)[:, 1:]
 
 
 @njit(cache=True)
 def find_frame(normal: Floats, frame: Floats) -> None:
-    """Fill ``frame`` (dim, dim) with the rows n, t (n, t1, t2) of a unit normal (dim,)."""
+    """Fill ``frame`` (dim, dim) with the right-handed rows n, t (n, t1, t2) of a normal (dim,).
+
+    2D: t is (-n_y, n_x).  3D: t1 is across n and the axis that n is farthest from.
+    """
     frame[0] = normal
     if len(normal) == 2:
         frame[1, 0], frame[1, 1] = -normal[1], normal[0]
         return
     x, y, z = normal
+    across = (-y, x, 0.0)
     if abs(x) <= abs(y) and abs(x) <= abs(z):
-        t0, t1, t2 = 0.0, -z, y
+        across = (0.0, -z, y)
     elif abs(y) <= abs(z):
-        t0, t1, t2 = z, 0.0, -x
-    else:
-        t0, t1, t2 = -y, x, 0.0
-    length = np.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
-    frame[1, 0], frame[1, 1], frame[1, 2] = t0 / length, t1 / length, t2 / length
-    for k in range(3):
-        i, j = (k + 1) % 3, (k + 2) % 3
-        frame[2, k] = normal[i] * frame[1, j] - normal[j] * frame[1, i]
+        across = (z, 0.0, -x)
+    across = vectors.divide(across, np.sqrt(vectors.dot(across, across)))
+    frame[1], frame[2] = across, vectors.cross(normal, across)
 
 
 @njit(cache=True)

@@ -20,7 +20,7 @@ from rigid_lcp.contact.near_pairs import (
     order_contacts,
 )
 from rigid_lcp.contact.placed_solids import MOST_EDGES, POLYHEDRON, SPHERE, Shapes3D, place_solids
-from rigid_lcp.contact.separation import Solids, dot
+from rigid_lcp.contact.separation import Solids
 from rigid_lcp.contact.solids import CORNER_EDGE, CORNERS, EDGE_CORNER, find_solid_contacts
 from rigid_lcp.shapes import vectors
 
@@ -31,7 +31,7 @@ def touch_sphere_sphere(x: Floats, radius: float, y: Floats, other: float, row: 
 
     Fills ``row`` as `touch_sphere_solid` does; returns 0, the only feature a sphere has.
     """
-    _fill_round(row, x, radius, y[0], y[1], y[2], other)
+    _fill_round(row, x, radius, vectors.subtract(x, y), other)
     return 0
 
 
@@ -39,8 +39,8 @@ def touch_sphere_sphere(x: Floats, radius: float, y: Floats, other: float, row: 
 def touch_sphere_plane(solids: Solids, plane: int, x: Floats, radius: float, row: Floats) -> int:
     """Gap of a sphere over a half-space; fills ``row``, returns the feature 0."""
     face = solids.first_face[plane]
-    n = solids.normal[face]
-    _fill(row, x, radius, n, dot(n, x) - solids.offset[face] - radius, np.inf)
+    n = vectors.read(solids.normal, face)
+    _fill(row, x, radius, n, vectors.dot(n, x) - solids.offset[face] - radius, np.inf)
     return 0
 
 
@@ -57,50 +57,44 @@ def touch_sphere_solid(solids: Solids, body: int, x: Floats, radius: float, row:
     edges = solids.first_edge[body + 1] - first_edge
     best, separation = first_face, -np.inf
     for f in range(first_face, first_face + faces):
-        distance = dot(solids.normal[f], x) - solids.offset[f]
+        distance = vectors.dot(solids.normal[f], x) - solids.offset[f]
         if distance > separation:
             best, separation = f, distance
     if separation <= 0.0 or manifold.is_within_face(solids, body, best, x, 0.0):
-        _fill(row, x, radius, solids.normal[best], separation - radius, np.inf)
+        normal = vectors.read(solids.normal, best)
+        _fill(row, x, radius, normal, separation - radius, np.inf)
         return best - first_face
     feature, nearest = 0, np.inf
     base = solids.first_vertex[body]
-    f0, f1, f2 = 0.0, 0.0, 0.0
+    away = (0.0, 0.0, 0.0)
     for e in range(first_edge, first_edge + edges):
-        p, q = solids.vertex[base + solids.edge[e, 0]], solids.vertex[base + solids.edge[e, 1]]
-        u0, u1, u2 = q[0] - p[0], q[1] - p[1], q[2] - p[2]
-        along = u0 * (x[0] - p[0]) + u1 * (x[1] - p[1]) + u2 * (x[2] - p[2])
-        place = min(max(along / (u0 * u0 + u1 * u1 + u2 * u2), 0.0), 1.0)
-        y0, y1, y2 = p[0] + place * u0, p[1] + place * u1, p[2] + place * u2
-        squares = (x[0] - y0) ** 2 + (x[1] - y1) ** 2 + (x[2] - y2) ** 2
+        p = solids.vertex[base + solids.edge[e, 0]]
+        u = vectors.subtract(solids.vertex[base + solids.edge[e, 1]], p)
+        along = vectors.dot(u, vectors.subtract(x, p))
+        place = min(max(along / vectors.dot(u, u), 0.0), 1.0)
+        apart = vectors.subtract(x, vectors.add(p, place, u))
+        squares = vectors.dot(apart, apart)
         if squares < nearest:
-            nearest, f0, f1, f2 = squares, y0, y1, y2
+            nearest, away = squares, apart
             feature = faces + e - first_edge
             if place == 0.0 or place == 1.0:
                 feature = faces + edges + solids.edge[e, int(place)]
-    _fill_round(row, x, radius, f0, f1, f2, 0.0)
+    _fill_round(row, x, radius, away, 0.0)
     return feature
 
 
 @njit(cache=True)
-def _fill_round(
-    row: Floats, x: Floats, radius: float, y0: float, y1: float, y2: float, other: float
-) -> None:
-    """Store the contact with a sphere, or a point of radius 0, about y; parted along z if at x."""
-    away = np.empty(3)
-    away[0], away[1], away[2] = x[0] - y0, x[1] - y1, x[2] - y2
-    distance = np.sqrt(dot(away, away))
-    if distance > 0.0:
-        for axis in range(3):
-            away[axis] /= distance
-    else:
-        away[2] = 1.0
-    _fill(row, x, radius, away, distance - radius - other, other)
+def _fill_round(row: Floats, x: Floats, radius: float, away: vectors.Vector, other: float) -> None:
+    """Store the contact with a sphere, or a point of radius 0, that x is ``away`` from; along z
+    where it is not."""
+    distance = np.sqrt(vectors.dot(away, away))
+    normal = vectors.divide(away, distance) if distance > 0.0 else (0.0, 0.0, 1.0)
+    _fill(row, x, radius, normal, distance - radius - other, other)
 
 
 @njit(cache=True)
 def _fill(
-    row: Floats, x: Floats, radius: float, normal: Floats, gap: float, curvature: float
+    row: Floats, x: Floats, radius: float, normal: vectors.Vector, gap: float, curvature: float
 ) -> None:
     """Store point on the sphere, normal, gap and radii of curvature."""
     for axis in range(3):
@@ -161,8 +155,8 @@ def find_edge_directions(
         for side, body, edge in ((0, a, edge_a), (1, b, edge_b)):
             if edge >= 0:
                 ends, first = solids.edge[solids.first_edge[body] + edge], solids.first_vertex[body]
-                start = vectors.read(solids.vertex, first + ends[0])
-                along = vectors.add(vectors.read(solids.vertex, first + ends[1]), -1.0, start)
+                start = solids.vertex[first + ends[0]]
+                along = vectors.subtract(solids.vertex[first + ends[1]], start)
                 length = np.sqrt(vectors.dot(along, along))
                 for axis in range(3):
                     directions[side, c, axis] = along[axis] / length
@@ -206,7 +200,7 @@ def find_pair_contacts(
                 c += 1
             continue
         if kind[j] == HALF_SPACE:
-            height = dot(solids.normal[solids.first_face[j]], position[i]) - reach[j]
+            height = vectors.dot(solids.normal[solids.first_face[j]], position[i]) - reach[j]
             if height > margin + (1.0 + LENGTH_TIE) * reach[i]:
                 continue
             count = find_corners_on_plane(solids, i, j, margin, reach[i], found)
@@ -252,7 +246,7 @@ def find_corners_on_plane(
     n, level, first = solids.normal[face], solids.offset[face], solids.first_vertex[body]
     for v in range(first, solids.first_vertex[body + 1]):
         x = solids.vertex[v]
-        gap = dot(n, x) - level
+        gap = vectors.dot(n, x) - level
         if gap <= margin:
             count = manifold.add_candidate(
                 found, count, kind, v - first, int(ZERO), gap, n, 1.0, x, LENGTH_TIE * size

@@ -13,7 +13,8 @@ from numba import njit
 from rigid_lcp.arrays import Floats, Ints
 from rigid_lcp.contact.arrays import LENGTH_TIE
 from rigid_lcp.contact.near_pairs import ZERO
-from rigid_lcp.contact.separation import NEARLY_OPPOSITE, POLYHEDRA, Solids, cross, cross_edges, dot
+from rigid_lcp.contact.separation import NEARLY_OPPOSITE, POLYHEDRA, Solids, cross_edges
+from rigid_lcp.shapes import vectors
 
 CORNER_FACE, FACE_CORNER, EDGES = 0, 1, 2
 """Corner of a on a face of b; corner of b on a face of a; an edge of a across one of b."""
@@ -34,10 +35,9 @@ def is_within_face(solids: Solids, body: int, face: int, x: Floats, slack: float
     for k in range(start, stop):
         p = solids.vertex[base + solids.loop[k]]
         q = solids.vertex[base + solids.loop[k + 1 if k + 1 < stop else start]]
-        u0, u1, u2 = q[0] - p[0], q[1] - p[1], q[2] - p[2]
-        o0, o1, o2 = cross(u0, u1, u2, n[0], n[1], n[2])
-        outside = o0 * (x[0] - p[0]) + o1 * (x[1] - p[1]) + o2 * (x[2] - p[2])
-        if outside > slack * np.sqrt(o0 * o0 + o1 * o1 + o2 * o2):
+        out = vectors.cross(vectors.subtract(q, p), n)
+        beyond = vectors.dot(out, vectors.subtract(x, p))
+        if beyond > slack * np.sqrt(vectors.dot(out, out)):
             return False
     return True
 
@@ -54,8 +54,8 @@ def add_candidate(
     """
     place = count
     for k in range(count):
-        d0, d1, d2 = found[k, 7] - point[0], found[k, 8] - point[1], found[k, 9] - point[2]
-        if d0 * d0 + d1 * d1 + d2 * d2 < same * same:
+        apart = vectors.subtract(found[k, 7:10], point)
+        if vectors.dot(apart, apart) < same * same:
             if found[k, 0] <= kind:
                 return count
             place = k
@@ -83,7 +83,7 @@ def find_face_candidates(
     sign = 1.0 if own_is_b else -1.0
     for v in range(first_other, solids.first_vertex[other + 1]):
         x = solids.vertex[v]
-        gap = dot(n, x) - level
+        gap = vectors.dot(n, x) - level
         if gap <= margin and is_within_face(solids, own, face, x, LENGTH_TIE * size):
             here, there = v - first_other, face - solids.first_face[own]
             kind, first, second = int(CORNER_FACE), here, there
@@ -96,11 +96,11 @@ def find_face_candidates(
     start, stop = solids.first_corner[face], solids.first_corner[face + 1]
     for g in range(solids.first_face[other], solids.first_face[other + 1]):
         m = solids.normal[g]
-        if -dot(m, n) < opposite:
+        if -vectors.dot(m, n) < opposite:
             continue
         for k in range(start, stop):
             x = solids.vertex[first_own + solids.loop[k]]
-            gap = dot(m, x) - solids.offset[g]
+            gap = vectors.dot(m, x) - solids.offset[g]
             if gap <= margin and is_within_face(solids, other, g, x, LENGTH_TIE * size):
                 here, there = g - solids.first_face[other], solids.loop[k]
                 kind, first, second = int(FACE_CORNER), here, there
@@ -122,9 +122,9 @@ def find_face_candidates(
             if not (0.0 < crossing[0] < 1.0 and 0.0 < crossing[1] < 1.0):
                 continue
             normal = crossing[3:6]
-            if crossing[2] > margin or dot(normal, towards) < opposite:
+            if crossing[2] > margin or vectors.dot(normal, towards) < opposite:
                 continue
-            if -sign * dot(normal, solids.bisector[e]) < solids.seen_about[e]:
+            if -sign * vectors.dot(normal, solids.bisector[e]) < solids.seen_about[e]:
                 continue
             count = add_candidate(
                 found, count, int(EDGES), edge_a - solids.first_edge[a],
@@ -154,14 +154,12 @@ def find_least_gap(found: Floats, count: int) -> float:
 
 
 @njit(cache=True)
-def find_farthest_from(found: Floats, count: int, x: float, y: float, z: float, tie: float) -> int:
+def find_farthest_from(found: Floats, count: int, x: Floats, tie: float) -> int:
     """Row of the candidate farthest from a point, less `SLOPE` gaps; the first within ``tie``."""
     best, most = 0, -np.inf
     for k in range(count):
-        away = np.sqrt(
-            (found[k, 7] - x) ** 2 + (found[k, 8] - y) ** 2 + (found[k, 9] - z) ** 2
-        )  # fmt: skip
-        away -= SLOPE * found[k, 3]
+        apart = vectors.subtract(found[k, 7:10], x)
+        away = np.sqrt(vectors.dot(apart, apart)) - SLOPE * found[k, 3]
         if away > most + tie:
             best, most = k, away
     return best
@@ -169,19 +167,15 @@ def find_farthest_from(found: Floats, count: int, x: float, y: float, z: float, 
 
 @njit(cache=True)
 def find_farthest_along(
-    found: Floats, count: int, start: int, d0: float, d1: float, d2: float, tie: float
+    found: Floats, count: int, start: int, d: vectors.Vector, tie: float
 ) -> int:
     """Row of the candidate farthest from row ``start`` along d, less `SLOPE` gaps; -1 if none is
     beyond ``tie`` [m]."""
     best, most = -1, -np.inf
-    length = np.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
+    length = np.sqrt(vectors.dot(d, d))
     step = tie * length
     for k in range(count):
-        along = (
-            d0 * (found[k, 7] - found[start, 7])
-            + d1 * (found[k, 8] - found[start, 8])
-            + d2 * (found[k, 9] - found[start, 9])
-        )
+        along = vectors.dot(d, vectors.subtract(found[k, 7:10], found[start, 7:10]))
         worth = along - SLOPE * length * (found[k, 3] - found[start, 3])
         if along > step and worth > most + step:
             best, most = k, worth
@@ -208,18 +202,13 @@ def keep_outer_rows(found: Floats, count: int, size: float, kept: Ints, number: 
         added, place = False, 0
         while place < corners < MOST_KEPT:
             start, end = found[ring[place]], found[ring[(place + 1) % corners]]
-            u0, u1, u2 = end[7] - start[7], end[8] - start[8], end[9] - start[9]
-            o0, o1, o2 = cross(u0, u1, u2, normal[0], normal[1], normal[2])
-            length = np.sqrt(o0 * o0 + o1 * o1 + o2 * o2)
+            out = vectors.cross(vectors.subtract(end[7:10], start[7:10]), normal)
+            length = np.sqrt(vectors.dot(out, out))
             higher = max(start[3], end[3])
             best, most = -1, least * length
             for k in range(count):
-                worth = (
-                    o0 * (found[k, 7] - start[7])
-                    + o1 * (found[k, 8] - start[8])
-                    + o2 * (found[k, 9] - start[9])
-                    - SLOPE * length * max(found[k, 3] - higher, 0.0)
-                )
+                worth = vectors.dot(out, vectors.subtract(found[k, 7:10], start[7:10]))
+                worth -= SLOPE * length * max(found[k, 3] - higher, 0.0)
                 if worth > most:
                     best, most = k, worth + LENGTH_TIE * size * length
             place += 1
@@ -253,14 +242,13 @@ def keep_outer(found: Floats, count: int, size: float) -> int:
             middle[axis] += found[k, 7 + axis] / count
         if found[k, 3] < found[deepest, 3] - tie:
             deepest = k
-    p = find_farthest_from(found, count, middle[0], middle[1], middle[2], tie)
-    q = find_farthest_from(found, count, found[p, 7], found[p, 8], found[p, 9], tie)
-    u0, u1, u2 = found[q, 7] - found[p, 7], found[q, 8] - found[p, 8], found[q, 9] - found[p, 9]
-    d0, d1, d2 = cross(found[p, 4], found[p, 5], found[p, 6], u0, u1, u2)
+    p = find_farthest_from(found, count, middle, tie)
+    q = find_farthest_from(found, count, found[p, 7:10], tie)
+    d = vectors.cross(found[p, 4:7], vectors.subtract(found[q, 7:10], found[p, 7:10]))
     rows = np.empty(MOST_KEPT + 4, np.int64)
     rows[0], rows[1] = p, q
-    rows[2] = find_farthest_along(found, count, p, d0, d1, d2, tie)
-    rows[3] = find_farthest_along(found, count, p, -d0, -d1, -d2, tie)
+    rows[2] = find_farthest_along(found, count, p, d, tie)
+    rows[3] = find_farthest_along(found, count, p, (-d[0], -d[1], -d[2]), tie)
     all_rows = keep_outer_rows(found, count, size, rows, 4)
     kept = np.empty((all_rows, CANDIDATE_COLUMNS))
     number, nearest, least, lowest = 0, 0, np.inf, np.inf

@@ -15,6 +15,7 @@ import numpy as np
 from numba import njit
 
 from rigid_lcp.arrays import Floats, Ints
+from rigid_lcp.shapes import vectors
 
 
 @dataclass(frozen=True)
@@ -59,20 +60,6 @@ class Solids(NamedTuple):
     """Cosine of half the angle between these normals, (e,): a normal whose cosine with the
     bisector is smaller lies outside the edge's cone of normals."""
     seen_about: Floats  # the same with `NEARLY_OPPOSITE` added to the half angle
-
-
-@njit(cache=True)
-def dot(a: Floats, b: Floats) -> float:
-    """Scalar product of two vectors (3,)."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@njit(cache=True)
-def cross(
-    a0: float, a1: float, a2: float, b0: float, b1: float, b2: float
-) -> tuple[float, float, float]:
-    """Vector product of two vectors, by components: small arrays would cost more than it."""
-    return a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
 
 
 @njit(cache=True)
@@ -132,31 +119,22 @@ def separate_edges(
     base_a, base_b = solids.first_vertex[a], solids.first_vertex[b]
     for e in near_a:
         p = solids.vertex[base_a + solids.edge[e, 0]]
-        q = solids.vertex[base_a + solids.edge[e, 1]]
-        u0, u1, u2 = q[0] - p[0], q[1] - p[1], q[2] - p[2]
-        length_a = u0 * u0 + u1 * u1 + u2 * u2
-        m = solids.bisector[e]
+        u = vectors.subtract(solids.vertex[base_a + solids.edge[e, 1]], p)
+        length_a = vectors.dot(u, u)
         for f in near_b:
             r = solids.vertex[base_b + solids.edge[f, 0]]
-            s = solids.vertex[base_b + solids.edge[f, 1]]
-            w0, w1, w2 = s[0] - r[0], s[1] - r[1], s[2] - r[2]
-            c0, c1, c2 = cross(u0, u1, u2, w0, w1, w2)
-            k = solids.bisector[f]
-            towards_b = c0 * k[0] + c1 * k[1] + c2 * k[2]
-            towards_a = c0 * m[0] + c1 * m[1] + c2 * m[2]
-            if towards_a * towards_b > 0.0 and solids.seen[e] > 0.0:  # it leaves both: no root yet
+            w = vectors.subtract(solids.vertex[base_b + solids.edge[f, 1]], r)
+            c = vectors.cross(u, w)
+            to_a, to_b = vectors.dot(c, solids.bisector[e]), vectors.dot(c, solids.bisector[f])
+            if to_a * to_b > 0.0 and solids.seen[e] > 0.0:  # it leaves both: no root yet
                 continue
-            squares = c0 * c0 + c1 * c1 + c2 * c2
-            if squares <= PARALLEL_EDGES**2 * length_a * (w0 * w0 + w1 * w1 + w2 * w2):
+            squares = vectors.dot(c, c)
+            if squares <= PARALLEL_EDGES**2 * length_a * vectors.dot(w, w):
                 continue
-            scale = 1.0 / np.sqrt(squares)
-            if towards_b < 0.0:
-                scale = -scale
-            if towards_b * scale < solids.seen[f]:
+            scale = (-1.0 if to_b < 0.0 else 1.0) / np.sqrt(squares)
+            if to_b * scale < solids.seen[f] or -to_a * scale < solids.seen[e]:
                 continue
-            if -towards_a * scale < solids.seen[e]:
-                continue
-            gap = scale * (c0 * (p[0] - r[0]) + c1 * (p[1] - r[1]) + c2 * (p[2] - r[2]))
+            gap = scale * vectors.dot(c, vectors.subtract(p, r))
             if gap > separation:
                 best_a, best_b, separation = e, f, gap
                 if separation > margin:
@@ -175,27 +153,20 @@ def cross_edges(
     """
     base_a, base_b = solids.first_vertex[a], solids.first_vertex[b]
     p = solids.vertex[base_a + solids.edge[edge_a, 0]]
-    q = solids.vertex[base_a + solids.edge[edge_a, 1]]
     r = solids.vertex[base_b + solids.edge[edge_b, 0]]
-    s = solids.vertex[base_b + solids.edge[edge_b, 1]]
-    u0, u1, u2 = q[0] - p[0], q[1] - p[1], q[2] - p[2]
-    w0, w1, w2 = s[0] - r[0], s[1] - r[1], s[2] - r[2]
-    x0, x1, x2 = r[0] - p[0], r[1] - p[1], r[2] - p[2]
-    c0, c1, c2 = cross(u0, u1, u2, w0, w1, w2)
-    squares = c0 * c0 + c1 * c1 + c2 * c2
-    lengths = (u0 * u0 + u1 * u1 + u2 * u2) * (w0 * w0 + w1 * w1 + w2 * w2)
-    if squares <= PARALLEL_EDGES**2 * lengths:
+    u = vectors.subtract(solids.vertex[base_a + solids.edge[edge_a, 1]], p)
+    w = vectors.subtract(solids.vertex[base_b + solids.edge[edge_b, 1]], r)
+    x, c = vectors.subtract(r, p), vectors.cross(u, w)
+    squares = vectors.dot(c, c)
+    if squares <= PARALLEL_EDGES**2 * (vectors.dot(u, u) * vectors.dot(w, w)):
         return False
-    y0, y1, y2 = cross(x0, x1, x2, w0, w1, w2)
-    crossing[0] = (y0 * c0 + y1 * c1 + y2 * c2) / squares
-    y0, y1, y2 = cross(x0, x1, x2, u0, u1, u2)
-    crossing[1] = (y0 * c0 + y1 * c1 + y2 * c2) / squares
+    crossing[0] = vectors.dot(vectors.cross(x, w), c) / squares
+    crossing[1] = vectors.dot(vectors.cross(x, u), c) / squares
     scale = 1.0 / np.sqrt(squares)
-    if c0 * towards[0] + c1 * towards[1] + c2 * towards[2] < 0.0:
+    if vectors.dot(c, towards) < 0.0:
         scale = -scale
-    crossing[2] = -scale * (c0 * x0 + c1 * x1 + c2 * x2)
-    crossing[3], crossing[4], crossing[5] = c0 * scale, c1 * scale, c2 * scale
-    crossing[6] = p[0] + crossing[0] * u0
-    crossing[7] = p[1] + crossing[0] * u1
-    crossing[8] = p[2] + crossing[0] * u2
+    crossing[2] = -scale * vectors.dot(c, x)
+    for axis in range(3):
+        crossing[3 + axis] = c[axis] * scale
+        crossing[6 + axis] = p[axis] + crossing[0] * u[axis]
     return True

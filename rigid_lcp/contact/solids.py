@@ -34,11 +34,11 @@ from rigid_lcp.contact.separation import (
     NEARLY_OPPOSITE,
     Solids,
     cross_edges,
-    dot,
     find_near_edges,
     separate_edges,
     separate_faces,
 )
+from rigid_lcp.shapes import vectors
 
 CORNER_EDGE, EDGE_CORNER, CORNERS = 3, 4, 5
 """Corner of a on an edge of b; corner of b on an edge of a; corner on corner."""
@@ -62,15 +62,13 @@ def list_corner_edge_pairs(
     base, corners = solids.first_vertex[other], solids.first_vertex[own]
     for e in edges_other:
         p = solids.vertex[base + solids.edge[e, 0]]
-        q = solids.vertex[base + solids.edge[e, 1]]
-        u0, u1, u2 = q[0] - p[0], q[1] - p[1], q[2] - p[2]
-        squares = u0 * u0 + u1 * u1 + u2 * u2
+        u = vectors.subtract(solids.vertex[base + solids.edge[e, 1]], p)
+        squares = vectors.dot(u, u)
         for v in range(corners, solids.first_vertex[own + 1]):
-            x = solids.vertex[v]
-            d0, d1, d2 = x[0] - p[0], x[1] - p[1], x[2] - p[2]
-            place = min(max((d0 * u0 + d1 * u1 + d2 * u2) / squares, 0.0), 1.0)
-            d0, d1, d2 = d0 - place * u0, d1 - place * u1, d2 - place * u2
-            distance = d0 * d0 + d1 * d1 + d2 * d2
+            d = vectors.subtract(solids.vertex[v], p)
+            place = min(max(vectors.dot(d, u) / squares, 0.0), 1.0)
+            d = vectors.add(d, -place, u)
+            distance = vectors.dot(d, d)
             if distance > within * within:
                 continue
             distance = np.sqrt(distance)
@@ -83,7 +81,7 @@ def list_corner_edge_pairs(
             end = 0 if place <= slack else (1 if place >= 1.0 - slack else -1)
             pairs[row, 0], pairs[row, 1], pairs[row, 2] = distance, v - corners, e
             pairs[row, 3], pairs[row, 4] = end, sign
-            pairs[row, 5], pairs[row, 6], pairs[row, 7] = sign * d0, sign * d1, sign * d2
+            pairs[row, 5], pairs[row, 6], pairs[row, 7] = sign * d[0], sign * d[1], sign * d[2]
     return count
 
 
@@ -94,10 +92,10 @@ def shares_gap(solids: Solids, pair: Floats, normal: Floats, tie: float) -> bool
     So do the two ends of what parallel edges have in common.
     """
     away = pair[5:8]
-    if pair[0] > tie and dot(away, normal) < np.cos(NEARLY_OPPOSITE) * pair[0]:
+    if pair[0] > tie and vectors.dot(away, normal) < np.cos(NEARLY_OPPOSITE) * pair[0]:
         return False
     edge = int(pair[2])
-    return pair[4] * dot(solids.bisector[edge], normal) >= solids.seen_about[edge]
+    return pair[4] * vectors.dot(solids.bisector[edge], normal) >= solids.seen_about[edge]
 
 
 @njit(cache=True)
@@ -158,7 +156,7 @@ def add_nearest_corner(
     normal, first = solids.normal[face], solids.first_vertex[other]
     best, least = first, np.inf
     for v in range(first, solids.first_vertex[other + 1]):
-        gap = dot(normal, solids.vertex[v]) - solids.offset[face]
+        gap = vectors.dot(normal, solids.vertex[v]) - solids.offset[face]
         if gap < least:
             best, least = v, gap
     if least > margin:
@@ -212,7 +210,7 @@ def find_solid_contacts(
     alone = (
         crosses
         and gap_edges > faces + LENGTH_TIE * size
-        and dot(crossing[3:6], towards) < np.cos(NEARLY_OPPOSITE)
+        and vectors.dot(crossing[3:6], towards) < np.cos(NEARLY_OPPOSITE)
     )
     count = int(ZERO)
     tie = LENGTH_TIE * size

@@ -91,7 +91,7 @@ def _list_jacobian(
             for body, side in ((first, sign), (second, -sign)):
                 if columns[body] < 0:
                     continue
-                moment = vectors.cross(vectors.add(x, -1.0, vectors.read(position, body)), d)
+                moment = vectors.cross(vectors.subtract(x, vectors.read(position, body)), d)
                 for axis in range(dim):
                     value[k + axis] = side * d[axis]
                 for axis in range(dim, size):
@@ -116,11 +116,11 @@ def _find_relative_motion(
 ) -> tuple[vectors.Vector, vectors.Vector, vectors.Vector]:
     """Velocity of a's point x, and it and ``w x (w x r)`` less those of b's point y."""
     (v_a, spin_a), (v_b, spin_b) = vectors.read_rates(rates, a), vectors.read_rates(rates, b)
-    turn_a = vectors.cross(spin_a, vectors.add(x, -1.0, vectors.read(position, a)))
-    turn_b = vectors.cross(spin_b, vectors.add(y, -1.0, vectors.read(position, b)))
+    turn_a = vectors.cross(spin_a, vectors.subtract(x, vectors.read(position, a)))
+    turn_b = vectors.cross(spin_b, vectors.subtract(y, vectors.read(position, b)))
     carried = vectors.add(v_a, 1.0, turn_a)
-    moving = vectors.add(carried, -1.0, vectors.add(v_b, 1.0, turn_b))
-    pull = vectors.add(vectors.cross(spin_a, turn_a), -1.0, vectors.cross(spin_b, turn_b))
+    moving = vectors.subtract(carried, vectors.add(v_b, 1.0, turn_b))
+    pull = vectors.subtract(vectors.cross(spin_a, turn_a), vectors.cross(spin_b, turn_b))
     return carried, moving, pull
 
 
@@ -148,7 +148,9 @@ def _list_relative_velocities(
     return found
 
 
-def find_inertial_acceleration(contacts: Contacts, motion: Motion) -> Floats:
+def find_inertial_acceleration(
+    contacts: Contacts, motion: Motion, corners_round: bool = True
+) -> Floats:
     """The terms ``d2g/dq_k dq_l q'_k q'_l`` of eqs 14, 17 and 24, (nc, dim) [m/s^2].
 
     Relative acceleration at the contacts while no force or torque acts.  With c the carrier of a
@@ -165,11 +167,16 @@ def find_inertial_acceleration(contacts: Contacts, motion: Motion) -> Floats:
 
     In 3D, at edges, see `_find_edge_terms`; crossing edges that slide along each other are taken to
     slide along b's, which matters to no force: friction then has the velocity's direction.
+
+    The distance of two points (a corner on a corner or an edge) has a curvature of 1 over itself:
+    it tells how the gap grows only for times far below a step.  With ``corners_round`` False the
+    plane across the normal takes the place of b there: it parts the two bodies, so it is safe, and
+    at most the way of a step too careful with bodies that would just pass.
     """
     c = contacts
     found: Floats = _list_inertial_accelerations(
         c.body_a, c.body_b, c.point, c.normal, c.gap, c.radius_a, c.radius_b, c.edge_a, c.edge_b,
-        motion.position, motion.rates,
+        motion.position, motion.rates, corners_round,
     )  # fmt: skip
     return found
 
@@ -178,19 +185,21 @@ def find_inertial_acceleration(contacts: Contacts, motion: Motion) -> Floats:
 def _list_inertial_accelerations(
     body_a: Ints, body_b: Ints, point: Floats, normals: Floats, gaps: Floats, radius_a: Floats,
     radius_b: Floats, edges_a: Floats, edges_b: Floats, position: Floats, rates: Floats,
+    corners_round: bool,
 ) -> Floats:  # fmt: skip
     nc, dim = point.shape
     found, frame = np.empty((nc, dim)), np.empty((dim, dim))
     for c in range(nc):
         a, b, n, gap = body_a[c], body_b[c], vectors.read(normals, c), gaps[c]
         x, e_a, e_b = vectors.read(point, c), vectors.read(edges_a, c), vectors.read(edges_b, c)
-        flat = np.isinf(radius_b[c])
+        plane = not corners_round and radius_a[c] == 0.0 and radius_b[c] == 0.0
+        flat = plane or np.isinf(radius_b[c])
         behind = 0.0 if flat else radius_b[c]
         carrier, foot = vectors.add(x, radius_a[c], n), vectors.add(x, -gap, n)
         carrier_b = carrier if flat else vectors.add(foot, -behind, n)
         carried, moving, pull = _find_relative_motion(position, rates, a, carrier, b, carrier_b)
         (v_a, spin_a), (v_b, spin_b) = vectors.read_rates(rates, a), vectors.read_rates(rates, b)
-        if vectors.dot(e_b, e_b) > 0.0:
+        if vectors.dot(e_b, e_b) > 0.0 and not plane:
             distance = radius_a[c] + gap
             motion = _find_relative_motion(position, rates, a, carrier, b, foot)
             normal, rate = _find_edge_terms(
@@ -206,8 +215,8 @@ def _list_inertial_accelerations(
             rate = vectors.divide(along, apart)
             normal = vectors.dot(n, pull) + vectors.dot(along, along) / apart
         way = vectors.add(carried, -radius_a[c], rate)
-        turn_a = vectors.cross(spin_a, vectors.add(way, -1.0, v_a))
-        pull = vectors.add(turn_a, -1.0, vectors.cross(spin_b, vectors.add(way, -1.0, v_b)))
+        turn_a = vectors.cross(spin_a, vectors.subtract(way, v_a))
+        pull = vectors.subtract(turn_a, vectors.cross(spin_b, vectors.subtract(way, v_b)))
         find_frame(normals[c], frame)
         found[c, 0] = normal
         for i in range(1, dim):

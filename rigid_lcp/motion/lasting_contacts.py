@@ -11,7 +11,7 @@ import numpy as np
 
 from rigid_lcp.arrays import Bools, Floats, Ints
 from rigid_lcp.collision import Collision, collide
-from rigid_lcp.contact import Contacts, choose_tangents, match_keys
+from rigid_lcp.contact import Contacts, build_frames, match_keys
 from rigid_lcp.errors import NotConverged
 from rigid_lcp.motion.acceleration_forces import LASTING
 from rigid_lcp.motion.equations import find_relative_velocity, find_response, make_body_space
@@ -116,10 +116,10 @@ def carry_slip(lasting: Lasting, rows: Bools | Ints, contacts: Contacts) -> Floa
     The tangents of a contact jump where its normal passes the axis they are made from, and where
     its two bodies have changed places.
     """
-    then = choose_tangents(lasting.contacts.normal[rows])
+    then = build_frames(lasting.contacts.normal[rows])[:, 1:]
     vector = np.einsum("cij,ci->cj", then, lasting.slip[rows])
     vector[contacts.body_a != lasting.contacts.body_a[rows]] *= -1.0
-    return np.einsum("cij,cj->ci", choose_tangents(contacts.normal), vector)
+    return np.einsum("cij,cj->ci", build_frames(contacts.normal)[:, 1:], vector)
 
 
 def collide_bodies(

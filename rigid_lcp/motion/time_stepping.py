@@ -191,7 +191,7 @@ def find_closing_contacts(
     ``middle``: the bodies at the midpoint with the rates of the start, ``free`` with those that
     they would have at the end without impulses.
     """
-    turning = 0.5 * h * find_inertial_acceleration(find_planes_at_corners(contacts), middle)
+    turning = 0.5 * h * find_inertial_acceleration(contacts, middle, corners_round=False)
     if middle.dim == 3:  # spins change also while no force acts
         coasting = replace_rates(middle, world.free_accelerations(middle))
         turning += 0.5 * h * find_relative_velocity(contacts, coasting)
@@ -235,20 +235,6 @@ def find_impulses_at_once(
         solution, error = solve(bodies, closing.offset + shift, closing.friction)
     velocity = solution.u.reshape(shift.shape) - shift
     return Impulses(solution.r.reshape(shift.shape), velocity, error, solution.message)
-
-
-def find_planes_at_corners(contacts: Contacts) -> Contacts:
-    """Contacts whose corners on corners and edges are corners on the plane across the normal.
-
-    The distance of two points has a curvature of 1 over itself: it tells how the gap grows only
-    for times far below a step.  The plane parts the two bodies, so it is safe, and at most the
-    way of a step too careful with bodies that would just pass.
-    """
-    corners = (contacts.radius_a == 0) & (contacts.radius_b == 0)
-    if not corners.any():
-        return contacts
-    flat = np.where(corners, np.inf, contacts.radius_b)
-    return replace(contacts, radius_b=flat, edge_b=np.where(corners[:, None], 0.0, contacts.edge_b))
 
 
 def judge_impulses(

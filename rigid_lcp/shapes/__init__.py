@@ -22,7 +22,6 @@ from rigid_lcp.shapes.rotations import (
     normalise,
     rotate,
     rotate_back,
-    turn_quaternion,
 )
 from rigid_lcp.shapes.round_grains import Disc, Sphere
 from trackbed.choices import find_choice
@@ -31,7 +30,7 @@ __all__ = [
     "FLATNESS", "Disc", "HalfSpace", "Polygon", "Polyhedron", "Sphere", "extract_quaternion",
     "find_quaternion_rate", "get_shape", "make_box", "make_quaternion", "make_rotation",
     "multiply_quaternions", "normalise", "require_real", "require_vector", "rotate",
-    "rotate_back", "turn_quaternion", "vectors",
+    "rotate_back", "vectors",
 ]  # fmt: skip
 
 

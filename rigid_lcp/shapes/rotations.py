@@ -91,17 +91,6 @@ def rotate_back(quaternion: Floats, vector: ArrayLike) -> Floats:
     return np.einsum("...ji,...j->...i", make_rotation(quaternion), np.asarray(vector, float))
 
 
-def turn_quaternion(quaternion: Floats, rotation_vector: ArrayLike) -> Floats:
-    """Orientation after a turn by ``rotation_vector`` (..., 3) [rad] in the world frame.
-
-    ``q' = exp(phi) q``, kept at length one against round-off.  With ``phi = w t`` this is the
-    exact motion under a constant spin, for any time; a spin that changes within the step needs an
-    integrator on top, such as `rigid_lcp.motion.gyroscopic.rotate_freely`.
-    """
-    turned = multiply_quaternions(make_quaternion(rotation_vector), quaternion)
-    return turned / np.linalg.norm(turned, axis=-1, keepdims=True)
-
-
 def find_quaternion_rate(quaternion: Floats, spin: Floats) -> Floats:
     """``dq/dt = (0, w) q / 2``, (..., 4), for Runge-Kutta stages."""
     pure = np.concatenate([np.zeros_like(spin[..., :1]), spin], axis=-1)

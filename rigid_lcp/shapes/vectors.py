@@ -1,5 +1,6 @@
 """Vectors, quaternions and rotation matrices as tuples of numbers, for compiled kernels.
 
+Small arrays would cost more than what is done with them; rows of three numbers are vectors too.
 A vector of the plane is one of space with z = 0, so that one kernel serves both.  Formulas and the
 order of their sums are those of `rigid_lcp.shapes.rotations`.
 """
@@ -41,6 +42,12 @@ def read_turn(rows: Floats, i: int) -> Quaternion:
 def add(a: Vector, share: float, b: Vector) -> Vector:
     """``a + share b``."""
     return a[0] + share * b[0], a[1] + share * b[1], a[2] + share * b[2]
+
+
+@njit(cache=True)
+def subtract(a: Vector, b: Vector) -> Vector:
+    """``a - b``."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 @njit(cache=True)

@@ -17,6 +17,7 @@ from rigid_lcp.motion.gyroscopic import (
     rotate_freely,
     turn_inertia,
 )
+from rigid_lcp.motion.state import Motion, displace_motion
 from rigid_lcp.shapes.polyhedron import make_box
 from rigid_lcp.shapes.rotations import (
     extract_quaternion,
@@ -27,7 +28,6 @@ from rigid_lcp.shapes.rotations import (
     normalise,
     rotate,
     rotate_back,
-    turn_quaternion,
 )
 from tests.rigid_solids import angular_momentum
 
@@ -38,6 +38,12 @@ vectors = st.tuples(*[st.floats(-10.0, 10.0)] * 3).map(np.array)
 
 def random_rotations(count: int, seed: int = 0) -> Floats:
     return normalise(np.random.default_rng(seed).normal(size=(count, 4)))
+
+
+def turn_quaternion(quaternion: Floats, phi: Floats) -> Floats:
+    """As a state is turned by a rotation vector."""
+    here = Motion(np.zeros((1, 3)), quaternion[None], np.zeros((1, 3)), np.zeros((1, 3)))
+    return displace_motion(here, np.concatenate([np.zeros(3), phi])[None]).angle[0]
 
 
 def as_scipy(quaternion: Floats) -> Rotation:
