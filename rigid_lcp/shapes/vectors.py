@@ -13,6 +13,7 @@ from numba import njit
 from rigid_lcp.arrays import Floats
 
 Vector = tuple[float, float, float]
+Row = Vector | Floats  # also a row of an array (n, 3)
 Quaternion = tuple[float, float, float, float]
 Matrix = tuple[Vector, Vector, Vector]
 
@@ -39,37 +40,37 @@ def read_turn(rows: Floats, i: int) -> Quaternion:
 
 
 @njit(cache=True)
-def add(a: Vector, share: float, b: Vector) -> Vector:
+def add(a: Row, share: float, b: Row) -> Vector:
     """``a + share b``."""
     return a[0] + share * b[0], a[1] + share * b[1], a[2] + share * b[2]
 
 
 @njit(cache=True)
-def subtract(a: Vector, b: Vector) -> Vector:
+def subtract(a: Row, b: Row) -> Vector:
     """``a - b``."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 @njit(cache=True)
-def divide(a: Vector, b: float) -> Vector:
+def divide(a: Row, b: float) -> Vector:
     """``a / b``."""
     return a[0] / b, a[1] / b, a[2] / b
 
 
 @njit(cache=True)
-def dot(a: Vector, b: Vector) -> float:
+def dot(a: Row, b: Row) -> float:
     """``a . b``."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @njit(cache=True)
-def project(a: Vector, b: Vector) -> float:
+def project(a: Row, b: Row) -> float:
     """``a . b`` in the order of `numpy.einsum`, so that states are to the bit as it made them."""
     return (a[0] * b[0] + a[2] * b[2]) + a[1] * b[1]
 
 
 @njit(cache=True)
-def cross(a: Vector, b: Vector) -> Vector:
+def cross(a: Row, b: Row) -> Vector:
     """``a x b``."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
@@ -112,13 +113,13 @@ def make_rotation(q: Quaternion) -> Matrix:
 
 
 @njit(cache=True)
-def rotate(r: Matrix, v: Vector) -> Vector:
+def rotate(r: Matrix, v: Row) -> Vector:
     """``R v``."""
     return project(r[0], v), project(r[1], v), project(r[2], v)
 
 
 @njit(cache=True)
-def rotate_back(r: Matrix, v: Vector) -> Vector:
+def rotate_back(r: Matrix, v: Row) -> Vector:
     """``R^T v``."""
     x, y, z = r
     return (
