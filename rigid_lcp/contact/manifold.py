@@ -255,19 +255,14 @@ def keep_outer(found: Floats, count: int, size: float) -> int:
     for row in rows[:all_rows]:
         if row < 0:
             continue
-        squares = 0.0
-        for column in range(CANDIDATE_COLUMNS):
-            kept[number, column] = found[row, column]
-            if column >= 7:
-                squares += (found[row, column] - found[deepest, column]) ** 2
+        kept[number] = found[row]
+        apart = vectors.subtract(found[row, 7:10], found[deepest, 7:10])
+        squares = vectors.dot(apart, apart)
         if squares < least:
             nearest, least = number, squares
         lowest = min(lowest, found[row, 3])
         number += 1
     if found[deepest, 3] < lowest - tie:
-        for column in range(CANDIDATE_COLUMNS):
-            kept[nearest, column] = found[deepest, column]
-    for row in range(number):
-        for column in range(CANDIDATE_COLUMNS):
-            found[row, column] = kept[row, column]
+        kept[nearest] = found[deepest]
+    found[:number] = kept[:number]
     return number
