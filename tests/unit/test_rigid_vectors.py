@@ -46,9 +46,9 @@ def test_features_are_placed_with_their_bodies_and_walls_stay() -> None:
 
 def test_contacts_come_by_their_pairs_as_they_were_found() -> None:
     """Whichever of the two is a; a half-space, body 1, is always the second."""
-    bodies = np.array([[2, 3], [2, 1], [2, 0], [0, 2], [3, 2]])
+    bodies = np.array([[2, 3], [3, 1], [2, 0], [0, 2], [3, 2]])
     number = np.arange(45.0).reshape(5, 9)
     found = order_contacts(np.array([0, 2, 0, 0]), bodies, number, np.arange(5))
-    assert np.array_equal(found[5], [2, 3, 1, 0, 4])
+    assert np.array_equal(found[5], [2, 3, 0, 4, 1])
     rows = np.column_stack([bodies, number])[found[5]]
     assert np.array_equal(np.column_stack([*found[:5], *found[6:]]), rows)
