@@ -24,11 +24,12 @@ def find_principal_axes(inertia: ArrayLike) -> tuple[Floats, Floats]:
 
 def turn_inertia(inertia: Floats, quaternion: Floats) -> Floats:
     """``R I R^T``, (..., 3, 3), of body tensors (..., 3, 3) [kg m^2]."""
+    inertia = np.broadcast_to(inertia, (*quaternion.shape[:-1], 3, 3))
     placed: Floats = _turn_tensors(inertia.reshape(-1, 3, 3), quaternion.reshape(-1, 4))
     return placed.reshape(inertia.shape)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _turn_tensors(inertia: Floats, quaternion: Floats) -> Floats:
     placed = np.zeros(inertia.shape)
     for body in range(len(inertia)):
@@ -46,7 +47,7 @@ def find_spin_acceleration(inertia: Floats, quaternion: Floats, spin: Floats) ->
     return np.asarray(change[..., 0], dtype=float)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def find_gyroscopic_torque(placed: Floats, spin: Floats) -> Floats:
     """``-w x I w`` [N m], (n, 3), of tensors in the world frame (n, 3, 3) [kg m^2]."""
     torque = np.empty(spin.shape)
@@ -78,11 +79,11 @@ def rotate_freely(
     return shapes.normalise(turned.reshape(quaternion.shape)), spun.reshape(spin.shape)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _rotate_bodies(
     moments: Floats, axes: Floats, quaternion: Floats, spin: Floats, seconds: float
 ) -> tuple[Floats, Floats]:
-    turned, spun = np.empty_like(quaternion), np.empty_like(spin)
+    turned, spun = np.empty(quaternion.shape), np.empty(spin.shape)
     for body in range(len(spin)):
         m, own = vectors.read(moments, body), vectors.read_turn(axes, body)
         frame = vectors.normalise(vectors.multiply(vectors.read_turn(quaternion, body), own))
@@ -108,7 +109,7 @@ def _rotate_bodies(
     return turned, spun
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def find_energy_turn(
     moments: vectors.Vector, momentum: vectors.Vector, twice_energy: float, seconds: float
 ) -> vectors.Vector:

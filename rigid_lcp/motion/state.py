@@ -35,7 +35,7 @@ class Motion:
         """Generalised velocities (n, 3) in 2D, (n, 6) in 3D [m/s, rad/s]."""
         bodies, dim = self.position.shape
         rates = np.empty((bodies, 3 * (dim - 1)))
-        rates[:, :dim], rates[:, dim:] = self.velocity, self.spin.reshape(bodies, -1)
+        rates[:, :dim], rates[:, dim:] = self.velocity, self.spin.reshape(bodies, 2 * dim - 3)
         return rates
 
 
@@ -56,7 +56,7 @@ def displace_motion(motion: Motion, move: Floats) -> Motion:
 @njit(cache=True)
 def _turn_bodies(quaternion: Floats, move: Floats) -> Floats:
     """Orientations (n, 4) turned by the rotation vectors of moves (n, 6), in the world frame."""
-    turned = np.empty_like(quaternion)
+    turned = np.empty(quaternion.shape)
     for body in range(len(move)):
         turn = vectors.make_turn(vectors.read_rates(move, body)[1])
         both = vectors.multiply(turn, vectors.read_turn(quaternion, body))

@@ -18,13 +18,13 @@ Quaternion = tuple[float, float, float, float]
 Matrix = tuple[Vector, Vector, Vector]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def read(rows: Floats, i: int) -> Vector:
     """Row i of vectors (n, 2) or (n, 3)."""
     return rows[i, 0], rows[i, 1], rows[i, 2] if rows.shape[1] == 3 else 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def read_rates(rates: Floats, i: int) -> tuple[Vector, Vector]:
     """Velocity [m/s] and spin [rad/s] of body i, of generalised velocities (n, 3) or (n, 6)."""
     x = rates[i]
@@ -33,49 +33,49 @@ def read_rates(rates: Floats, i: int) -> tuple[Vector, Vector]:
     return (x[0], x[1], x[2]), (x[3], x[4], x[5])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def read_turn(rows: Floats, i: int) -> Quaternion:
     """Row i of quaternions (n, 4)."""
     return rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def add(a: Row, share: float, b: Row) -> Vector:
     """``a + share b``."""
     return a[0] + share * b[0], a[1] + share * b[1], a[2] + share * b[2]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def subtract(a: Row, b: Row) -> Vector:
     """``a - b``."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def divide(a: Row, b: float) -> Vector:
     """``a / b``."""
     return a[0] / b, a[1] / b, a[2] / b
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def dot(a: Row, b: Row) -> float:
     """``a . b``."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def project(a: Row, b: Row) -> float:
     """``a . b`` in the order of `numpy.einsum`, so that states are to the bit as it made them."""
     return (a[0] * b[0] + a[2] * b[2]) + a[1] * b[1]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def cross(a: Row, b: Row) -> Vector:
     """``a x b``."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def multiply(left: Quaternion, right: Quaternion) -> Quaternion:
     """``left right``: the rotation ``right`` first, then ``left``."""
     w, v, s, u = left[0], left[1:], right[0], right[1:]
@@ -84,7 +84,7 @@ def multiply(left: Quaternion, right: Quaternion) -> Quaternion:
     return real, w * u[0] + s * v[0] + x[0], w * u[1] + s * v[1] + x[1], w * u[2] + s * v[2] + x[2]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def make_turn(phi: Vector) -> Quaternion:
     """Quaternion of a turn by ``|phi|`` [rad] about ``phi``."""
     half = 0.5 * np.sqrt(dot(phi, phi))
@@ -93,7 +93,7 @@ def make_turn(phi: Vector) -> Quaternion:
     return np.cos(half), share * phi[0], share * phi[1], share * phi[2]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def normalise(q: Quaternion) -> Quaternion:
     """A quaternion of length one; not finite for one of length zero."""
     squares = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]
@@ -101,7 +101,7 @@ def normalise(q: Quaternion) -> Quaternion:
     return q[0] / length, q[1] / length, q[2] / length, q[3] / length
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def make_rotation(q: Quaternion) -> Matrix:
     """``R(q)`` by rows, of a unit quaternion."""
     w, x, y, z = q
@@ -112,13 +112,13 @@ def make_rotation(q: Quaternion) -> Matrix:
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def rotate(r: Matrix, v: Row) -> Vector:
     """``R v``."""
     return project(r[0], v), project(r[1], v), project(r[2], v)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def rotate_back(r: Matrix, v: Row) -> Vector:
     """``R^T v``."""
     x, y, z = r

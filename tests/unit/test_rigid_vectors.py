@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from rigid_lcp.contact import build_frames, pack_shapes_3d
 from rigid_lcp.contact.near_pairs import order_contacts
 from rigid_lcp.contact.placed_solids import place_solids
+from rigid_lcp.errors import SceneError
+from rigid_lcp.motion.gyroscopic import rotate_freely, turn_inertia
 from rigid_lcp.shapes import make_rotation, multiply_quaternions, normalise, vectors
 from tests.rigid_solids import FLOOR, make_stone
 
@@ -52,3 +55,10 @@ def test_contacts_come_by_their_pairs_as_they_were_found() -> None:
     assert np.array_equal(found[5], [2, 3, 0, 4, 1])
     rows = np.column_stack([bodies, number])[found[5]]
     assert np.array_equal(np.column_stack([*found[:5], *found[6:]]), rows)
+
+
+def test_moments_that_underflow_are_a_sentence_and_tensors_broadcast() -> None:
+    still, turns = np.array([[1.0, 0, 0, 0]]), normalise(RANDOM.normal(size=(3, 4)))
+    with pytest.raises(SceneError, match="quaternion"):
+        rotate_freely((np.zeros((1, 3)), still), still, np.ones((1, 3)), 1e-3)
+    assert turn_inertia(np.eye(3), turns) == pytest.approx(np.tile(np.eye(3), (3, 1, 1)))
