@@ -60,7 +60,7 @@ def renew_friction():
 def press_surface(forces):
     """Constant forces down on the grains [N]: weight of the ballast beside a block.
 
-    YADE does not save them: they are told again after each load.
+    YADE does not save them: they are set again after each load.
     """
     for number, force in enumerate(forces):
         O.forces.setPermF(number, Vector3(0, 0, -force))

@@ -67,8 +67,9 @@ def find_result(sweep: Sweep, member: Member, ended: Ended | None) -> Result:
             done = here.state == "finished"
     state, exit_code, sentence = "waiting", None, ""
     if ended is not None:
-        exit_code = ended.exit_code
-        sentence = ended.sentence or f"its {RESULT} can not be read: remove {folder}"
+        exit_code, sentence = ended.exit_code, ended.sentence
+        if ended.finished and not done:
+            sentence = f"its files show no finished run: remove {folder}"
         state = "stopped" if ended == STOPPED else "failed"
     if done and (ended is None or ended.finished):
         state, exit_code, sentence = "finished", 0, str(summary.get("sentence", ""))

@@ -161,7 +161,7 @@ def draw(rows: Sequence[Row], picture: Path) -> None:
                 mark = "s" if name.endswith(DOUBLED) else "o"
                 axes.errorbar(cost, mean, half if half == half else 0.0, fmt=mark, ms=5, lw=1,
                               capsize=3, color=COLOURS[family], label=name)  # fmt: skip
-            axes.set(xscale="log", xlim=(0.03, 1.2), ylim=(-120, 120), title=kind.title,
+            axes.set(xscale="log", xlim=(0.03, 1.2), ylim=(-120, 200), title=kind.title,
                      xlabel="cost over that of every cycle")  # fmt: skip
             axes.set_xticks(SHARES, [f"{share:g}" for share in SHARES])
             axes.xaxis.set_minor_locator(NullLocator())
