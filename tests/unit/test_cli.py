@@ -19,7 +19,7 @@ import pytest
 import trackbed
 from adapters import errors
 from trackbed.command import VERBS, explain_error, main
-from trackbed.run_files import raise_on_signals
+from trackbed.run_files import hold_signals, raise_on_signals
 
 ROOT = Path(__file__).parents[2]
 
@@ -171,6 +171,25 @@ def test_an_interrupt_that_python_drops_ends_the_command(begins: bool, monkeypat
     assert after == []
     assert "interrupted" in capsys.readouterr().err
     assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_a_signal_is_held_until_the_block_ends() -> None:
+    """What the block does is whole, and the signal counts behind it, after an error too."""
+    done: list[str] = []
+
+    def work(error: Exception | None) -> None:
+        with raise_on_signals("nothing", "again"):
+            with hold_signals():
+                os.kill(os.getpid(), signal.SIGTERM)
+                done.append("held")
+                if error is not None:
+                    raise error
+            done.append("behind the block")
+
+    for error in (None, ValueError("in the block")):
+        with pytest.raises(errors.Interrupted, match="stopped by SIGTERM"):
+            work(error)
+    assert done == ["held", "held"]
 
 
 def test_reader_goes_away() -> None:

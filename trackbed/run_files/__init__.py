@@ -21,7 +21,12 @@ from trackbed.run_files.folder import (
     write_result,
 )
 from trackbed.run_files.provenance import record_provenance
-from trackbed.run_files.signals import note_interrupts, note_signals, raise_on_signals
+from trackbed.run_files.signals import (
+    hold_signals,
+    note_interrupts,
+    note_signals,
+    raise_on_signals,
+)
 from trackbed.run_files.whole import (
     append_text,
     digest_file,
@@ -38,9 +43,9 @@ from trackbed.run_files.whole import (
 
 __all__ = [
     "MANIFEST", "RESULT", "Progress", "add_run_arguments", "append_text", "digest_file",
-    "folder", "is_written", "list_changed_tables", "list_differences", "lock_folder",
-    "make_manifest", "note_interrupts", "note_signals", "open_run", "open_unlinked", "place_run",
-    "raise_on_signals", "read_object", "record_provenance", "refuse_format", "refuse_links",
-    "refuse_writing", "replace_file", "seal_file", "sync_folder", "time_step", "write_csv",
-    "write_pvd", "write_result", "write_whole",
+    "folder", "hold_signals", "is_written", "list_changed_tables", "list_differences",
+    "lock_folder", "make_manifest", "note_interrupts", "note_signals", "open_run", "open_unlinked",
+    "place_run", "raise_on_signals", "read_object", "record_provenance", "refuse_format",
+    "refuse_links", "refuse_writing", "replace_file", "seal_file", "sync_folder", "time_step",
+    "write_csv", "write_pvd", "write_result", "write_whole",
 ]  # fmt: skip

@@ -77,6 +77,18 @@ def handle_signals(
 
 
 @contextmanager
+def hold_signals() -> Iterator[None]:
+    """Act on a signal only when the block ends: its files are closed, what it writes is whole."""
+    held: list[signal.Signals] = []
+    try:
+        with handle_signals(held.append):
+            yield
+    finally:
+        for number in held[:1]:
+            signal.raise_signal(number)
+
+
+@contextmanager
 def raise_on_signals(kept: str, remedy: str, where: str = "") -> Iterator[None]:
     """Raise `Interrupted` at a signal: ``kept`` says what is saved, ``remedy`` how to go on."""
 

@@ -22,7 +22,7 @@ from adapters.procedure.sweep.member import (
     run_member,
 )
 from adapters.procedure.sweep.plan import Member, Sweep, check_folder, find_pinned_engine
-from trackbed.run_files import MANIFEST, RESULT, read_object, write_whole
+from trackbed.run_files import MANIFEST, RESULT, hold_signals, read_object, write_whole
 
 STOP_S = 30
 """How long members may take to stop when the sweep is interrupted [s]."""
@@ -151,8 +151,9 @@ def _run(
         taken = set()
         try:
             for future in as_completed(futures):
-                take_result(future)
-                taken.add(future)  # behind it: a signal within is to lose no result
+                with hold_signals():
+                    take_result(future)
+                    taken.add(future)
         except (KeyboardInterrupt, Exception):
             sweep.stop_file.touch()
             wait([*futures], timeout=STOP_S)
