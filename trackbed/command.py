@@ -25,6 +25,7 @@ VERBS = {
     "sweep": ("adapters.cli.sweep", "several seeds and values of a scene's keys, side by side"),
     "status": (RUN, "how far a run is, its settlement and speed-up"),
     "report": (RUN, "write report.html and the figures of a run"),
+    "compare": ("adapters.cli.compare", "two runs of one kind side by side: keys and results"),
     "export": ("adapters.cli.export", "a run as files of ParaView, OVITO, ON-DEM or CSV"),
     "fit": (
         "adapters.cli.fit",
@@ -74,6 +75,14 @@ def build_parser(verb: str | None) -> argparse.ArgumentParser:
                 find_checkout()
             import_module(module).register(name, verb_parser)
     return parser
+
+
+def complete_line(line: str) -> None:
+    """Answer a shell that completes a line, by argcomplete, and end: no verb runs."""
+    from argcomplete import autocomplete
+
+    verb = next((word for word in line.split() if word in VERBS), None)
+    autocomplete(build_parser(verb))
 
 
 def find_checkout() -> None:
@@ -156,6 +165,8 @@ def main(words: Sequence[str] | None = None) -> int:
     words = sys.argv[1:] if words is None else words
     try:
         with note_interrupts():
+            if "_ARGCOMPLETE" in os.environ:
+                complete_line(os.environ["COMP_LINE"])
             arguments = build_parser(find_verb(words)).parse_args(words)
             code = choose_command(arguments)(arguments)
             sys.stdout.flush()

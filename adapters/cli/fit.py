@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from math import floor, inf, log10
 from pathlib import Path
 
 from adapters.cli.arguments import add_json, print_json
@@ -161,10 +162,20 @@ def run_fit(arguments: argparse.Namespace) -> int:
     if found.laws:
         agreeing = ", ".join(name for name, said in found.laws.items() if said.agrees)
         print(f"laws that agree to {fit.AGREE:.0%} of the increment: {agreeing or 'none'}")
-    low, high = fitted["band"]
-    print(f"settlement at cycle {to_cycle:.10g}: {fitted['prediction']:.6g} {unit}".rstrip())
-    said = f"  with probability {arguments.probability:g} in {low:.6g} ... {high:.6g} {unit}"
-    print(said.rstrip())
+    settled, low, high = round_to_band(fitted["prediction"], *fitted["band"])
+    print(f"settlement at cycle {to_cycle:.10g}: {settled} {unit}".rstrip(), end=", ")
+    if ahead == series.cycle.max(initial=0.0):
+        print("as read; --to-cycle predicts")
+    else:
+        print(f"with probability {arguments.probability:g} in {low} ... {high} {unit}".rstrip())
     if found.failure_excluded is False:
         print(f"  so that failure at {arguments.fail_at:g} is not excluded")
     return 0
+
+
+def round_to_band(value: float, low: float, high: float) -> list[str]:
+    """A value and its band to two digits of half the band; of a reading as it was given."""
+    if not 0 < high - low < inf:
+        return [f"{one:.6g}" for one in (value, low, high)]
+    digits = 1 - floor(log10((high - low) / 2))
+    return [f"{round(one, digits):.{max(digits, 0)}f}" for one in (value, low, high)]

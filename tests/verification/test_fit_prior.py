@@ -74,7 +74,9 @@ def test_fit_shows_its_formula_and_a_picture(tmp_path: Path, capsys) -> None:
     form = re.search(r"u\(N\) = (.*), N in cycles: from", said)[1].replace("^", "**")
     form = form.replace(" mm ((", " * ((").replace(" mm", "")
     predicted = float(re.search(r"at cycle 10000: (\S+) mm", said)[1])
-    assert eval(form, {"N": 1e4}) == pytest.approx(predicted, rel=1e-4)
+    assert eval(form, {"N": 1e4}) == pytest.approx(
+        predicted, abs=0.051
+    )  # a tenth is its last digit
     assert "<!-- band -->" in picture.read_text()
     assert main([*words, "hyperbolic"]) == 0
     assert re.search(r"N\).*\n.* mm\n.* mm\n  tau = \S+ cycles", capsys.readouterr().out)

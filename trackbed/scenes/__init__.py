@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from importlib.resources import files
 from pathlib import Path
+from textwrap import shorten
 
 from trackbed.run_verbs import find_scene_kind
 
-__all__ = ["find_scene_file", "find_scene_verb", "list_scenes", "read_template"]
+__all__ = ["find_scene_file", "find_scene_verb", "list_scenes", "read_template", "read_title"]
 
 
 def list_scenes() -> tuple[str, ...]:
@@ -22,6 +24,12 @@ def read_template(name: str) -> str:
     if name not in list_scenes():
         raise KeyError(f"no scene {name!r}; there are {', '.join(list_scenes())}")
     return (files(__name__) / f"{name}.toml").read_text(encoding="utf-8")
+
+
+def read_title(name: str) -> str:
+    """The first sentence of the comment that the scene ``name`` begins with."""
+    comment = " ".join(re.findall(r"^# (.*)", read_template(name).split("\n\n")[0], re.MULTILINE))
+    return shorten(re.split(r"\.\s+(?=[A-Z])|\.\s\s+|[:;.]$", comment)[0], 100, placeholder=" ...")
 
 
 def find_scene_file(name: str) -> Path:
