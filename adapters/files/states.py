@@ -1,4 +1,4 @@
-"""States in files: ``.npz`` of trackbed, ``.vtkhdf`` of ON-DEM, or a text dump of an engine."""
+"""States in files: ``.npz`` of trackbed, ``.vtkhdf`` of ON-DEM, a text dump of an engine, a run."""
 
 from __future__ import annotations
 
@@ -11,15 +11,20 @@ from adapters.errors import DumpError, UsageError
 from adapters.files.dump import EXTENSIONS, PACKED, Frame, write_dump
 from adapters.files.dump_reader import read_last_frame
 from adapters.files.ondem import ENDING, write_bodies
+from adapters.files.run_folder import RunFolder
+from adapters.files.window import load_window
 
 
 def read_state_file(path: Path, density: float) -> State:
-    """A state from ``path``: ``.npz`` as `adapters.bed.load_state`, else by `read_last_frame`.
+    """A state from ``path``: ``.npz`` as `adapters.bed.load_state`, a run folder by
+    `read_last_state`, else by `read_last_frame`.
 
     A dump needs the columns id, radius and places.  Without its own columns, a mass is that of a
     sphere of ``density`` [kg/m^3] and a velocity is zero; contacts and piston it has none.
     Raises `UsageError` and `DumpError`.
     """
+    if path.is_dir():
+        return read_last_state(path)
     if path.suffix == ".npz" and path.is_file():
         return load_state(path)
     frame = read_last_frame(path)
@@ -38,6 +43,19 @@ def read_state_file(path: Path, density: float) -> State:
         read_vectors("vx", "vy", "vz"), read_vectors("omegax", "omegay", "omegaz"),
         time_step=frame.time_step,
     )  # fmt: skip
+
+
+def read_last_state(run: Path) -> State:
+    """The bed at the end of the last finished stage of a run; raises `UsageError` for none."""
+    folder = RunFolder(run)
+    for name in reversed(folder.stage_names()):
+        if folder.outcome(name) is not None and not folder.failure(name):
+            if name.startswith("window"):
+                return load_window(run / name / "states.npz").state(-1)
+            return load_state(run / name / f"{'relaxed' if name[0] == 'j' else 'state'}.npz")
+    raise UsageError(
+        "no stage of a run is finished here", where=str(run), remedy="give a run folder, or a file"
+    )
 
 
 def check_state_name(path: Path) -> None:

@@ -30,7 +30,7 @@ from adapters.procedure.record import (
     read_run_record,
     read_track,
 )
-from adapters.procedure.run import record_scene, refuse_differences, refuse_unloaded
+from adapters.procedure.run import refuse_differences, refuse_unloaded
 from adapters.procedure.seating import SEATING, find_hung_cycles, format_spans
 from adapters.procedure.stages import settle_by
 from adapters.procedure.status import judge_progress, read_status
@@ -41,6 +41,6 @@ __all__ = [
     "estimate_mean", "estimate_sinking",
     "find_comparable_cycle", "find_hung_cycles", "find_speed_up", "format_spans", "judge_members",
     "judge_progress", "list_checks", "list_decisions", "list_jumped_spans", "make_plain",
-    "read_run_record", "read_status", "read_track", "record_scene", "refuse_differences",
-    "refuse_unloaded", "run", "settle_by", "sum_cost",
+    "read_run_record", "read_status", "read_track", "refuse_differences", "refuse_unloaded", "run",
+    "settle_by", "sum_cost",
 ]  # fmt: skip

@@ -22,11 +22,20 @@ from adapters.procedure.fixed import settle_fixed
 from adapters.procedure.progress import Progress, describe_plan, warn_without_jumps
 from adapters.procedure.record import MEMBERS, read_members, refuse_other_member
 from adapters.procedure.stages import Bed, Clock, Run, Variant
-from adapters.scene import Scene, bound_friction, draw_start, list_stages, load_scene
+from adapters.scene import (
+    INPUT_FILES,
+    Scene,
+    bound_friction,
+    copy_inputs,
+    draw_start,
+    list_stages,
+    load_scene,
+    record_scene,
+)
 from trackbed.memory import refuse_more_memory
 from trackbed.run_files import list_differences, record_provenance, refuse_writing, write_whole
 
-OWN_FILES = ("lock", "scene.toml", "load_series.csv", "form.toml", "dry_run")
+OWN_FILES = ("lock", *INPUT_FILES, "dry_run")
 """What may be in a run folder before its manifest is written."""
 STATE_BYTES = 500
 """Memory that a grain takes at each cycle end of a window, contacts and wall forces too [bytes]."""
@@ -205,7 +214,7 @@ def open_member(folder: RunFolder, scene: Scene, number: int) -> Iterator[RunFol
             refuse_other_member(whole, inner, number)
         else:
             refuse_strangers(inner)
-            for name in {"scene.toml", "load_series.csv", "form.toml"} & {*os.listdir(folder.path)}:
+            for name in {*INPUT_FILES} & {*os.listdir(folder.path)}:
                 shutil.copyfile(folder.path / name, inner.path / name)
         own = whole | {"members": 1, "member": number}
         write_whole(manifest, json.dumps(own, indent=1) + "\n")
@@ -261,20 +270,6 @@ def count_shared_cycles(folder: RunFolder, scene: Scene) -> int:
     return max(first, next(jumps, p.total_cycles))
 
 
-def record_scene(scene: Scene) -> dict[str, Any]:
-    """The effective parameters of a scene, as the manifest keeps them; a load series as values."""
-    record = scene.model_dump(mode="json")
-    if scene.loading is not None and scene.loading.samples is not None:
-        record["loading"]["series"] = {
-            name: values.tolist() for name, values in vars(scene.loading.samples).items()
-        }
-    if str(scene.sample.form).endswith(".toml"):
-        record["sample"]["form"] = {
-            name: getattr(scene.form, name).tolist() for name in ("place", "radius", "inertia")
-        }
-    return record
-
-
 def prepare_manifest(
     folder: RunFolder, scene: Scene, scene_path: Path, overrides: Sequence[str], control: bool,
     members: int,
@@ -299,14 +294,7 @@ def prepare_manifest(
         folder.add_event("resumed")
         return
     refuse_strangers(folder)
-    shutil.copyfile(scene_path, folder.path / "scene.toml")
-    kept = list(overrides)
-    if scene.loading is not None and scene.loading.series is not None:
-        shutil.copyfile(scene.loading.series, folder.path / "load_series.csv")
-        kept.append('loading.series="load_series.csv"')
-    if (form := str(scene.sample.form)).endswith(".toml"):
-        shutil.copyfile(form, folder.path / "form.toml")
-        kept.append('sample.form="form.toml"')
+    kept = [*overrides, *copy_inputs(scene, scene_path, folder.path)]
     manifest = {
         "scene": record_scene(scene), "overrides": kept, "control": control, "members": members,
         "provenance": record_provenance(sys.argv),

@@ -1,6 +1,7 @@
 """A settlement scene: its tables, its file, and what is checked before anything runs."""
 
 from adapters.scene.file import expand_schedule, load_scene
+from adapters.scene.inputs import INPUT_FILES, copy_inputs, record_scene
 from adapters.scene.model import list_omissions
 from adapters.scene.procedures import fill_procedure
 from adapters.scene.stages import bound_friction, draw_start, list_stages
@@ -8,6 +9,7 @@ from adapters.scene.tables import MEMBERS_MOST, Procedure, Scene
 from adapters.scene.values import flatten_keys
 
 __all__ = [
-    "MEMBERS_MOST", "Procedure", "Scene", "bound_friction", "draw_start", "expand_schedule",
-    "fill_procedure", "flatten_keys", "list_omissions", "list_stages", "load_scene",
+    "INPUT_FILES", "MEMBERS_MOST", "Procedure", "Scene", "bound_friction",
+    "copy_inputs", "draw_start", "expand_schedule", "fill_procedure", "flatten_keys",
+    "list_omissions", "list_stages", "load_scene", "record_scene",
 ]  # fmt: skip

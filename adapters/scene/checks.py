@@ -18,9 +18,10 @@ import numpy as np
 from adapters import laws, moves
 from adapters.bed import RadiusDistribution
 from adapters.bed.stones import SPHERE, find_form
-from adapters.errors import SceneError
+from adapters.errors import DumpError, SceneError, UsageError
 from adapters.files import read_load_series
 from adapters.scene import mechanics
+from adapters.scene.ballast import read_stored_bed
 from adapters.scene.values import Check, NotValid, Values, find_named_form, find_radii
 from trackbed.choices import explain_retired, find_choices
 from trackbed.scene_files import Problem, describe_error, suggest_word
@@ -32,6 +33,10 @@ ALTERNATIVES = (
     ("sample.grain_radius", "sample.grading"),
 )
 """Pairs of keys of which a scene gives exactly one."""
+STATE_KEY, STATE_HAS = "sample.state", tuple(
+    f"sample.{key}" for key in ("count", "fill_height", "grain_radius", "grading", "grading_scale")
+)  # fmt: skip
+"""A saved bed, and the keys of what it has by itself."""
 JUMP_KEYS, TOLERANCE_KEY = ("procedure.k", "procedure.h"), "procedure.tolerance"
 """Cycles computed and jumped by hand, and what stands instead."""
 OWNED = (
@@ -68,7 +73,7 @@ def _check_alternatives(scene: Values) -> Iterator[Problem]:
     for first, second in ALTERNATIVES:
         given = [key for key in (first, second) if scene.has(key)]
         name = second.rpartition(".")[2]
-        if not given:
+        if not given and not (first in STATE_HAS and scene.has(STATE_KEY)):
             yield Problem(first, f"missing: give this or {name}")
         elif len(given) == 2:
             yield Problem(first, f"give this or {name}, not both")
@@ -97,7 +102,7 @@ def _check_symmetry(scene: Values) -> Iterator[Problem]:
 
 def _check_grain_radius(scene: Values) -> Iterator[Problem]:
     radii = find_radii(scene)
-    if not isinstance(radii, RadiusDistribution):
+    if not isinstance(radii, RadiusDistribution) or scene.has(STATE_KEY):
         return
     key = "sample.grain_radius.standard_deviation"
     if radii.name == "constant" and radii.standard_deviation > 0:
@@ -111,6 +116,24 @@ def _check_grain_radius(scene: Values) -> Iterator[Problem]:
 def _check_grading_scale(scene: Values) -> Iterator[Problem]:
     if scene.has("sample.grading_scale") and not scene.has("sample.grading"):
         yield Problem("sample.grading_scale", "there is no sample.grading to scale")
+
+
+def _check_stored_bed(scene: Values) -> Iterator[Problem]:
+    if not scene.has(STATE_KEY):
+        return
+    for key in (*STATE_HAS, "sample.form"):
+        if scene.has(key):
+            yield Problem(key, "a saved bed has its own grains, spheres: leave it or state out")
+    for key, default in (("seed", 1), ("relative_density_start", 0.05)):
+        if scene.need(f"sample.{key}") != default:
+            yield Problem(f"sample.{key}", "nothing is drawn for a saved bed: leave it out")
+    try:
+        if read_stored_bed(scene.need(STATE_KEY)).orientation is not None:
+            yield Problem(STATE_KEY, "is a bed of stones: spheres alone can be taken over so far")
+    except (UsageError, DumpError) as error:
+        yield Problem(STATE_KEY, describe_error(error), error.where)
+    except OSError as error:
+        yield Problem(STATE_KEY, f"cannot be read ({error.strerror}): {scene.need(STATE_KEY)}")
 
 
 def _check_rain(scene: Values) -> Iterator[Problem]:
@@ -259,8 +282,8 @@ def _check_relaxation(scene: Values) -> Iterator[Problem]:
 
 CHECKS: tuple[Check, ...] = (
     _check_alternatives, *(partial(_check_owned_keys, *row) for row in OWNED), _check_symmetry,
-    _check_grain_radius, _check_grading_scale, _check_rain, _check_rolling, _check_form,
-    _check_series, _check_partial_piston, _check_crib, _check_stages, _check_procedure,
+    _check_grain_radius, _check_grading_scale, _check_stored_bed, _check_rain, _check_rolling,
+    _check_form, _check_series, _check_partial_piston, _check_crib, _check_stages, _check_procedure,
     _check_jumps, _check_settlement, _check_seating, _check_launcher,
     *(partial(_check_choice, *row) for row in CHOICES), _check_relaxation, *mechanics.CHECKS,
 )  # fmt: skip

@@ -9,7 +9,14 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from adapters.scene.checks import ALTERNATIVES, JUMP_KEYS, TOLERANCE_KEY, find_problems
+from adapters.scene.checks import (
+    ALTERNATIVES,
+    JUMP_KEYS,
+    STATE_HAS,
+    STATE_KEY,
+    TOLERANCE_KEY,
+    find_problems,
+)
 from adapters.scene.mechanics import DOUBTFUL
 from adapters.scene.procedures import fill_procedure, schedule_jumps
 from adapters.scene.tables import Procedure, Scene
@@ -25,9 +32,9 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
     ``overrides`` such as ``procedure.k=10`` replace or add keys, their values in TOML (a bare word
     is a string); an override of one of two alternative keys removes the other, one of
     procedure.tolerance k, h and another name, one of procedure.name all but total_cycles and
-    members.  Keys that follow from the procedure's name are put in
-    (`adapters.scene.procedures`).  A relative path of a load series counts from the scene file's
-    folder.
+    members, one of sample.state what that has by itself.  Keys that follow from the procedure's
+    name are put in (`adapters.scene.procedures`).  A relative path of a load series counts from
+    the scene file's folder.
 
     Raises `UsageError` when the file or an override can not be read, `SceneError` with all that is
     wrong: file, line, dotted key and sentence of each.
@@ -38,6 +45,8 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
     loading, sample, engine = (tables.get(name, {}) for name in ("loading", "sample", "engine"))
     if isinstance(loading.get("series"), str):
         loading["series"] = str(text.path.parent.absolute() / loading["series"])
+    if isinstance(sample.get("state"), str):
+        sample["state"] = str(text.path.parent.absolute() / sample["state"])
     if str(sample.get("form")).endswith(".toml"):
         sample["form"] = str(text.path.parent.absolute() / str(sample["form"]))
     if "procedure" in tables:
@@ -62,7 +71,8 @@ def _drop_alternatives(data: dict[str, Any], key: str) -> None:
     if key == TOLERANCE_KEY and "name" in data["procedure"]:
         data["procedure"] = {**data["procedure"], "name": "tolerance"}
     others = [other for pair in ALTERNATIVES if key in pair for other in pair if other != key]
-    for other in (*others, *(JUMP_KEYS if key == TOLERANCE_KEY else ())):
+    others += {TOLERANCE_KEY: JUMP_KEYS, STATE_KEY: STATE_HAS}.get(key, ())
+    for other in others:
         *tables, name = other.split(".")
         table = data
         for step in tables:

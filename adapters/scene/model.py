@@ -46,6 +46,8 @@ def _list_grains(scene: Scene) -> Iterator[str]:
 
 def _list_contacts(scene: Scene) -> Iterator[str]:
     grain = scene.material.grain
+    if scene.sample.state is not None:
+        yield "The saved bed's history: its grains settle from rest, contacts without springs."
     yield "Plastic and adhesive contacts: Hertz's law is elastic, for overlaps far below a radius."
     if grain.rolling_friction:
         yield "Spinning resistance: a grain may spin about the normal of its contact without end."

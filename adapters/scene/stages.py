@@ -5,14 +5,17 @@ from __future__ import annotations
 from itertools import pairwise
 
 from adapters.bed import FloatArray, draw_radii, draw_sample_start
+from adapters.scene.ballast import place_stored_bed, read_stored_bed
 from adapters.scene.procedures import fill_procedure
 from adapters.scene.tables import Scene
 
 
 def draw_start(scene: Scene) -> tuple[FloatArray, FloatArray, float]:
     """Centres (n, 3) and radii (n,) of a random start, and the height it fills [m]; of stones the
-    spheres around them find room."""
+    spheres around them find room.  Those of a saved bed where the scene names one."""
     sample, reach = scene.sample, scene.form.reach
+    if sample.state is not None:
+        return place_stored_bed(read_stored_bed(sample.state), scene.container)
     radius = draw_radii(sample.radii, scene.grain_count, sample.seed)
     position, height = draw_sample_start(
         reach * radius, scene.container, sample.relative_density_start, sample.seed

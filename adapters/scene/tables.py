@@ -35,8 +35,15 @@ from adapters.bed.stones import SPHERE, Form, find_form
 from adapters.files import LoadSeries, read_load_series
 from adapters.laws.fit import FIRST_WINDOW
 from adapters.moves import DEFAULT as MOVE_DEFAULT
-from adapters.scene.ballast import GradingKey, Stage, make_radii
+from adapters.scene.ballast import (
+    GradingKey,
+    Stage,
+    find_stored_radii,
+    make_radii,
+    read_stored_bed,
+)
 from adapters.scene.checks import find_problems, find_warnings
+from adapters.scene.materials import Material
 from adapters.scene.mechanics import COUNT_GREATEST
 from adapters.scene.values import flatten_keys
 from trackbed.scene_files import NonNegative, Positive, Table, Text
@@ -47,9 +54,6 @@ FLAT_WALLED = ("yade",)
 """Engines without a cylinder: planes tangent to it take its place."""
 
 Share = Annotated[float, Field(ge=1e-6, le=1, allow_inf_nan=False)]
-Poisson = Annotated[float, Field(ge=0, lt=0.5, allow_inf_nan=False)]
-Restitution = Annotated[float, Field(gt=0.05, le=1, allow_inf_nan=False)]
-ViscousAlpha = Annotated[float, Field(ge=0, lt=contact_law.find_alpha(0.05), allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=1, le=COUNT_GREATEST)]
 MEMBERS_MOST = 1000
 """Members of a run at most: the mean of so many is known to 5 % of what they differ by."""
@@ -97,43 +101,19 @@ class Sample(Table):
     """Form of the grains, a name or a file (`adapters.bed.stones.find_form`); radii and sieves are
     those of the sphere of the same volume.  None: spheres."""
 
+    state: Text | None = None
+    """File or run folder of a saved bed (`adapters.files.read_state_file`), in place of the rain:
+    its places and radii, at rest; a relative path counts from the scene file's folder."""
+
     @property
     def radii(self) -> Radii:
         """Radii of the grains, with their bounds and moments."""
+        if self.state is not None:
+            return find_stored_radii(self.state)
         if self.grading is not None:
             return make_radii(self.grading, self.grading_scale)
         assert self.grain_radius is not None
         return self.grain_radius.law
-
-
-class GrainMaterial(Table):
-    """Material of the grains."""
-
-    young: Positive  # Young's modulus [Pa]
-    poisson: Poisson  # Poisson's ratio [-]
-    density: Positive  # mass density [kg/m^3]
-    viscous_alpha: ViscousAlpha | None = None  # coefficient alpha_n = alpha_t of eq. 7 [-]
-    restitution: Restitution | None = None
-    """Coefficient of restitution [-], instead of ``viscous_alpha``."""
-    friction: NonNegative  # Coulomb's coefficient between grains [-]
-    rolling_friction: Positive | None = None
-    """Greatest torque that resists rolling between grains over R* F_n [-]; None: no resistance."""
-
-
-class WallMaterial(Table):
-    """Material of floor, walls and piston; symmetry planes are rigid and frictionless."""
-
-    young: Positive  # Young's modulus [Pa]
-    poisson: Poisson  # Poisson's ratio [-]
-    friction: NonNegative  # Coulomb's coefficient between grain and wall [-]
-    rolling_friction: Positive | None = None  # as that of grains [-], with R* = R
-
-
-class Material(Table):
-    """Materials of grains and walls."""
-
-    grain: GrainMaterial
-    wall: WallMaterial
 
 
 class Loading(Table):
@@ -383,7 +363,9 @@ class Scene(Table):
 
     @property
     def grain_count(self) -> int:
-        """Number of grains; from ``fill_height`` where that is given."""
+        """Number of grains; from ``fill_height`` or a saved bed where that is given."""
+        if self.sample.state is not None:
+            return len(read_stored_bed(self.sample.state).radius)
         if self.sample.count is not None:
             return self.sample.count
         assert self.sample.fill_height is not None

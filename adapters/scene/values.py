@@ -7,8 +7,8 @@ from typing import Any
 
 from adapters.bed import Container, Radii, RadiusDistribution
 from adapters.bed.stones import Form, find_form
-from adapters.errors import SceneError
-from adapters.scene.ballast import make_radii
+from adapters.errors import DumpError, SceneError, UsageError
+from adapters.scene.ballast import find_stored_radii, make_radii
 from trackbed.scene_files import Problem
 
 
@@ -66,11 +66,18 @@ def flatten_keys(table: dict[str, Any], prefix: str = "") -> dict[str, Any]:
 
 def name_radii(scene: Values) -> str:
     """The key that says how large grains are."""
+    if scene.has("sample.state"):
+        return "sample.state"
     return "sample.grading" if scene.has("sample.grading") else "sample.grain_radius.mean"
 
 
 def find_radii(scene: Values) -> Radii:
     """The radii of the grains, whether they make sense or not."""
+    if scene.has("sample.state"):
+        try:
+            return find_stored_radii(scene.need("sample.state"))
+        except (OSError, UsageError, DumpError) as error:
+            raise NotValid from error
     if scene.has("sample.grading"):
         return make_radii(scene.need("sample.grading"), scene.get("sample.grading_scale"))
     table = "sample.grain_radius."

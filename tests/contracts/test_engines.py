@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from adapters.bed.state import State, save_state
 from adapters.engines.contract import Engine, get_engine, list_engines, list_real_engines
 from adapters.errors import EngineMissing, SceneError
 from adapters.files.run_folder import RunFolder
@@ -29,9 +30,11 @@ SCENES = {
     "loads in stages, series of stress": ("ballast", (
         "loading.stage=[{from_cycle=9,amplitude=1e5,mean=6e4,frequency=9.0}]",)),
     "less friction while it rains": ("ballast", ("sample.rain_friction=0.1",)),
+    "a bed from a saved state": ("ballast", ('sample.state="BED"',)),
     "stones of several spheres": ("karrech-coarse", ('sample.form="tetrahedron"',)),
 }  # fmt: skip
-"""Scene and keys of each row of the page's table; decks of the user's own are no scene of these."""
+"""Scene and keys, BED a saved one, of each row of the page's table; decks of the user's own are no
+scene of these."""
 every_engine = pytest.mark.parametrize("name", list_engines())
 
 
@@ -65,6 +68,9 @@ def test_places_in_auto_differ() -> None:
 def test_the_page_says_what_each_engine_takes(row: str, tmp_path: Path) -> None:
     """An engine takes a scene when it writes the rain of it."""
     kind, keys = SCENES[row]
+    place, radius, still = np.array([[0.1, 0.1, 0.02]]), np.array([0.02]), np.zeros((1, 3))
+    save_state(State(np.array([1]), place, radius, radius, still, still), bed := tmp_path / "b.npz")
+    keys = tuple(key.replace("BED", str(bed)) for key in keys)
     words = []
     for name in sorted(list_real_engines()):
         try:

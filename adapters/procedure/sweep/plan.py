@@ -17,8 +17,8 @@ from typing import Any
 
 from adapters.errors import SceneError, UsageError
 from adapters.files import RunFolder
-from adapters.procedure import record_scene, refuse_differences, refuse_unloaded
-from adapters.scene import flatten_keys, load_scene
+from adapters.procedure import refuse_differences, refuse_unloaded
+from adapters.scene import flatten_keys, load_scene, record_scene
 from trackbed.run_files import MANIFEST, read_object
 from trackbed.run_verbs import SETTLEMENT, Kind, find_file_kind
 
