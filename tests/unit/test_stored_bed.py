@@ -68,6 +68,7 @@ DEEP = [
     (slice(2, 3), (-0.16e-3, 0.0, 0.0), "1 contacts of 3 grains"),
     (slice(2, 3), (-0.16e-3, 0.0, 0.0), "of grain 5 with grain 7, by 0.0537"),
     (slice(0, 1), (0.0, 0.0, -0.12e-3), "of grain 2 with the scene's walls or floor, by 0.06"),
+    (slice(0, 1), (0.0, -1.3189e-3, 0.0), "of grain 2 with grain 5, by 0.055"),
     (slice(0, 3), (0.0, 0.0, -1.0), "3 contacts of 3 grains"),
 ]
 
