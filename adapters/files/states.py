@@ -23,7 +23,7 @@ def read_state_file(path: Path, density: float) -> State:
     sphere of ``density`` [kg/m^3] and a velocity is zero; contacts and piston it has none.
     Raises `UsageError` and `DumpError`.
     """
-    if path.is_dir():
+    if path.is_dir() and RunFolder(path).stage_names():
         return read_last_state(path)
     if path.suffix == ".npz" and path.is_file():
         return load_state(path)

@@ -53,7 +53,7 @@ CONTRADICT = [
     ("sample.radius=2e-3", "radii up to 0.003 m do not fit"),
     ('sample.state="nowhere.npz"', "state: cannot be read (No such file or directory)"),
     (f'sample.state="{COARSE}"', "state: this is a scene, no series and no state"),
-    (f'sample.state="{COARSE.parent}"', "state: no stage of a run is finished here"),
+    (f'sample.state="{COARSE.parent}"', "state: the dump cannot be opened (Is a directory)"),
 ]
 
 
