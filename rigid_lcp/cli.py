@@ -52,7 +52,13 @@ def _format_value(value: Any) -> str:
 
 def _preview_run(file: SceneFile) -> dict[str, Any]:
     """What a run would be: bodies, steps, about what they cost, what is left out."""
-    from rigid_lcp.scene import count_unknowns, list_left_out, make_simulation, plan_steps
+    from rigid_lcp.scene import (
+        count_unknowns,
+        describe_scans,
+        list_left_out,
+        make_simulation,
+        plan_steps,
+    )
 
     _, run = make_simulation(file)
     tables = file.tables.run
@@ -67,6 +73,7 @@ def _preview_run(file: SceneFile) -> dict[str, Any]:
         "unknowns_a_contact": count_unknowns(file),
         "frames": tables.frames,
         "estimated_s": seconds * steps,
+        **describe_scans(file),
         "left_out": list_left_out(file),
     }
 
@@ -78,6 +85,8 @@ def _run(file: SceneFile, path: Path, arguments: argparse.Namespace) -> dict[str
     from trackbed.run_files import make_manifest, open_run, write_result
 
     folder, manifest = RunFolder(path), make_manifest(file.tables.model_dump(mode="json"))
+    if file.digests:  # older runs without files still go on
+        manifest["files"] = file.digests
     given = {"resume": arguments.resume, "force": arguments.force}
     if finished := folder.look_ahead(manifest, **given):
         return finished | {"folder": str(path)}

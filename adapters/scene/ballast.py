@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
-from pydantic import BeforeValidator, Field
+from pydantic import Field
 
 from adapters.bed import (
     OVERLAP_BOUND,
@@ -21,39 +21,7 @@ from adapters.bed import (
 )
 from adapters.errors import SceneError
 from adapters.files import read_state_file
-from trackbed.scene_files import GRADINGS, Grading, NonNegative, Positive, Table, suggest_word
-
-Sieves = tuple[tuple[float, float], ...]
-"""Side of each sieve's hole [mm], and mass that passes it [%]."""
-
-
-def make_grading(key: str | Sieves) -> Grading:
-    """The curve of a standard's name or of a table; raises ValueError for neither, SceneError."""
-    if isinstance(key, str):
-        if key not in GRADINGS:
-            raise ValueError(f"unknown grading {key!r}{suggest_word(key, GRADINGS)}")
-        return GRADINGS[key]
-    sieves, percent = np.array(key, float).reshape(-1, 2).T
-    if sieves.max(initial=0.0) < 0.1:
-        raise ValueError(f"sieves are given in mm, and the coarsest would be {sieves.max():g} mm")
-    return Grading(sieves / 1e3, percent / 100)
-
-
-def read_grading(key: Any) -> str | Sieves:
-    """The key, tables as tuples; raises ValueError with a sentence where it is no grading."""
-    try:
-        if not isinstance(key, str):
-            key = tuple((float(sieve), float(percent)) for sieve, percent in key)
-        make_grading(key)
-    except (TypeError, SceneError) as error:
-        raise ValueError(
-            "must be a standard's name or [[sieve in mm, passing in %], ...] with sieves that grow"
-            f" and percentages that grow from 0 to 100, not {key!r:.60}"
-        ) from error
-    return key
-
-
-GradingKey = Annotated[str | Sieves, BeforeValidator(read_grading)]
+from trackbed.scene_files import NonNegative, Positive, Sieves, Table, make_grading
 
 
 class Stage(Table):

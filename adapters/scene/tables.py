@@ -35,18 +35,12 @@ from adapters.bed.stones import SPHERE, Form, find_form
 from adapters.files import LoadSeries, read_load_series
 from adapters.laws.fit import FIRST_WINDOW
 from adapters.moves import DEFAULT as MOVE_DEFAULT
-from adapters.scene.ballast import (
-    GradingKey,
-    Stage,
-    find_stored_radii,
-    make_radii,
-    read_stored_bed,
-)
+from adapters.scene.ballast import Stage, find_stored_radii, make_radii, read_stored_bed
 from adapters.scene.checks import find_problems, find_warnings
 from adapters.scene.materials import Material
 from adapters.scene.mechanics import COUNT_GREATEST
 from adapters.scene.values import flatten_keys
-from trackbed.scene_files import NonNegative, Positive, Table, Text
+from trackbed.scene_files import GradingKey, NonNegative, Positive, Table, Text
 
 TRACK_SAMPLES = 100
 """Least number of samples of the piston's record in a cycle."""

@@ -2,8 +2,7 @@
 
 from qdem_fem.grains.hulls import GrainRecipe
 from qdem_fem.grains.measures import find_edge_angles, find_surface_edges
-from qdem_fem.grains.sets import GrainSet, make_grains, save_grains
-from qdem_fem.grains.sizes import BALLAST
+from qdem_fem.grains.sets import BALLAST, GrainSet, make_grains, save_grains
 
 __all__ = [
     "BALLAST", "GrainRecipe", "GrainSet", "find_edge_angles", "find_surface_edges",

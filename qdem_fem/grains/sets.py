@@ -17,13 +17,14 @@ import numpy as np
 from qdem_fem.files import Floats, Integers, MeshError
 from qdem_fem.grains.hulls import GrainForm, GrainRecipe
 from qdem_fem.grains.meshing import make_grain_tetrahedra
-from qdem_fem.grains.sizes import BALLAST, find_sieve_size
 from qdem_fem.mesh import TetMesh
 from trackbed.choices import find_choice
 from trackbed.memory import read_arrays, refuse_more_memory
 from trackbed.run_files import write_whole
-from trackbed.scene_files import Grading, draw_sizes
+from trackbed.scene_files import GRADINGS, Grading, draw_sizes, find_sieve_size
 
+BALLAST = GRADINGS["EN 13450 31.5/50"]
+"""What grains follow where nothing else is asked for."""
 GRAINS_FORMAT = 1
 
 

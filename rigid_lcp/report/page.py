@@ -68,6 +68,7 @@ def write_report(
             "ended without restitution, which costs energy."
         )
     said = [(name, form.format(summary[key])) for name, key, form in ROWS if key in summary]
+    said += [("scan", each) for each in summary.get("scans", ())]
     return write_run_page(
         folder.path, summary["title"] or "Rigid grains", claim, figures, said, summary["left_out"],
         manifest["provenance"],

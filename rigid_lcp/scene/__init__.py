@@ -4,6 +4,7 @@ from rigid_lcp.scene.file import SceneFile, list_doubts, load_scene
 from rigid_lcp.scene.run import (
     RunFolder,
     count_unknowns,
+    describe_scans,
     list_left_out,
     make_simulation,
     plan_steps,
@@ -16,7 +17,7 @@ from rigid_lcp.scene.run import (
 from rigid_lcp.scene.simulation import Simulation
 
 __all__ = [
-    "RunFolder", "SceneFile", "Simulation", "count_unknowns", "list_doubts",
+    "RunFolder", "SceneFile", "Simulation", "count_unknowns", "describe_scans", "list_doubts",
     "list_left_out", "load_scene", "make_simulation", "plan_steps", "read_frame", "read_history",
     "rebuild_frame_scene", "run_scene", "summarise_run",
 ]  # fmt: skip

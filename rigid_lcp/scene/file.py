@@ -13,13 +13,32 @@ from scipy.spatial import cKDTree
 
 from rigid_lcp import shapes
 from rigid_lcp.arrays import Floats
-from rigid_lcp.errors import ShapeError
+from rigid_lcp.errors import SceneError, ShapeError
 from rigid_lcp.motion import Loads, Motion, Scene
-from rigid_lcp.scene.types import BodyTable, Grains, Load, SceneTables, find_faults
+from rigid_lcp.scene.types import (
+    BodyTable,
+    Grains,
+    Load,
+    Poured,
+    SceneTables,
+    Stones,
+    find_faults,
+)
+from trackbed.errors import MeshError
 from trackbed.plausible import describe_implausible
-from trackbed.scene_files import Guide, read_scene
+from trackbed.scene_files import (
+    Guide,
+    Problem,
+    describe_error,
+    draw_sizes,
+    make_grading,
+    read_scene,
+    refuse_outside_limits,
+)
 
 GUIDE = Guide("pile", "run.duration=0.1")
+ENDINGS = (".stl", ".obj", ".ply")
+"""Of mesh files, in a folder of them."""
 GRID_SPACING = 1.05
 """Distance of the grid points of grains over their largest diameter."""
 
@@ -30,6 +49,14 @@ class SceneFile:
 
     text: str
     tables: SceneTables
+    scans: tuple[tuple[shapes.Scan, ...], ...] = ()
+    """Of each table of ``stones``, its mesh files as they were read."""
+    unused: tuple[str, ...] = ()  # sentences on files that are no meshes, in folders of meshes
+
+    @property
+    def digests(self) -> dict[str, str]:
+        """Digests of the mesh files, by name."""
+        return {str(scan.path): scan.digest for scans in self.scans for scan in scans}
 
 
 def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> SceneFile:
@@ -44,7 +71,45 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> SceneFile:
     text.refuse(text.problems)
     tables = SceneTables.model_validate(text.data)
     text.refuse(find_faults(tables))
-    return SceneFile(text.text, tables)
+    scans, unused = [], []
+    for number, stones in enumerate(tables.stones or ()):
+        try:
+            paths, others = find_meshes(stones, text.path.parent)
+            scans.append(tuple(read_scans(stones, paths)))
+            unused += others
+        except (MeshError, ShapeError) as error:
+            text.problems.append(
+                Problem(f"stones.{number}.mesh", describe_error(error), error.where)
+            )
+    text.refuse(text.problems)
+    return SceneFile(text.text, tables, tuple(scans), tuple(unused))
+
+
+def find_meshes(stones: Stones, folder: Path) -> tuple[list[Path], list[str]]:
+    """Mesh files of a table, whose paths are from ``folder``, and what is not used of folders."""
+    paths: list[Path] = []
+    unused: list[str] = []
+    for path in (folder / name for name in stones.mesh):
+        inside = sorted(path.glob("[!.]*"))
+        meshes = [one for one in inside if one.suffix.lower() in ENDINGS]
+        paths += meshes or [path]
+        if meshes and (others := [one.name for one in inside if one not in meshes]):
+            unused.append(f"{path}: not used, as no {', '.join(ENDINGS)}: {', '.join(others)}")
+    return paths, unused
+
+
+def read_scans(stones: Stones, paths: Sequence[Path]) -> Iterator[shapes.Scan]:
+    """The scans of a table.  Raises as `rigid_lcp.shapes.read_scan`, and `ShapeError` for a hull
+    with too much volume that the scan has not."""
+    for path in paths:
+        scan = shapes.read_scan(path, stones.unit, stones.corners)
+        if scan.hull.volume > stones.hull_excess:
+            raise ShapeError(
+                f"its convex hull has {scan.hull.volume:.1%} more volume, above hull_excess",
+                where=str(path),
+                remedy="raise hull_excess, or cut the stone into convex parts and give one a file",
+            )
+        yield scan
 
 
 def build_scene(file: SceneFile) -> Scene:
@@ -74,7 +139,48 @@ def build_scene(file: SceneFile) -> Scene:
             scene.add(
                 shape, density=grains.density, position=position, angle=angle, **merge(grains)
             )
+    for number, (stones, scans) in enumerate(zip(tables.stones or (), file.scans, strict=True)):
+        try:
+            for shape, position, angle in place_stones(stones, scans):
+                scene.add(
+                    shape, density=stones.density, position=position, angle=angle, **merge(stones)
+                )
+        except SceneError as error:
+            raise error.relocate(f"stones.{number}.grading") from error
     return scene
+
+
+def place_stones(
+    stones: Stones, scans: Sequence[shapes.Scan]
+) -> Iterator[tuple[shapes.Polyhedron, Floats, Floats]]:
+    """Shape, position (3,) [m] and quaternion (4,) of every scanned stone.
+
+    As many of each scan, whatever their size; on the grid of `place_grains`.  The same seed gives
+    the same stones.  Raises `SceneError` for fewer stones than meet the limits of a grading.
+    """
+    random, count = np.random.default_rng(stones.seed), stones.count
+    which = random.permutation(count) % len(scans)
+    sizes = np.array([scans[k].size for k in which])
+    if stones.grading is not None:
+        grading = make_grading(stones.grading)
+        sizes = draw_sizes(grading, count, random)
+        refuse_outside_limits(grading, sizes)
+    elif stones.size is not None:
+        sizes = random.uniform(stones.size[0], stones.size[1], count)
+    made = [scans[k].shape.scale(d / scans[k].size) for k, d in zip(which, sizes, strict=True)]
+    cell = 2 * GRID_SPACING * max(shape.reach for shape in made)
+    for shape, place in zip(made, lay_grid(stones, cell), strict=True):
+        yield shape, place, random.normal(size=4)
+
+
+def lay_grid(poured: Poured, cell: float) -> Iterator[Floats]:
+    """Middles (dim,) [m] of cells of a side [m], row by row from below, as many as bodies."""
+    low, high = np.array(poured.region_low), np.array(poured.region_high)
+    across = np.maximum(1, np.floor((high - low)[:-1] / cell).astype(int))
+    for number in range(poured.count):
+        place = np.array(np.unravel_index(number % across.prod(), across), dtype=float)
+        level = number // across.prod()
+        yield low + cell * np.append(place + 0.5, level + 0.5)
 
 
 def place_grains(grains: Grains, dim: int) -> Iterator[tuple[Any, Floats, Any]]:
@@ -84,13 +190,7 @@ def place_grains(grains: Grains, dim: int) -> Iterator[tuple[Any, Floats, Any]]:
     same grains.
     """
     random, draw = np.random.default_rng(grains.seed), shapes.get_shape(grains.shape)
-    low, high = np.array(grains.region_low), np.array(grains.region_high)
-    cell = GRID_SPACING * grains.size[1]
-    across = np.maximum(1, np.floor((high - low)[:-1] / cell).astype(int))
-    for number in range(grains.count):
-        place = np.array(np.unravel_index(number % across.prod(), across), dtype=float)
-        level = number // across.prod()
-        position = low + cell * np.append(place + 0.5, level + 0.5)
+    for position in lay_grid(grains, GRID_SPACING * grains.size[1]):
         diameter = random.uniform(grains.size[0], grains.size[1])
         corners = int(random.integers(grains.corners[0], grains.corners[1], endpoint=True))
         stone = draw(random, diameter, corners, dim)
@@ -142,14 +242,14 @@ def refuse_lost_vertices(given: Floats, shape: shapes.Polyhedron) -> None:
 def list_doubts(tables: SceneTables) -> list[str]:
     """Sentences on values that are likely in another unit than SI."""
     named: list[tuple[str, Any]] = [("surface", tables.surface)]
-    for kind in ("ground", "body", "grains"):
-        named += [(f"{kind}.{i}", one) for i, one in enumerate(getattr(tables, kind))]
+    for kind in ("ground", "body", "grains", "stones"):
+        named += [(f"{kind}.{i}", one) for i, one in enumerate(getattr(tables, kind) or ())]
     found: list[str | None] = []
     for key, one in named:
         for quantity in ("friction", "density"):
             if (value := getattr(one, quantity, None)) is not None:
                 found.append(describe_implausible(quantity, value, f"{key}.{quantity}"))
-        if isinstance(one, Grains):
+        if isinstance(one, Poured) and one.size:
             found.append(describe_implausible("grain", one.size[1], f"{key}.size"))
         if isinstance(one, BodyTable):
             size = 2 * (one.radius or 0.0) if one.vertices is None else float(

@@ -120,6 +120,7 @@ class RunFolder(run_folder.RunFolder):
         "picture-*.png", "movie.gif", ".*.partial",
     )  # fmt: skip
     states = "frame_*.npz"
+    compared = ("scene", "files")
 
     def write_frame(self, number: int, run: Simulation, cpu: float) -> None:
         """Keep the state of a run as frame ``number``; ``cpu``: processor time so far [s].
@@ -254,7 +255,13 @@ def count_unknowns(file: SceneFile) -> int:
 def _has_any(file: SceneFile, property_: str) -> bool:
     tables = file.tables
     bodies: list[Any] = [tables.surface, *tables.ground, *tables.body, *tables.grains]
-    return any(getattr(body, property_) for body in bodies)
+    return any(getattr(body, property_) for body in (*bodies, *(tables.stones or ())))
+
+
+def describe_scans(file: SceneFile) -> dict[str, list[str]]:
+    """How scanned stones differ from their scans, a sentence each; nothing without any."""
+    said = [scan.describe() for scans in file.scans for scan in scans]
+    return {"scans": [*said, *file.unused]} if said else {}
 
 
 def list_left_out(file: SceneFile) -> list[str]:
@@ -326,6 +333,6 @@ def summarise_run(
         }  # fmt: skip
     if run.breakage is not None:
         summary["broken"] = len(run.broken)
-    return summary | {
+    return summary | describe_scans(file) | {
         "frames": frames, "last_frame": FRAME.format(frames), "left_out": list_left_out(file),
     }  # fmt: skip

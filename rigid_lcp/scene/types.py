@@ -3,13 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
+from rigid_lcp.contact import MOST_EDGES
 from rigid_lcp.motion import BOUNDS, explain_step_limit
 from trackbed.choices import find_choices
-from trackbed.scene_files import Name, NonNegative, Positive, Problem, Real, Table, suggest_word
+from trackbed.scene_files import (
+    GradingKey,
+    LengthUnit,
+    Name,
+    NonNegative,
+    Positive,
+    Problem,
+    Real,
+    Table,
+    Text,
+    suggest_word,
+)
 
 Vector = Annotated[list[Real], Field(min_length=2, max_length=3)]
 VECTORS = (
@@ -17,7 +29,10 @@ VECTORS = (
 )  # fmt: skip
 """Keys whose values have one number a dimension."""
 Restitution = Annotated[Real, Field(ge=0, le=1)]
+Sizes = Annotated[list[Positive], Field(min_length=2, max_length=2)]
 Corners = Annotated[int, Field(le=1000)]
+MOST_CORNERS = (MOST_EDGES + 4) // 3
+"""Of a scanned stone: with n it has 3 n - 6 edges at most; a body may have `MOST_EDGES` - 2."""
 LEAST_OF_A_STEP = 1e-6
 """Shortest time between two frames in steps."""
 
@@ -96,34 +111,75 @@ class BodyTable(Table):
         return self
 
 
-class Grains(Table):
-    """Many irregular stones on a loose grid inside a region, to be poured."""
+def list_names(given: Any) -> Any:
+    """A name as a list of it."""
+    return [given] if isinstance(given, str) else given
+
+
+Meshes = Annotated[list[Text], BeforeValidator(list_names), Field(min_length=1)]
+
+
+class Poured(Table):
+    """Many bodies on a loose grid inside a region, at random angles, to be poured."""
 
     count: Annotated[int, Field(ge=1, le=100_000)]  # number of stones
-    size: Annotated[list[Positive], Field(min_length=2, max_length=2)]
-    """Smallest and largest diameter [m], uniform in between."""
+    size: Sizes | None = None
     region_low: Vector  # least corner [m] of ...
     region_high: Vector
     """Corners of the region that the grid fills from below [m]; higher if it does not suffice."""
     density: Positive  # as that of a body [kg/m^3]
-    corners: Annotated[list[Corners], Field(min_length=2, max_length=2)] = Field([5, 9])
-    """Fewest and most corners of a stone."""
-    shape: Annotated[str, AfterValidator(check_shape)] = "irregular"
-    """A file of `rigid_lcp.shapes` that draws stones."""
     seed: Annotated[int, Field(ge=0)] = 1  # of the stones
     friction: NonNegative | None = None  # by default that of ``surface`` [-]
     restitution: Restitution | None = None  # by default that of ``surface`` [-]
 
     @model_validator(mode="after")
-    def _check_order(self) -> Grains:
-        if self.size[0] > self.size[1]:
+    def _check_order(self) -> Self:
+        if self.size and self.size[0] > self.size[1]:
             raise ValueError("size is [smallest, largest]")
-        if not 3 <= self.corners[0] <= self.corners[1]:
-            raise ValueError("corners is [fewest, most], at least 3")
         if len(self.region_low) != len(self.region_high) or any(
             low >= high for low, high in zip(self.region_low, self.region_high, strict=True)
         ):
             raise ValueError("region_high must lie beyond region_low in every direction")
+        return self
+
+
+class Grains(Poured):
+    """Irregular stones, drawn at random."""
+
+    size: Sizes  # smallest and largest diameter [m], uniform in between
+    corners: Annotated[list[Corners], Field(min_length=2, max_length=2)] = Field([5, 9])
+    """Fewest and most corners of a stone."""
+    shape: Annotated[str, AfterValidator(check_shape)] = "irregular"
+    """A file of `rigid_lcp.shapes` that draws stones."""
+
+    @model_validator(mode="after")
+    def _check_corners(self) -> Grains:
+        if not 3 <= self.corners[0] <= self.corners[1]:
+            raise ValueError("corners is [fewest, most], at least 3")
+        return self
+
+
+class Stones(Poured):
+    """Scanned stones: convex hulls of closed surfaces, of as few corners as asked; in space."""
+
+    mesh: Meshes
+    """Mesh file, STL, OBJ or PLY, or a list of them, or a folder whose files of these endings are
+    taken: as many stones of each; paths from the scene's folder."""
+    unit: LengthUnit  # of the lengths in the files
+    grading: GradingKey | None = None
+    """Sieve sizes by a standard's name, or sieves [mm] with the mass that passes [%]; drawn by
+    mass."""
+    size: Sizes | None = None
+    """Or smallest and largest sieve size [m], uniform in between; the scan's own without both."""
+    corners: Annotated[int, Field(ge=4, le=MOST_CORNERS)] = 40
+    """Most corners of a stone: a hull of more is thinned to as many.  Their cost: docs/rigid.md."""
+    hull_excess: NonNegative = 0.25
+    """Most volume that a hull may have beyond its scan, over the scan's [-]."""
+
+    @model_validator(mode="after")
+    def _check_sizes(self) -> Stones:
+        if self.grading is not None and self.size is not None:
+            raise ValueError("give grading or size, or neither for the scan's own size")
         return self
 
 
@@ -177,6 +233,7 @@ class SceneTables(Table):
     ground: list[Ground] = Field([])
     body: list[BodyTable] = Field([])
     grains: list[Grains] = Field([])
+    stones: list[Stones] | None = None  # None, not empty: older runs without this key still go on
     load: list[Load] = Field([])
     wear: WearTable | None = None
     strength: StrengthTable | None = None
@@ -198,6 +255,8 @@ def find_faults(tables: SceneTables) -> Iterator[Problem]:
             yield Problem(f"load.{i}.body", f"there is no body {load.body}{near}")
         elif load.body in held:
             yield Problem(f"load.{i}.body", f"{load.body} is fixed, no load moves it")
+    if tables.stones and tables.dimensions == 2:
+        yield Problem("stones", "scanned stones are in 3 dimensions: give dimensions = 3")
     for i, grains in enumerate(tables.grains):
         if tables.dimensions == 3 and grains.corners[0] < 4:
             yield Problem(f"grains.{i}.corners", "a polyhedron has at least 4")
@@ -206,15 +265,16 @@ def find_faults(tables: SceneTables) -> Iterator[Problem]:
     size = tables.strength and (tables.strength.modulus, tables.strength.reference_volume)
     if size and (size[0] is None) != (size[1] is None):
         yield Problem("strength", "give both modulus and reference_volume, or neither")
-    if not tables.grains and all(body.fixed for body in tables.body):
-        yield Problem("", "no body can move: add a [[body]] with a density, or [[grains]]")
+    if not (tables.grains or tables.stones) and all(body.fixed for body in tables.body):
+        said = "no body can move: add a [[body]] with a density, [[grains]] or [[stones]]"
+        yield Problem("", said)
 
 
 def _find_wrong_sizes(tables: SceneTables) -> Iterator[Problem]:
     """Vectors that are not of the scene's dimensions."""
     vectors: list[tuple[str, Any]] = [("gravity", tables.gravity)]
-    for kind in ("ground", "body", "grains", "load"):
-        for i, table in enumerate(getattr(tables, kind)):
+    for kind in ("ground", "body", "grains", "stones", "load"):
+        for i, table in enumerate(getattr(tables, kind) or ()):
             vectors += [(f"{kind}.{i}.{name}", getattr(table, name, None)) for name in VECTORS]
             for k, vertex in enumerate(getattr(table, "vertices", None) or ()):
                 vectors.append((f"{kind}.{i}.vertices.{k}", vertex))

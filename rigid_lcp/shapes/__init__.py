@@ -24,13 +24,14 @@ from rigid_lcp.shapes.rotations import (
     rotate_back,
 )
 from rigid_lcp.shapes.round_grains import Disc, Sphere
+from rigid_lcp.shapes.scan import Scan, read_scan
 from trackbed.choices import find_choice
 
 __all__ = [
-    "FLATNESS", "Disc", "HalfSpace", "Polygon", "Polyhedron", "Sphere", "extract_quaternion",
-    "find_quaternion_rate", "get_shape", "make_box", "make_quaternion", "make_rotation",
-    "multiply_quaternions", "normalise", "require_real", "require_vector", "rotate",
-    "rotate_back", "vectors",
+    "FLATNESS", "Disc", "HalfSpace", "Polygon", "Polyhedron", "Scan", "Sphere",
+    "extract_quaternion", "find_quaternion_rate", "get_shape", "make_box", "make_quaternion",
+    "make_rotation", "multiply_quaternions", "normalise", "read_scan", "require_real",
+    "require_vector", "rotate", "rotate_back", "vectors",
 ]  # fmt: skip
 
 

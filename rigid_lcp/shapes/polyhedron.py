@@ -6,6 +6,7 @@ is turned is the state's business.
 
 from __future__ import annotations
 
+from copy import copy
 from functools import cached_property
 from typing import Self
 
@@ -19,6 +20,8 @@ from rigid_lcp.shapes.numbers import require_finite_shape, require_length, requi
 FLATNESS = 1e-9
 """Corners within this share of the size of a plane lie in it: round-off of coordinates is far
 below, and what a grain has for edges far above."""
+SCALING = {"vertices": 1, "distances": 1, "reach": 1, "width": 1, "volume": 3, "inertia": 5}
+"""Powers of length in what a polyhedron knows of itself."""
 
 
 def integrate_solid(points: Floats, triangles: Ints) -> tuple[float, Floats, Floats]:
@@ -54,7 +57,7 @@ class Polyhedron:
     dim = 3
 
     def __init__(self, points: ArrayLike) -> None:
-        triangles, corners = _find_hull(points)
+        triangles, corners = find_hull(points)
         found = integrate_solid(corners, triangles)
         self._set_fields(corners - found[1], triangles, found)
 
@@ -66,8 +69,17 @@ class Polyhedron:
         here is made again from its corners to the last bit.
         """
         made = cls.__new__(cls)
-        triangles, corners = _find_hull(vertices)
+        triangles, corners = find_hull(vertices)
         made._set_fields(corners, triangles, integrate_solid(corners, triangles))
+        return made
+
+    def scale(self, factor: float) -> Self:
+        """The same polyhedron ``factor`` [-] times as large, about its centre of mass; angles of
+        faces and names of corners, edges and faces stay."""
+        made = copy(self)
+        made.__dict__["edges"] = self.edges
+        for name, power in SCALING.items():
+            made.__dict__[name] = factor**power * getattr(self, name)
         return made
 
     def _set_fields(
@@ -135,7 +147,7 @@ def make_box(length: float, width: float, height: float) -> Polyhedron:
     return Polyhedron(corners * edges)
 
 
-def _find_hull(points: ArrayLike) -> tuple[Ints, Floats]:
+def find_hull(points: ArrayLike) -> tuple[Ints, Floats]:
     """Triangles of the convex hull, wound outwards, and the points that are its corners."""
     from scipy.spatial import ConvexHull, QhullError
 

@@ -32,13 +32,13 @@ from qdem_fem.grains.measures import (
     quarter_faces,
 )
 from qdem_fem.grains.meshing import find_radius_ratios, make_grain_tetrahedra
-from qdem_fem.grains.sets import GrainSet, load_grains, make_grains, save_grains
-from qdem_fem.grains.sizes import BALLAST, find_sieve_size
+from qdem_fem.grains.sets import BALLAST, GrainSet, load_grains, make_grains, save_grains
 from qdem_fem.mesh.surface import find_surface_faces
 from qdem_fem.mesh.tetrahedra import find_gradients
 from trackbed.command import main
 from trackbed.errors import SceneError
 from trackbed.scene_files.grading import Grading, draw_sizes
+from trackbed.scene_files.sieving import find_sieve_size
 
 CUBE = np.array([[i, j, k] for i in (0.0, 1.0) for j in (0.0, 1.0) for k in (0.0, 1.0)]) - 0.5
 TETRAHEDRON = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BeforeValidator
 
 from trackbed.errors import SceneError
+from trackbed.scene_files.reader import suggest_word
 
 Floats = NDArray[np.float64]
 
@@ -122,3 +125,36 @@ def refuse_outside_limits(grading: Grading, sizes: Floats) -> None:
             where="sample.grading",
             remedy="give more grains, another seed, or a table of sieves of your own",
         )
+
+
+Sieves = tuple[tuple[float, float], ...]
+"""Side of each sieve's hole [mm], and mass that passes it [%]."""
+
+
+def make_grading(key: str | Sieves) -> Grading:
+    """The curve of a standard's name or of a table; raises ValueError for neither, SceneError."""
+    if isinstance(key, str):
+        if key not in GRADINGS:
+            raise ValueError(f"unknown grading {key!r}{suggest_word(key, GRADINGS)}")
+        return GRADINGS[key]
+    sieves, percent = np.array(key, float).reshape(-1, 2).T
+    if sieves.max(initial=0.0) < 0.1:
+        raise ValueError(f"sieves are given in mm, and the coarsest would be {sieves.max():g} mm")
+    return Grading(sieves / 1e3, percent / 100)
+
+
+def read_grading(key: Any) -> str | Sieves:
+    """The key, tables as tuples; raises ValueError with a sentence where it is no grading."""
+    try:
+        if not isinstance(key, str):
+            key = tuple((float(sieve), float(percent)) for sieve, percent in key)
+        make_grading(key)
+    except (TypeError, SceneError) as error:
+        raise ValueError(
+            "must be a standard's name or [[sieve in mm, passing in %], ...] with sieves that grow"
+            f" and percentages that grow from 0 to 100, not {key!r:.60}"
+        ) from error
+    return key
+
+
+GradingKey = Annotated[str | Sieves, BeforeValidator(read_grading)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -14,6 +14,8 @@ Positive = Annotated[float, Field(ge=LEAST, le=1e18, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, le=1e18, allow_inf_nan=False)]
 NAME_PATTERN = r"^[\w.+-]{1,60}$"
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
+LengthUnit = Literal["m", "cm", "mm"]
+"""Of lengths in meshes."""
 Text = Annotated[str, Field(min_length=1, max_length=1000, pattern=r"^[^\x00]*$")]
 
 

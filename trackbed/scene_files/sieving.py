@@ -1,4 +1,4 @@
-"""Sizes of grains: the smallest square hole that each passes."""
+"""Sizes of stones: the smallest square hole that each passes."""
 
 from __future__ import annotations
 
@@ -8,11 +8,7 @@ from functools import cache
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from qdem_fem.files import Floats
-from trackbed.scene_files import GRADINGS
-
-BALLAST = GRADINGS["EN 13450 31.5/50"]
-"""What grains follow where nothing else is asked for."""
+from trackbed.scene_files.grading import Floats
 
 
 @dataclass(frozen=True)
