@@ -172,7 +172,7 @@ class Stones(Poured):
     size: Sizes | None = None
     """Or smallest and largest sieve size [m], uniform in between; the scan's own without both."""
     corners: Annotated[int, Field(ge=4, le=MOST_CORNERS)] = 40
-    """Most corners of a stone: a hull of more is thinned to as many.  Their cost: docs/rigid.md."""
+    """Most corners of a stone: a hull of more is thinned to as many (cost: docs/hard-grains.md)."""
     hull_excess: NonNegative = 0.25
     """Most volume that a hull may have beyond its scan, over the scan's [-]."""
 

@@ -52,7 +52,7 @@ class Scan:
         said = (
             f"{self.path.name}: {self.triangles:,} triangles"
             f"{', which faced inwards, turned' * self.turned}; its convex hull has "
-            f"{self.hull.volume:.2%} more volume and mass, moments of inertia "
+            f"{max(self.hull.volume, 0.0):.2%} more volume and mass, moments of inertia "
             f"{self.hull.inertia:.2%} and a centre {self.hull.centre:.2%} of a radius off; "
         )
         count = len(self.shape.vertices)
