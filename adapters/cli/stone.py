@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import get_args
 
 from adapters.errors import UsageError
-from trackbed.scene_files import LengthUnit
 
+UNITS = ("m", "cm", "mm")
+"""Of lengths in meshes, as in scenes: what names them there loads big libraries."""
 SPHERES_MOST = 200
 """Spheres of a stone at most: a bed of such stones costs as much as one of meshes."""
 
@@ -18,9 +18,7 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "mesh", metavar="MESH", type=Path, help="closed surface of triangles: STL, OBJ, PLY, ..."
     )
-    parser.add_argument(
-        "--unit", required=True, choices=get_args(LengthUnit), help="of the mesh's lengths"
-    )
+    parser.add_argument("--unit", required=True, choices=UNITS, help="of the mesh's lengths")
     parser.add_argument(
         "--spheres", metavar="N", type=int, default=8, help="spheres of the stone (default: 8)"
     )
