@@ -20,7 +20,6 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from trackbed.errors import LibraryMissing, MeshError
-from trackbed.scene_files import LengthUnit
 from trackbed.series_file import SI
 
 Floats = NDArray[np.float64]
@@ -119,7 +118,7 @@ class Surface:
     turned: bool  # whether all triangles of the file faced inwards
 
 
-def read_surface(path: str | os.PathLike[str], unit: LengthUnit) -> Surface:
+def read_surface(path: str | os.PathLike[str], unit: str) -> Surface:
     """The closed surface in a mesh file whose lengths are in ``unit``; polygons become triangles.
 
     Raises as `read_mesh_file`, and `MeshError` for a surface that does not bound one solid: open,
