@@ -119,7 +119,8 @@ class Surface:
 
 
 def read_surface(path: str | os.PathLike[str], unit: str) -> Surface:
-    """The closed surface in a mesh file whose lengths are in ``unit``; polygons become triangles.
+    """The closed surface in a mesh file whose lengths are in ``unit``, m, cm or mm; polygons become
+    triangles.
 
     Raises as `read_mesh_file`, and `MeshError` for a surface that does not bound one solid: open,
     in pieces, flat, with triangles that do not face alike, or one that crosses itself.
@@ -175,10 +176,9 @@ def read_surface(path: str | os.PathLike[str], unit: str) -> Surface:
 
 
 def find_crossing(points: Floats, triangles: Integers) -> Floats | None:
-    """A point (3,) of a closed surface behind which its inside is passed twice, or its outside.
+    """A point (3,) where a line enters a closed surface from its inside, or leaves it from outside.
 
-    None where no one of `LINES` along z, at random, leaves the surface anywhere but where it is
-    inside by having entered once.
+    None where each of `LINES` random lines along z enters and leaves the surface in turn.
     """
     corner = points[triangles]
     low, high = points.min(axis=0), points.max(axis=0)

@@ -12,7 +12,7 @@ from adapters.errors import UsageError
 from trackbed.run_files import MANIFEST, RESULT, read_object, refuse_links
 from trackbed.run_verbs import describe_run, find_kind, refuse_no_run
 
-HERE = ("run_folder", "next", "why", "digests", "provenance", "format")
+NO_RESULTS = ("run_folder", "next", "digests")
 """What differs between any two runs and is no result."""
 
 
@@ -70,7 +70,7 @@ def read_numbers(path: Path) -> dict[str, Any]:
         from adapters.procedure import judge_progress, make_plain
 
         result = make_plain(asdict(judge_progress(read_record(path))))
-    return dict(list_leaves({name: one for name, one in result.items() if name not in HERE}))
+    return dict(list_leaves({name: one for name, one in result.items() if name not in NO_RESULTS}))
 
 
 def list_leaves(content: Any, name: str = "") -> Iterator[tuple[str, Any]]:

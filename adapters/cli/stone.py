@@ -8,7 +8,7 @@ from pathlib import Path
 from adapters.errors import UsageError
 
 UNITS = ("m", "cm", "mm")
-"""Of lengths in meshes, as in scenes: what names them there loads big libraries."""
+"""Of lengths in meshes; those of scenes, `LengthUnit`, would load pydantic for ``--help``."""
 SPHERES_MOST = 200
 """Spheres of a stone at most: a bed of such stones costs as much as one of meshes."""
 

@@ -25,7 +25,7 @@ Solid = tuple[float, Floats, Floats]
 
 @dataclass(frozen=True)
 class Change:
-    """What one solid has that another has not."""
+    """How one solid differs from another."""
 
     volume: float  # over the other's, less 1 [-]
     centre: float  # way of the centre of mass over the radius of a sphere of the other's volume [-]
@@ -90,7 +90,7 @@ def read_scan(path: Path, unit: LengthUnit, corners: int) -> Scan:
 
 
 def compare_solids(solid: Solid, other: Solid) -> Change:
-    """What a solid has that another has not."""
+    """How a solid differs from another."""
     moments, wanted = (np.linalg.eigvalsh(one[2]) for one in (solid, other))
     apart = np.abs(moments / wanted - 1)
     radius = (3 * other[0] / (4 * np.pi)) ** (1 / 3)

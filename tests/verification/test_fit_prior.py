@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -73,10 +74,13 @@ def test_fit_shows_its_formula_and_a_picture(tmp_path: Path, capsys) -> None:
     said = capsys.readouterr().out
     form = re.search(r"u\(N\) = (.*), N in cycles: from", said)[1].replace("^", "**")
     form = form.replace(" mm ((", " * ((").replace(" mm", "")
-    predicted = float(re.search(r"at cycle 10000: (\S+) mm", said)[1])
-    assert eval(form, {"N": 1e4}) == pytest.approx(
-        predicted, abs=0.051
-    )  # a tenth is its last digit
+    shown = re.search(r"at cycle 10000: (\S+) mm, with probability 0.9 in (\S+) ... (\S+) mm", said)
+    assert main([*words, "auto", "--json"]) == 0
+    exact = json.loads(capsys.readouterr().out)
+    assert eval(form, {"N": 1e4}) == pytest.approx(exact["prediction"], rel=1e-4)
+    half_a_digit = 0.025 * (exact["band"][1] - exact["band"][0])  # the second of half the band
+    for number, value in zip(shown.groups(), (exact["prediction"], *exact["band"]), strict=True):
+        assert float(number) == pytest.approx(value, abs=half_a_digit)
     assert "<!-- band -->" in picture.read_text()
     assert main([*words, "hyperbolic"]) == 0
     assert re.search(r"N\).*\n.* mm\n.* mm\n  tau = \S+ cycles", capsys.readouterr().out)
