@@ -78,7 +78,7 @@ def read_mesh_file(path: str | os.PathLike[str], where: str) -> Any:
         raise MeshError(
             "it is a directory" if Path(path).is_dir() else "there is no such file",
             where=where,
-            remedy="give the path of a mesh file that meshio reads (.msh, .vtu, .inp, .mesh, ...)",
+            remedy="give the path of a mesh file that meshio reads (.msh, .vtu, .inp, .stl, ...)",
         )
     import meshio
 
