@@ -34,7 +34,7 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
 
 def run_line(arguments: argparse.Namespace) -> int:
     """Run a scene, or say what would run; the last line is the engineer's sentence."""
-    from track_line.scene import load_scene, preview_run
+    from track_line.scene import list_doubts, load_scene, preview_run
 
     _refuse_no_scene(arguments)
     settings, doubts = _fit_beds(arguments) if arguments.beds else ([], [])
@@ -42,6 +42,8 @@ def run_line(arguments: argparse.Namespace) -> int:
         return 0
     path = place_run(arguments)
     file = load_scene(arguments.scene, [*settings, *arguments.overrides])
+    for doubt in list_doubts(file):
+        print(f"warning: {doubt}", file=sys.stderr)
     answer = preview_run(file) if arguments.dry_run else _run(file, path, arguments, doubts)
     sentence = "" if arguments.json else answer.pop("sentence", "")
     print_fields(answer, arguments.json)

@@ -6,7 +6,10 @@ from dataclasses import dataclass
 from math import radians, tan
 from typing import Literal
 
-Quantity = Literal["friction", "density", "young", "grain", "body", "settlement", "strain"]
+Quantity = Literal[
+    "friction", "density", "young", "grain", "body", "settlement", "strain",
+    "bending", "line_mass", "stiffness", "mass", "axle", "speed", "level",
+]  # fmt: skip
 DEGREES = "an angle in degrees"
 
 
@@ -25,7 +28,8 @@ class Bounds:
 
 @dataclass(frozen=True)
 class PlausibleBounds:
-    """Between soft rubber and diamond, cork and gold, a grain of sand and a long bridge span."""
+    """Between soft rubber and diamond, cork and gold, a grain of sand and a long bridge span; of
+    lines, between a field railway's and ten times the heaviest there are."""
 
     friction: Bounds = Bounds(
         "friction", "", 0.0, 2.0, (0.05, 2.0), ((DEGREES, radians(1)), ("%", 0.01))
@@ -41,6 +45,19 @@ class PlausibleBounds:
     settlement: Bounds = Bounds("settlement", "m", 0.0, 1.0, (1e-5, 0.5), (("mm", 1e-3),))
     strain: Bounds = Bounds("strain", "", 0.0, 1.0, (1e-5, 0.5), (("%", 0.01),))
     body: Bounds = Bounds("body", "m", 0.0, 100.0, (1e-3, 100.0), (("mm", 1e-3), ("um", 1e-6)))
+    bending: Bounds = Bounds(
+        "bending stiffness", "N m^2", 1e4, 1e8, (1e5, 1e8), (("MN m^2", 1e6), ("kN m^2", 1e3))
+    )
+    line_mass: Bounds = Bounds("rail", "kg/m", 0.0, 200.0, (10.0, 100.0), (("g/m", 1e-3),))
+    stiffness: Bounds = Bounds(
+        "stiffness", "N/m", 1e4, 1e11, (1e6, 1e10), (("MN/m or kN/mm", 1e6), ("kN/m", 1e3))
+    )
+    mass: Bounds = Bounds("mass", "kg", 0.0, 1e4, (10.0, 1e3), (("g", 1e-3),))
+    axle: Bounds = Bounds(
+        "axle load", "N", 1e3, 1e6, (5e4, 5e5), (("kN", 1e3), ("t", 9.81e3), ("kg", 9.81))
+    )
+    speed: Bounds = Bounds("speed", "m/s", 0.0, 150.0, (5.0, 140.0), (("km/h", 1 / 3.6),))
+    level: Bounds = Bounds("limit of a level", "m", 1e-5, 0.1, (1e-4, 0.05), (("mm", 1e-3),))
 
 
 PLAUSIBLE = PlausibleBounds()

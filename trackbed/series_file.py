@@ -113,7 +113,9 @@ class Table:
         )
         raise UsageError(
             f"'{columns[place][row].strip()}' is not {kind}", where=self.where(row, names[place]),
-            remedy="below the header a row is a reading: leave out what is none"
+            remedy=("below the header a row is a reading: leave out what is none" if row else
+                    "a row of units has one word a column: write others into the header, such as "
+                    "settlement [mm], and their factors into the numbers")
             + (", and write no marks for thousands" if "," in columns[place][row] else ""),
         )  # fmt: skip
 

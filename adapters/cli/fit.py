@@ -148,8 +148,9 @@ def run_fit(arguments: argparse.Namespace) -> int:
         print(f"warning: {fall.why}\n  -> {fall.remedy}", file=sys.stderr)
     quantity: Quantity = "strain" if series.unit == "1" else "settlement"
     most = float(abs(series.settlement).max()) if series.unit in ("m", "1") else 0.0
-    if said := describe_implausible(quantity, most, series.where):
-        print(f"warning: {said}", file=sys.stderr)
+    for said in (describe_implausible(quantity, most, series.where), *series.doubts):
+        if said:
+            print(f"warning: {said}", file=sys.stderr)
     fitted = found.to_json()
     if arguments.json:
         print_json(fitted)
@@ -174,8 +175,10 @@ def run_fit(arguments: argparse.Namespace) -> int:
 
 
 def round_to_band(value: float, low: float, high: float) -> list[str]:
-    """A value and its band to two digits of half the band; of a reading as it was given."""
+    """A value and its band to two digits of half the band, or of the value where that is less; of a
+    reading as it was given."""
     if not 0 < high - low < inf:
         return [f"{one:.6g}" for one in (value, low, high)]
-    digits = 1 - floor(log10((high - low) / 2))
+    shown = min((high - low) / 2, abs(value) or inf)
+    digits = 1 - floor(log10(shown))
     return [f"{round(one, digits):.{max(digits, 0)}f}" for one in (value, low, high)]

@@ -14,7 +14,11 @@ from adapters.bed import FloatArray
 from adapters.errors import UsageError
 from adapters.files.dump import find_cell
 from adapters.files.settlement_table import SUFFIXES, Series, read_table_series
+from trackbed.plausible import describe_implausible
 from trackbed.run_verbs import find_kind
+
+THROWN = 10.0
+"""Way of a grain over the greatest of all others, above which it is no part of the bed [-]."""
 
 
 def make_too_few_error(
@@ -94,7 +98,8 @@ def read_dump_series(paths: Sequence[Path], steps_per_cycle: float | None = None
     steps: list[int] = []
     heights: list[float] = []
     grains: FloatArray | None = None
-    before = np.empty(0)
+    identifiers = first = before = np.empty(0)
+    widest = 0.0
     for path in sorted(paths, key=_make_sort_key):
         for frame in read_frames(path):
             where = f"{path}, time step {frame.time_step}"
@@ -114,19 +119,43 @@ def read_dump_series(paths: Sequence[Path], steps_per_cycle: float | None = None
                     remedy="name the files so that their numbers ascend with time",
                 )  # fmt: skip
             steps.append(frame.time_step)
-            plain = "z" in frame.columns and not {"iz", "zu"} & set(frame.columns)
+            folded = not {"iz", "zu", "zsu"} & set(frame.columns)
+            plain = folded and "z" in frame.columns
             height = frame.column("z") if plain else frame.find_centres()[:, 2]
-            if plain and len(steps) > 1 and frame.boundary.split()[-1:] == ["pp"]:
+            if folded and len(steps) > 1 and frame.boundary.split()[-1:] == ["pp"]:
                 _refuse_folded(
                     identifiers, height - before, find_cell(frame.bounds)[1][2, 2], where
                 )
             before = height
+            first = height if len(steps) == 1 else first
             heights.append(float(height.mean()))
+            if "radius" in frame.columns:
+                widest = 2 * float(frame.column("radius").max())
     if steps_per_cycle is None:
         cycle = np.arange(len(steps), dtype=float)
     else:
         cycle = np.array(steps) / steps_per_cycle
-    return Series(cycle, heights[0] - np.array(heights))
+    doubts = (
+        describe_implausible("grain", widest, str(paths[0])) if widest else None,
+        describe_thrown(identifiers, first - before),
+    )
+    return Series(cycle, heights[0] - np.array(heights), doubts=tuple(filter(None, doubts)))
+
+
+def describe_thrown(grains: FloatArray, sunk: FloatArray) -> str | None:
+    """A sentence on a grain that makes most of what the mean of grains (n,) sank by, (n,) [m]; None
+    where none does."""
+    others = sunk - np.median(sunk)
+    most = int(np.argmax(np.abs(others)))
+    if len(sunk) < 3 or abs(others[most]) <= 0.5 * abs(float(sunk.sum())):
+        return None
+    rest = float(np.abs(np.delete(sunk, most)).max())
+    if abs(sunk[most]) <= THROWN * rest:
+        return None
+    return (
+        f"grain {grains[most]:g} alone makes most of this settlement: it sank by {sunk[most]:.3g} "
+        f"m, and no other moved by more than {rest:.3g} m; leave it out if it left the bed"
+    )
 
 
 def _refuse_folded(grains: FloatArray, rise: FloatArray, period: float, where: str) -> None:

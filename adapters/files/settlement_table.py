@@ -31,15 +31,16 @@ class Series:
     where: str = ""  # file or folder it was read from, for errors
     left_out: int = 0  # rows that `keep_from` and `restart_after` left out
     columns: str = ""  # columns of a table that were taken, and the line that names them, to tell
+    doubts: tuple[str, ...] = ()  # what is hardly meant, a sentence each
 
     @property
     def sinks_from(self) -> float | None:
-        """First reading of what is a height: it sinks towards zero, at least by four fifths of all
-        it moves, and has not got there; None for a settlement, which begins at zero and grows."""
-        first, moved = float(self.settlement[0]), np.diff(self.settlement)
-        down, lowest = -float(moved.sum()), float(self.settlement.min())
-        falls = down > 0.8 * float(np.abs(moved).sum())
-        return first if len(moved) > 2 and falls and lowest > 0 else None
+        """First reading of what is a height: it begins above zero and has sunk by four fifths of
+        the range of all readings; None for a settlement, which begins at zero and grows."""
+        if len(self.settlement) < 3:
+            return None
+        first, span = float(self.settlement[0]), float(np.ptp(self.settlement))
+        return first if first - self.settlement[-1] > 0.8 * span and first > 0.2 * span else None
 
     def keep_from(self, cycle: float) -> Series:
         """The rows from the user's ``cycle`` on, to leave out a bedding-in that no law describes.
@@ -80,6 +81,8 @@ SETTLEMENT_NAMES = {
 one; of other columns, and of a table without a header, it is then not known."""
 KINDS = ("computed", "healing", "jumped")
 """What a row of a run's table may be; only computed ones are data for a law."""
+STRAY = 10.0
+"""Distance of a reading from all others over their range, above which it is none [-]."""
 REMEDY = (
     "the first line names the columns, such as cycle,settlement or cycle,settlement_mm (units are "
     "m, cm, mm, um, %); for other names: --columns CYCLE SETTLEMENT"
@@ -143,11 +146,30 @@ def read_table_series(path: Path, names: Sequence[str] = (), unit: str | None = 
             where=table.where(second, "cycle"),
             remedy="keep one reading of a cycle; a file for each stage whose count starts again",
         )
+    _refuse_stray_reading(table, settlement, order, title)
     source = ""
     if table.header:
         source = " and ".join(table.header[place] for place in places)
         source += f", named in line {table.header_line}" + (" with units below" * bool(table.units))
     return Series(cycle, settlement, unit or UNKNOWN, columns=source)
+
+
+def _refuse_stray_reading(
+    table: Table, settlement: FloatArray, order: NDArray[np.intp], title: str
+) -> None:
+    """Refuse a reading that lies `STRAY` ranges of all others away, as loggers write -999 for none;
+    the first may, as a bed finds its seat, and the last one downwards, as it fails."""
+    extremes = (int(settlement.argmin()), int(settlement.argmax())) if len(settlement) > 4 else ()
+    for row in extremes:
+        others = np.delete(settlement, row)
+        away = float(np.abs(others - settlement[row]).min(initial=np.inf))
+        failed = row == len(settlement) - 1 and settlement[row] > others.max()
+        if row > 0 and not failed and 0 < STRAY * float(np.ptp(others)) < away:
+            raise UsageError(
+                f"{settlement[row]:g} is no neighbour of the other readings, which lie between "
+                f"{others.min():g} and {others.max():g}", where=table.where(int(order[row]), title),
+                remedy="leave the row out if it marks a missing reading",
+            )  # fmt: skip
 
 
 def _name_unit(given: str | None) -> str | None:

@@ -18,6 +18,15 @@ from trackbed.plausible import Quantity, describe_implausible
         ("friction", 30.0, "as an angle in degrees it would be 0.5774"),
         ("grain", 31.5, "as mm it would be 0.0315 m"),
         ("body", 2000.0, "as mm it would be 2 m"),
+        ("bending", 6.38, "as MN m^2 it would be 6.38e+06 N m^2"),
+        ("line_mass", 60210.0, "as g/m it would be 60.21 kg/m"),
+        ("stiffness", 28.0, "as MN/m or kN/mm it would be 2.8e+07 N/m"),
+        ("stiffness", 28e12, "2.8e+13 N/m is above 1e+11; give SI units"),
+        ("mass", 150e3, "as g it would be 150 kg"),
+        ("axle", 200.0, "as kN it would be 2e+05 N"),
+        ("axle", 22.5, "as t it would be 2.207e+05 N"),
+        ("speed", 160.0, "as km/h it would be 44.44 m/s"),
+        ("level", 1.5, "as mm it would be 0.0015 m"),
     ],
 )
 def test_the_unit_that_was_meant_is_named(quantity: Quantity, value: float, words: str) -> None:

@@ -71,12 +71,31 @@ def test_heights_that_are_folded_need_what_unfolds_them(tmp_path: Path) -> None:
         write_text(path, "id radius x y z", np.array([[1, 0.05, 0.5, 0.5, z]]), step=step)
     with pytest.raises(UsageError, match="grain 1 passed a periodic side in z"):
         read_series([path])
+    scaled = tmp_path / "scaled.dump"
+    for step, z in ((0, 0.005), (1, 0.995)):
+        write_text(scaled, "id radius xs ys zs", np.array([[1, 0.05, 0.5, 0.5, z]]), step=step)
+    with pytest.raises(UsageError, match="grain 1 passed a periodic side in z"):
+        read_series([scaled])
     for columns, flags in (("iz", [0, -1]), ("zu", [-0.99, -0.99 - sunk])):
         path = tmp_path / f"{columns}.dump"
         for step, (z, flag) in enumerate(zip((-0.99, 0.99), flags, strict=True)):
             row = np.array([[1, 0.05, 0.5, 0.5, z, flag]])
             write_text(path, f"id radius x y z {columns}", row, step=step)
         np.testing.assert_allclose(read_series([path]).settlement, [0.0, sunk], atol=1e-12)
+
+
+def test_a_grain_that_was_thrown_off_is_named(tmp_path: Path) -> None:
+    """64 grains sink by 1 mm and one flies up by 0.4 m: the mean is that grain's; radii of 2 m."""
+    path, grains = tmp_path / "a.dump", np.arange(1, 65)
+    rows = np.column_stack((grains, np.full(64, 2.0), grains, grains, np.linspace(0, 0.1, 64)))
+    write_text(path, "id radius x y z", rows)
+    assert not [one for one in read_series([path]).doubts if "alone" in one]
+    rows[:, 4] -= 1e-3
+    rows[7, 4] += 0.4
+    write_text(path, "id radius x y z", rows, step=1)
+    implausible, thrown = read_series([path]).doubts
+    assert "a grain of 4 m" in implausible
+    assert "grain 8 alone makes most of this settlement: it sank by -0.399 m" in thrown
 
 
 def test_other_units_than_si_are_refused(tmp_path: Path) -> None:

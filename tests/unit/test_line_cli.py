@@ -107,6 +107,19 @@ def test_a_scene_that_makes_no_line_is_refused(words, override, said, capsys):
     assert not Path(words[1]).with_name("line-run").exists()
 
 
+def test_values_that_no_track_has_are_named(words, capsys):
+    """As shipped there is nothing to say; each key of another unit is named before the run."""
+    assert main([*words, "--dry-run"]) == 0
+    assert "warning" not in capsys.readouterr().err
+    far = {"track.bending": 6.38, "track.rail_mass": 60210.0, "track.pad": 100.0, "track.bed": 28.0,
+           "track.sleeper_mass": 15e4, "line.speed": 160.0, "line.limit": 1.5}  # fmt: skip
+    sets = [word for key, value in far.items() for word in ("--set", f"{key}={value}")]
+    main([*words, "--dry-run", *sets, "--set", "axle=[{load=200.0, unsprung_mass=6e5}]"])
+    said = capsys.readouterr().err
+    for key in (*far, "axle.0.load", "axle.0.unsprung_mass"):
+        assert f"warning: {key}: a " in said
+
+
 def test_a_dry_run_says_what_the_law_is_good_for(words, capsys):
     assert main([*words, "--dry-run"]) == 0
     assert "from memory" in capsys.readouterr().out

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from adapters.errors import UsageError
@@ -111,8 +112,32 @@ def test_heights_are_no_settlement(tmp_path: Path, capsys: pytest.CaptureFixture
         read_series([path], columns=("cycle", "piston_height"))
     assert main(["fit", str(write(path, "cycle,settlement_mm", heights))]) == 2
     assert "sink from 59.8 towards zero" in capsys.readouterr().err
+    noisy = 299 - np.log(np.arange(1, 1001)) / 2 + np.random.default_rng(1).normal(0, 0.05, 1000)
+    for rows in (
+        "\n".join(f"{i},{one:.4f}" for i, one in enumerate(noisy, 1)),
+        "1,300\n10,299\n100,298", "1,2\n10,0.8\n100,-0.3\n1000,-1.4", "1,3\n10,2\n50,1\n90,0",
+    ):  # fmt: skip
+        assert main(["fit", str(write(path, "cycle,settlement_mm", rows))]) == 2
     for rows in ("1,-0.1\n2,-0.2\n5,-0.3\n10,-0.4", "1,5\n2,4.99\n5,5.01\n10,5\n20,4.99"):
         assert main(["fit", str(write(path, "cycle,settlement_mm", rows))]) == 0
+
+
+def test_a_reading_that_marks_none_is_refused(tmp_path: Path) -> None:
+    """-999 in the middle, with its line; a first reading of zero and a failure at the end pass."""
+    path, good = tmp_path / "a.csv", ["1,1.0", "2,1.3", "5,1.8", "10,2.1", "20,2.5"]
+    for row, mark in ((2, "5,-999"), (4, "20,-999"), (3, "10,9999")):
+        rows = [mark if i == row else one for i, one in enumerate(good)]
+        with pytest.raises(UsageError, match=rf"a.csv:{row + 2}.* no neighbour"):
+            read_series([write(path, "cycle,settlement_mm", "\n".join(rows))])
+    for rows in (["0,-90", *good], [*good, "50,90"]):
+        assert len(read_series([write(path, "cycle,settlement_mm", "\n".join(rows))]).cycle) == 6
+
+
+def test_a_factor_in_a_row_of_units_is_not_left_out(tmp_path: Path) -> None:
+    """1/10 mm below the header is refused, and the remedy keeps the factor."""
+    with pytest.raises(UsageError, match="is not a number") as raised:
+        read_series([write(tmp_path / "a.csv", "cycle,settlement", "-,1/10 mm\n1,1\n2,1.3\n5,2")])
+    assert "their factors into the numbers" in str(raised.value.remedy)
 
 
 @pytest.mark.parametrize(

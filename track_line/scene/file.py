@@ -15,6 +15,7 @@ from track_line.beds import Scatter, Zone
 from track_line.laws import BedLoad, get_law, list_laws
 from track_line.settling import Axle, Line, find_alert_limit, make_line
 from trackbed.memory import refuse_more_memory
+from trackbed.plausible import Quantity, describe_implausible
 from trackbed.scene_files import (
     Guide,
     Name,
@@ -96,6 +97,23 @@ def find_faults(tables: SceneTables) -> Iterator[Problem]:
             )  # fmt: skip
         elif not zone.find_inside(place).any():
             yield Problem(f"zone.{i}", f"no sleeper lies from {zone.begin:g} to {zone.end:g} m")
+
+
+def list_doubts(file: SceneFile) -> Iterator[str]:
+    """Sentences on values that no track has: mostly numbers in another unit than SI."""
+    track, line = file.tables.track, file.tables.line
+    values: list[tuple[Quantity, float, str]] = [
+        ("bending", track.bending, "track.bending"), ("stiffness", track.pad, "track.pad"),
+        ("line_mass", track.rail_mass, "track.rail_mass"), ("stiffness", track.bed, "track.bed"),
+        ("mass", track.sleeper_mass, "track.sleeper_mass"), ("speed", line.speed, "line.speed"),
+        ("level", file.limit, "line.limit"),
+    ]  # fmt: skip
+    for i, one in enumerate(file.tables.axle):
+        values += [
+            ("axle", one.load, f"axle.{i}.load"),
+            ("mass", one.unsprung_mass, f"axle.{i}.unsprung_mass"),
+        ]
+    yield from filter(None, (describe_implausible(*value) for value in values))
 
 
 def is_sound(tables: SceneTables) -> bool:
