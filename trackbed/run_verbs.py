@@ -71,6 +71,14 @@ def find_file_kind(path: Path) -> Kind:
     return SETTLEMENT
 
 
+def refuse_scene(path: Path, what: str, then: str = "") -> None:
+    """Raise `UsageError` for a scene, ``what`` it is not; say which verb runs it and what to do
+    ``then``."""
+    if path.suffix == ".toml":
+        run = f"trackbed {find_file_kind(path).verb} {shlex.quote(str(path))}"
+        raise UsageError(f"this is a scene, {what}", where=str(path), remedy=f"run it{then}: {run}")
+
+
 def choose_command(arguments: argparse.Namespace) -> Callable[[argparse.Namespace], int]:
     """What does the verb that was asked for: that of the run's kind, where it is about a run."""
     command: Callable[[argparse.Namespace], int] = arguments.command

@@ -9,10 +9,10 @@ from typing import Any
 
 from adapters.cli.arguments import add_json, print_json
 from adapters.errors import UsageError
-from trackbed.run_files import MANIFEST, RESULT, read_object, refuse_links
+from trackbed.run_files import MANIFEST, RESULT, SEAL, read_object, refuse_links
 from trackbed.run_verbs import describe_run, find_kind, refuse_no_run
 
-NO_RESULTS = ("run_folder", "next", "digests")
+NO_RESULTS = ("run_folder", "next", "digests", SEAL)
 """What differs between any two runs and is no result."""
 
 

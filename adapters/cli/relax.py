@@ -12,7 +12,9 @@ from adapters.errors import UsageError
 
 def register(verb: str, parser: argparse.ArgumentParser) -> None:
     """Arguments of ``relax``."""
-    parser.add_argument("state", metavar="STATE", type=Path, help="a .npz, .vtkhdf or a dump")
+    parser.add_argument(
+        "state", metavar="STATE", type=Path, help="a .npz, .vtkhdf, dump or run folder"
+    )
     parser.add_argument(
         "--out", metavar="STATE", type=Path, required=True,
         help=".npz, .vtkhdf; or .dump, .lammpstrj, .liggghts, also with .gz, .bz2, .xz behind",
@@ -32,10 +34,12 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
 
 
 def find_scene_of_state(state: Path) -> tuple[Path, list[str]]:
-    """Scene file and overrides of the run folder that a state lies in."""
+    """Scene file and overrides of the run folder that a state lies in, or is."""
     from adapters.files import RunFolder
+    from trackbed.run_verbs import refuse_scene
 
-    for folder in state.resolve().parents:
+    refuse_scene(state, "no series and no state", ", then give what came out")
+    for folder in (state.resolve(), *state.resolve().parents):
         if (folder / "manifest.json").exists():
             return folder / "scene.toml", RunFolder(folder).manifest()["overrides"]
     raise UsageError(

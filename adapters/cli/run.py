@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -199,7 +200,10 @@ def run_report(arguments: argparse.Namespace) -> int:
 
     folder = arguments.run_folder
     brief = is_deck_scene(folder / "scene.toml")
-    page = write_brief_report(read_record(folder)) if brief else write_report(folder)
+    record = read_record(folder)
+    page = write_brief_report(record) if brief else write_report(folder, record)
+    if record.damaged:
+        print(f"warning: not as the run left it: {', '.join(record.damaged)}", file=sys.stderr)
     show_page(page, arguments.open)
     print_result(arguments.run_folder)
     return 0

@@ -14,6 +14,7 @@ from adapters.decks.scene import is_deck_scene
 from adapters.decks.scripts import ENDING, read_marked
 from adapters.errors import UsageError
 from trackbed.run_files import refuse_writing, write_whole
+from trackbed.run_verbs import refuse_scene
 
 SCENE = """\
 # {name}: load cycles computed and jumped on a deck of your own.  Written by trackbed adopt.
@@ -53,6 +54,7 @@ def adopt(path: Path, engine: str) -> Adoption:
     path = path.absolute()
     if not path.name.isprintable():  # a scene could not name it
         raise UsageError("the deck's name is no text", where=ascii(path.name), remedy="rename it")
+    refuse_scene(path, "no deck of an engine")
     if (path.suffix == ".py") != (engine == "yade"):
         raise UsageError(ENDING, where=str(path), remedy="name the engine that it is written for")
     marked, found, copy = read_marked(path), list[Finding](), path

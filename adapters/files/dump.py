@@ -13,7 +13,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from adapters.bed import FloatArray, IntArray
-from adapters.errors import DumpError
+from adapters.errors import DumpError, UsageError
 from trackbed.run_files import replace_file
 
 Kind = Literal["atoms", "entries"]
@@ -108,6 +108,33 @@ class Header(NamedTuple):
     columns: tuple[str, ...]
     bounds: FloatArray
     boundary: str
+
+
+def describe_format(head: bytes) -> str:
+    """What a file of another format is by its first bytes, and what to do; empty for none known."""
+    return next((said for mark, said in OTHER_FORMATS.items() if head.startswith(mark)), "")
+
+
+def open_dump(path: Path) -> Any:
+    """The bytes of a dump, unpacked; raises `UsageError` for what can not be opened, `DumpError`
+    where it is not packed as its name says."""
+    try:
+        if path.suffix in PACKED and path.is_file():
+            with path.open("rb") as stream:
+                head = stream.read(8)
+            said = describe_format(head)
+            if head and f"ends in {path.suffix}" not in said:
+                name = f"of plain text leave {path.suffix} out of the name; else copy it again"
+                raise DumpError(
+                    f"this is no {path.suffix} file: it begins with {repr(head)[1:]}",
+                    where=str(path), remedy=said or name,
+                )  # fmt: skip
+        return PACKED.get(path.suffix, open)(path, "rb")
+    except OSError as error:
+        raise UsageError(
+            f"the dump cannot be opened ({error.strerror})", where=str(path),
+            remedy="give a file: check its name, and that the engine's dump came to its first step",
+        ) from error  # fmt: skip
 
 
 def list_grains(identifiers: IntArray) -> str:

@@ -14,9 +14,10 @@ from typing import NoReturn
 import numpy as np
 
 from adapters.bed import FloatArray, IntArray
-from adapters.errors import DumpError, UsageError
-from adapters.files.dump import OTHER_FORMATS, PACKED, Frame, Header, Kind, list_grains
+from adapters.errors import DumpError
+from adapters.files.dump import Frame, Header, Kind, describe_format, list_grains, open_dump
 from adapters.files.ondem import ENDING, read_bodies
+from trackbed.run_verbs import refuse_scene
 
 TEXT_BLOCK = 1 << 20
 """Bytes read at once; also the longest line that is taken for text."""
@@ -42,17 +43,8 @@ def read_frames(path: str | Path, whole: bool = True) -> Iterator[Frame]:
     A ``.vtkhdf`` is one frame (`ondem`).  Not for ``.bin``, VTK or image dumps, nor text columns.
     """
     path = Path(path)
-    if path.suffix == ".toml":
-        do = f"run it, then give what came out: trackbed run {path}"
-        raise UsageError("this is a scene, no series and no state", where=str(path), remedy=do)
-    try:
-        stream = PACKED.get(path.suffix, open)(path, "rb")
-    except OSError as error:
-        raise UsageError(
-            f"the dump cannot be opened ({error.strerror})", where=str(path),
-            remedy="give a file: check its name, and that the engine's dump came to its first step",
-        ) from error  # fmt: skip
-    with stream:
+    refuse_scene(path, "no series and no state", ", then give what came out")
+    with open_dump(path) as stream:
         if path.suffix == ENDING:
             yield Frame(*read_bodies(path))
             return
@@ -158,10 +150,9 @@ class Reader:
             )
         start = head.lstrip()[:5]
         if start != b"ITEM:"[: len(start)]:
-            known = [text for mark, text in OTHER_FORMATS.items() if head.startswith(mark)]
             text = "it begins with " + repr(head[:16])[1:]
             table = "; a table is named .csv, .tsv, .txt, .dat or .xlsx, and not packed"
-            remedy = known[0] if known else WRITE_TEXT + table
+            remedy = describe_format(head) or WRITE_TEXT + table
             self.refuse(f"this is no text dump: {text}", remedy, line=1)
 
     def read_whole(self, item: str) -> int:

@@ -8,7 +8,6 @@ another name, such as a copy of a stage, is no stage and is left alone.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import re
@@ -68,8 +67,6 @@ STAGES = ("preparation", "jump", "window")
 """Kinds of stages; at one cycle in this order: a jump of h = 0 comes before its window."""
 STAGE = re.compile(r"preparation|jump_\d{6,}_\d+|window_\d{6,}")
 """Name of a stage's folder."""
-SEAL = "seal"
-"""Key of a record, such as an outcome, with the SHA-256 of the others; older ones have none."""
 
 
 @dataclass
@@ -117,8 +114,7 @@ class RunFolder:
     def add_event(self, what: str, **details: object) -> None:
         """Append one line to ``events.jsonl``."""
         now = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
-        record = json.loads(json.dumps({"time": now, "event": what, **details}))
-        line = json.dumps(record | {SEAL: _digest(record)})
+        line = json.dumps(run_files.seal_record({"time": now, "event": what, **details}))
         run_files.append_text(self.path / EVENTS, line + "\n")
 
     def keep_cycle_by_cycle(self, now: bool) -> bool:
@@ -142,12 +138,13 @@ class RunFolder:
 
     def list_damaged(self) -> list[str]:
         """What in the folder is not as it was left: stages, which count for nothing then, and
-        the records beside them."""
-        listing, path = self._list_stages(), self.path / "settlement.csv"
+        the records beside them.  Reads all that has a digest: about a second a gigabyte."""
+        path = self.path / "settlement.csv"
+        text = read_bounded(path, errors="replace") if path.exists() else ""  # may grow meanwhile
+        listing = self._list_stages(verify=True)
         names = [n for n in listing.names if n not in listing.finished and not self.failure(n)]
         if not all(self._read_events()[:-1]):  # a crash cuts the last one
             names.append(EVENTS)
-        text = read_bounded(path, errors="replace") if path.exists() else ""
         titles = text.partition("\n")[0].split(",")[: len(COLUMNS)]  # 0.2 had fewer: names in rows
         keys = [COLUMNS.get(title, title) for title in titles]
         rows = "".join(_format_rows(one.rows, keys) for one in listing.finished.values())
@@ -170,7 +167,8 @@ class RunFolder:
                 same = all(_identify(path) == found for path, found in looked_at)
                 if same and verified >= verify:
                     return outcome
-            outcome = Outcome(**_open_seal(json.loads(read_bounded(folder / "outcome.json"))))
+            record = json.loads(read_bounded(folder / "outcome.json"))
+            outcome = Outcome(**run_files.open_seal(record))
             names = ("outcome.json", *outcome.notes.get("files", ()))
             files = [(path, _identify(path)) for path in (f"{folder}/{one}" for one in names)]
             found = _list_sizes(folder)
@@ -206,10 +204,10 @@ class RunFolder:
         """Outcomes of all finished stages in order; failed jumps are left out."""
         return list((self._listing or self._list_stages()).finished.values())
 
-    def _list_stages(self) -> Listing:
+    def _list_stages(self, verify: bool = False) -> Listing:
         names = self.stage_names()
         kept = (name for name in names if not (name.startswith("jump") and self.failure(name)))
-        found = {name: self.outcome(name, verify=False) for name in kept}
+        found = {name: self.outcome(name, verify=verify) for name in kept}
         return Listing(names, {name: one for name, one in found.items() if one is not None})
 
     def failure(self, name: str) -> str:
@@ -266,8 +264,7 @@ class RunFolder:
         sizes = _list_sizes(folder)
         digests = {name: run_files.seal_file(folder / name) for name in sizes}
         outcome = replace(outcome, notes=outcome.notes | {"files": sizes, "digests": digests})
-        record = json.loads(json.dumps(asdict(outcome)))
-        text = json.dumps(record | {SEAL: _digest(record)}, indent=1)
+        text = json.dumps(run_files.seal_record(asdict(outcome)), indent=1)
         run_files.write_whole(folder / "outcome.json", text + "\n")
         run_files.sync_folder(folder)
         place = self.path / folder.name
@@ -344,21 +341,9 @@ class RunFolder:
         self.write_settlement()
 
 
-def _digest(record: dict[str, Any]) -> str:
-    """SHA-256 of an outcome as JSON, whatever the order of its keys."""
-    return hashlib.sha256(json.dumps(record, sort_keys=True).encode()).hexdigest()
-
-
-def _open_seal(record: dict[str, Any]) -> dict[str, Any]:
-    """A record without its seal; raises `ValueError` where it is not the seal of this record."""
-    if (seal := record.pop(SEAL, None)) is not None and seal != _digest(record):
-        raise ValueError("changed since it was written")
-    return record
-
-
 def _read_event(line: str) -> dict[str, Any]:
     try:
-        event = _open_seal(json.loads(line))
+        event = run_files.open_seal(json.loads(line))
         datetime.fromisoformat(event["time"])
         return event if isinstance(event["event"], str) else {}
     except (ValueError, TypeError, AttributeError, KeyError):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Sequence
 from dataclasses import replace
 from math import isfinite
@@ -13,8 +14,10 @@ import numpy as np
 from adapters.bed import FloatArray
 from adapters.errors import UsageError
 from adapters.files.dump import find_cell
+from adapters.files.run_folder import EVENTS, RunFolder
 from adapters.files.settlement_table import SUFFIXES, Series, read_table_series
 from trackbed.plausible import describe_implausible
+from trackbed.run_files import MANIFEST, refuse_links
 from trackbed.run_verbs import find_kind
 
 THROWN = 10.0
@@ -74,6 +77,8 @@ def read_series(
                 f"this is a {kind.verb} run, which has no settlement under load cycles",
                 where=str(path), remedy=f"its files are open: {kind.files}",
             )  # fmt: skip
+        if path.is_dir():
+            _refuse_changed(path)
         if path.is_dir() and not table.exists():
             raise UsageError(
                 "can not read the series (No such file or directory)", where=str(table),
@@ -142,6 +147,20 @@ def read_dump_series(paths: Sequence[Path], steps_per_cycle: float | None = None
     return Series(cycle, heights[0] - np.array(heights), doubts=tuple(filter(None, doubts)))
 
 
+def _refuse_changed(run: Path) -> None:
+    """Refuse a run whose table may not be what it computed: a changed one, or links out of it."""
+    refuse_links(run)
+    folder = RunFolder(run)
+    if (run / MANIFEST).exists():
+        folder.manifest()  # raises where there is none in it
+    if damaged := [name for name in folder.list_damaged() if name != EVENTS]:
+        raise UsageError(
+            f"not as the run left it: {', '.join(damaged)}", where=str(run),
+            remedy=f"trackbed resume {shlex.quote(str(run))} makes it again; or give the table "
+            f"that you trust: {run / 'settlement.csv'}",
+        )  # fmt: skip
+
+
 def describe_thrown(grains: FloatArray, sunk: FloatArray) -> str | None:
     """A sentence on a grain that makes most of what the mean of grains (n,) sank by, (n,) [m]; None
     where none does."""
@@ -171,9 +190,8 @@ def _refuse_folded(grains: FloatArray, rise: FloatArray, period: float, where: s
 def _is_table(path: Path) -> bool:
     """Whether a file is a table by its name, and not a dump by its first word."""
     suffix = path.suffix.lower()
-    certain = suffix in (SUFFIXES[0], SUFFIXES[-1])
-    if certain or suffix not in SUFFIXES or not path.is_file():
-        return certain
+    if suffix not in SUFFIXES or not path.is_file():
+        return suffix in (SUFFIXES[0], SUFFIXES[-1])
     with path.open("rb") as stream:
         return not stream.read(64).lstrip().startswith(b"ITEM:")
 

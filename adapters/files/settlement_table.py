@@ -66,7 +66,7 @@ class Series:
 
 
 SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".xlsx")
-"""Names of tables; the middle ones may be dumps too, which begin with ``ITEM:``."""
+"""Names of tables; all but the last may be dumps too, which begin with ``ITEM:``."""
 UNITS = {"m": "m", "cm": "cm", "mm": "mm", "um": "um", "µm": "um", "μm": "um", "%": "%", "-": "1"}
 """Units a header may give, as in ``settlement_mm`` or ``Settlement [mm]``, and their names."""
 CYCLE_NAMES = ("cycle", "cycles", "n")

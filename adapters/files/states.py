@@ -13,6 +13,7 @@ from adapters.files.dump_reader import read_last_frame
 from adapters.files.ondem import ENDING, write_bodies
 from adapters.files.run_folder import RunFolder
 from adapters.files.window import load_window
+from trackbed.run_files import refuse_links
 
 
 def read_state_file(path: Path, density: float) -> State:
@@ -47,6 +48,7 @@ def read_state_file(path: Path, density: float) -> State:
 
 def read_last_state(run: Path) -> State:
     """The bed at the end of the last finished stage of a run; raises `UsageError` for none."""
+    refuse_links(run)
     folder = RunFolder(run)
     for name in reversed(folder.stage_names()):
         if folder.outcome(name) is not None and not folder.failure(name):

@@ -46,7 +46,6 @@ class Track:
     discarded: tuple[str, ...]
     """Stages whose unfinished or superseded work was moved away; empty folders left out."""
     events: tuple[dict[str, Any], ...]
-    damaged: tuple[str, ...] = ()  # stages and records that are not as the run left them
     exchanged: str = ""  # grains that came, went and wore in a user's deck, for a sentence
 
     @cached_property
@@ -107,7 +106,11 @@ class Track:
         for name, outcome in self.jumps:
             if outcome.last_cycle == cycle:
                 return load_state(self._find_sound(name) / "relaxed.npz").position
-        raise UsageError(f"no state was computed at cycle {cycle}", where=str(self.folder.path))
+        path = self.folder.path
+        raise UsageError(
+            f"no state was computed at cycle {cycle}", where=str(path),
+            remedy=f"where a stage is damaged or gone, trackbed resume {path} computes it again",
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -121,6 +124,16 @@ class Record:
     control: Track | None  # none when there is none, or it has not yet a cycle of its own
     members: tuple[Record, ...]  # beside this one, as far as they have begun
     asked: int  # members in all, this one counted
+
+    @cached_property
+    def damaged(self) -> tuple[str, ...]:
+        """Stages and records of the run, of the full run beside it and of its members that are not
+        as they were left; see `RunFolder.list_damaged`."""
+        full = RunFolder(self.path / CONTROL).list_damaged()
+        found = [*self.run.folder.list_damaged(), *(f"{CONTROL}/{name}" for name in full)]
+        for one in self.members:
+            found += [f"{MEMBERS}/{one.path.name}/{name}" for name in one.damaged]
+        return tuple(found)
 
 
 def read_run_record(path: Path) -> Record:
@@ -188,7 +201,6 @@ def read_track(folder: RunFolder) -> Track:
         folder=folder, outcomes=tuple(outcome for _, outcome in stages),
         names=tuple(stage for stage, _ in stages), failed_jumps=list_failed_jumps(folder),
         discarded=tuple(discarded), events=tuple(folder.events()),
-        damaged=tuple(folder.list_damaged()),
     )  # fmt: skip
 
 

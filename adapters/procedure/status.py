@@ -8,7 +8,7 @@ from pathlib import Path
 
 from adapters.files import EVENTS
 from adapters.procedure.members import Settled, judge_members, sum_members_cost
-from adapters.procedure.record import MEMBERS, Record, Track, make_plain, read_run_record
+from adapters.procedure.record import Record, Track, make_plain, read_run_record
 from trackbed.run_files import is_written
 
 
@@ -56,10 +56,8 @@ def judge_progress(record: Record) -> Status:
     cycle = int(history.cycle[-1]) if len(history.cycle) else 0
     computed = history.count_computed(cycle)
     state = "running" if is_written(run_folder, "lock") else "stopped"
-    damaged = list(record.run.damaged)
-    for one in record.members:
-        damaged += [f"{MEMBERS}/{one.path.name}/{name}" for name in one.run.damaged]
-    if state == "stopped" and _is_finished(record) and all(EVENTS in name for name in damaged):
+    events_alone = all(EVENTS in name for name in record.damaged)
+    if state == "stopped" and events_alone and _is_finished(record):
         state = "finished"
     result = judge_members(record)
     procedure = record.scene.procedure if record.scene.loading is not None else None
@@ -84,7 +82,7 @@ def judge_progress(record: Record) -> Status:
         cpu_s=sum_members_cost(record),
         band_m=result.mean_grain.band if result else None,
         control_cycle=_find_last_cycle(record.control) if record.control is not None else None,
-        damaged=", ".join(damaged),
+        damaged=", ".join(record.damaged),
         next=f"trackbed {verb} {shlex.quote(str(run_folder))}",
         result=result,
     )

@@ -119,7 +119,7 @@ def gather_numbers(record: Record) -> Numbers:
         failed_jumps=tuple((jump.stage, jump.why) for jump in run.failed_jumps),
         stops=tuple((e["time"], e.get("why", "")) for e in run.events if e["event"] == "stopped"),
         discarded=run.discarded + (() if control is None else control.discarded),
-        damaged=run.damaged + (() if control is None else control.damaged),
+        damaged=record.damaged,
         engines=tuple(dict.fromkeys(f"{e['name']}: {e['version']}" for e in engines)),
         provenance=dict(record.manifest.get("provenance", {})),
         parameters={key: value for key, value in parameters.items() if value is not None},

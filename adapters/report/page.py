@@ -35,16 +35,16 @@ from trackbed.report import (
     mark_number,
     save_figure,
 )
-from trackbed.run_files import write_whole
+from trackbed.run_files import refuse_writing, write_whole
 
 
-def write_report(run_folder: Path) -> Path:
+def write_report(run_folder: Path, record: procedure.Record | None = None) -> Path:
     """Write the report of a run, finished or not; returns the path of ``report.html``.
 
-    Raises `UsageError` when ``run_folder`` is no run folder.  Only reads what finished stages
-    left, so it may be called while the run goes on.
+    ``record``: what was read of the run already.  Raises `UsageError` when ``run_folder`` is no run
+    folder.  Only reads what finished stages left, so it may be called while the run goes on.
     """
-    record = procedure.read_run_record(run_folder)
+    record = record or procedure.read_run_record(run_folder)
     numbers = gather_numbers(record)
     with explain_full_disk(run_folder):
         figure = write_figure(record, numbers.settled) if numbers.cycle else None
@@ -64,7 +64,7 @@ def write_brief_report(record: procedure.Record) -> Path:
             *(make_paragraph(escape(one)) for one in procedure.describe_result(record)),
             make_picture(figure, "Settlement curve", "Grey spans were jumped."),
             make_section("Failed jumps", make_list(escape(j.why) for j in record.run.failed_jumps)),
-            make_section("Damaged", make_list(map(escape, record.run.damaged))),
+            make_section("Damaged", make_list(map(escape, record.damaged))),
         ]
         write_whole(record.path / "report.html", make_page("Settlement of a deck", body))
     return record.path / "report.html"
@@ -73,7 +73,8 @@ def write_brief_report(record: procedure.Record) -> Path:
 def write_figure(record: procedure.Record, found: procedure.Settled | None) -> Path:
     """Draw the settlement; the picture's path."""
     folder = record.path / "figures"
-    folder.mkdir(exist_ok=True)
+    with refuse_writing(folder):
+        folder.mkdir(exist_ok=True)
     full = None if record.control is None else record.control.history
     spans = procedure.list_jumped_spans(record.run.outcomes)
     title = ""

@@ -70,6 +70,19 @@ def test_a_changed_table_of_a_finished_run_is_named(kind: str, tmp_path, capsys)
         assert main(["status", str(folder)]) == 0
 
 
+def test_a_changed_result_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A number of ``result.json`` that was changed by hand; the order of its keys is none."""
+    folder = folder_of("qdem", tmp_path / "run")
+    (folder / "report.html").touch()
+    write_result(folder, {"time": 0.5, "steps": 3})
+    file = folder / "result.json"
+    result = json.loads(file.read_text())
+    for change, said in ((dict(reversed(result.items())), ""), (result | {"steps": 4}, file.name)):
+        file.write_text(json.dumps(change))
+        assert main(["status", str(folder), "--json"]) == 0
+        assert json.loads(capsys.readouterr().out)["damaged"] == said
+
+
 @pytest.mark.parametrize("kind", SCENES)
 @pytest.mark.parametrize(
     ("words", "said"),

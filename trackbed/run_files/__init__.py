@@ -28,13 +28,16 @@ from trackbed.run_files.signals import (
     raise_on_signals,
 )
 from trackbed.run_files.whole import (
+    SEAL,
     append_text,
     digest_file,
+    open_seal,
     open_unlinked,
     read_object,
     refuse_writing,
     replace_file,
     seal_file,
+    seal_record,
     sync_folder,
     write_csv,
     write_pvd,
@@ -42,10 +45,10 @@ from trackbed.run_files.whole import (
 )
 
 __all__ = [
-    "MANIFEST", "RESULT", "Progress", "add_run_arguments", "append_text", "digest_file",
+    "MANIFEST", "RESULT", "SEAL", "Progress", "add_run_arguments", "append_text", "digest_file",
     "folder", "hold_signals", "is_written", "list_changed_tables", "list_differences",
-    "lock_folder", "make_manifest", "note_interrupts", "note_signals", "open_run", "open_unlinked",
-    "place_run", "raise_on_signals", "read_object", "record_provenance", "refuse_format",
-    "refuse_links", "refuse_writing", "replace_file", "seal_file", "sync_folder", "time_step",
-    "write_csv", "write_pvd", "write_result", "write_whole",
+    "lock_folder", "make_manifest", "note_interrupts", "note_signals", "open_run", "open_seal",
+    "open_unlinked", "place_run", "raise_on_signals", "read_object", "record_provenance",
+    "refuse_format", "refuse_links", "refuse_writing", "replace_file", "seal_file", "seal_record",
+    "sync_folder", "time_step", "write_csv", "write_pvd", "write_result", "write_whole",
 ]  # fmt: skip

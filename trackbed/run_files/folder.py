@@ -277,14 +277,21 @@ def _shorten(value: Any) -> str:
 
 
 def write_result(path: Path, summary: dict[str, Any]) -> None:
-    """Write the ``summary`` of a finished run in a folder, with digests of its tables."""
+    """Write the ``summary`` of a finished run in a folder, with digests of its tables, sealed."""
     digests = {one.name: whole.digest_file(one) for one in sorted(path.glob(TABLES))}
-    whole.write_whole(path / RESULT, json.dumps(summary | {"digests": digests}, indent=1) + "\n")
+    record = whole.seal_record(summary | {"digests": digests})
+    whole.write_whole(path / RESULT, json.dumps(record, indent=1) + "\n")
 
 
 def list_changed_tables(path: Path, summary: dict[str, Any]) -> list[str]:
-    """Tables of the run in ``path`` that are not as they were when its ``summary`` was written."""
+    """Tables of the run in ``path`` that are not as they were when its ``summary`` was written, and
+    the result itself."""
     known = summary.get("digests")
     now = {one.name: whole.digest_file(one) for one in path.glob(TABLES) if one.is_file()}
     kept = known.items() if isinstance(known, dict) else ()
-    return [str(name) for name, digest in kept if now.get(name) != digest]
+    changed = [str(name) for name, digest in kept if now.get(name) != digest]
+    try:
+        whole.open_seal(summary)
+    except ValueError:
+        changed.append(RESULT)
+    return changed

@@ -17,6 +17,8 @@ from trackbed.memory import read_bounded
 
 NO_FOLDER = (EEXIST, ENOTDIR)
 """A file where the folder, or one above it, should be."""
+SEAL = "seal"
+"""Key of a record, such as an outcome, with the SHA-256 of the others; older ones have none."""
 
 
 def open_unlinked(path: Path, mode: str) -> IO[Any]:
@@ -95,6 +97,24 @@ def digest_file(path: Path) -> str:
     """SHA-256 of a file.  Raises `OSError`."""
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def seal_record(record: dict[str, Any]) -> dict[str, Any]:
+    """A record of JSON with its seal, whatever the order of its keys."""
+    record = json.loads(json.dumps(record))
+    return record | {SEAL: _digest_record(record)}
+
+
+def open_seal(record: dict[str, Any]) -> dict[str, Any]:
+    """A record without its seal; raises `ValueError` where it is not the seal of this record."""
+    bare = {key: value for key, value in record.items() if key != SEAL}
+    if SEAL in record and record[SEAL] != _digest_record(bare):
+        raise ValueError("changed since it was written")
+    return bare
+
+
+def _digest_record(record: dict[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(record, sort_keys=True).encode()).hexdigest()
 
 
 def sync_folder(path: Path) -> None:

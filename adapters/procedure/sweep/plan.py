@@ -19,7 +19,7 @@ from adapters.errors import SceneError, UsageError
 from adapters.files import RunFolder
 from adapters.procedure import refuse_differences, refuse_unloaded
 from adapters.scene import flatten_keys, load_scene, record_scene
-from trackbed.run_files import MANIFEST, read_object
+from trackbed.run_files import MANIFEST, read_object, refuse_writing
 from trackbed.run_verbs import SETTLEMENT, Kind, find_file_kind
 
 SEEDS_MOST = 10_000
@@ -217,7 +217,8 @@ def check_folder(sweep: Sweep) -> None:
     folder = sweep.folder
     if not folder.exists():
         return
-    strangers = sorted(path.name for path in folder.iterdir())
+    with refuse_writing(folder):
+        strangers = sorted(path.name for path in folder.iterdir())
     if strangers and not (folder / "sweep.json").exists() and set(strangers) != {"lock"}:
         raise UsageError(
             f"the folder holds something else ({', '.join(strangers[:3])}), no sweep",

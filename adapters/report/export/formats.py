@@ -27,7 +27,7 @@ from adapters.report.export.fields import (
 )
 from adapters.report.export.instants import ExportedRun, Instant
 from adapters.scene import list_stages
-from trackbed.run_files import replace_file, write_pvd
+from trackbed.run_files import refuse_writing, replace_file, write_pvd
 
 Gather = Callable[[ExportedRun, Instant], dict[str, Array]]
 ENGINE_NAME = {"velocity": "v"}
@@ -40,7 +40,6 @@ def export_vtu(run: ExportedRun, into: Path, every: int) -> list[Path]:
     Grains are points with `gather_grains`; contacts are lines from centre to centre with
     `gather_contacts`.
     """
-    (into / "vtu").mkdir(exist_ok=True)
     grains, contacts = [], []
     for instant in run.instants(every):
         grains.append((instant.cycle, f"vtu/grains_{instant.cycle:06d}.vtu"))
@@ -147,7 +146,6 @@ def write_csv_rows(path: Path, parts: Iterable[Mapping[str, Array]]) -> None:
 def export_vtkhdf(run: ExportedRun, into: Path, every: int) -> list[Path]:
     """``vtkhdf/grains_000000.vtkhdf`` and on: an instant a file by `write_bodies`; its iteration is
     the cycle, its time that under load, jumped cycles too.  Of a deck only its bodies are known."""
-    (into / "vtkhdf").mkdir(exist_ok=True)
     material, written = run.scene.material.grain.model_dump() if run.own else {}, []
     for instant in run.instants(every):
         scene = {"iteration": instant.cycle} | (_find_time(run, instant) if run.own else {})
@@ -193,5 +191,6 @@ def export_run(run: ExportedRun, to: str, into: Path, every: int = 1) -> list[Pa
     if every < 1:
         raise UsageError(f"every {every} cycles is no step", remedy="give a whole number from 1 on")
     with explain_full_disk(into):
-        into.mkdir(parents=True, exist_ok=True)
+        with refuse_writing(into):
+            (into / to if to in ("vtu", "vtkhdf") else into).mkdir(parents=True, exist_ok=True)
         return FORMATS[to](run, into, every)
