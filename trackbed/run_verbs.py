@@ -72,8 +72,7 @@ def find_file_kind(path: Path) -> Kind:
 
 
 def refuse_scene(path: Path, what: str, then: str = "") -> None:
-    """Raise `UsageError` for a scene, ``what`` it is not; say which verb runs it and what to do
-    ``then``."""
+    """Raise `UsageError` for a scene, ``what`` it is not; say how it is run, and what ``then``."""
     if path.suffix == ".toml":
         run = f"trackbed {find_file_kind(path).verb} {shlex.quote(str(path))}"
         raise UsageError(f"this is a scene, {what}", where=str(path), remedy=f"run it{then}: {run}")

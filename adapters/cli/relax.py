@@ -12,9 +12,7 @@ from adapters.errors import UsageError
 
 def register(verb: str, parser: argparse.ArgumentParser) -> None:
     """Arguments of ``relax``."""
-    parser.add_argument(
-        "state", metavar="STATE", type=Path, help="a .npz, .vtkhdf, dump or run folder"
-    )
+    parser.add_argument("state", metavar="STATE", type=Path, help="a .npz, .vtkhdf, dump or run")
     parser.add_argument(
         "--out", metavar="STATE", type=Path, required=True,
         help=".npz, .vtkhdf; or .dump, .lammpstrj, .liggghts, also with .gz, .bz2, .xz behind",

@@ -51,10 +51,10 @@ def adopt(path: Path, engine: str) -> Adoption:
     wrote is such a copy, and looked at where it is.  Raises `UsageError` for decks that can not be
     read or marked, and for another file where the copy should be.
     """
+    refuse_scene(path, "no deck of an engine")
     path = path.absolute()
     if not path.name.isprintable():  # a scene could not name it
         raise UsageError("the deck's name is no text", where=ascii(path.name), remedy="rename it")
-    refuse_scene(path, "no deck of an engine")
     if (path.suffix == ".py") != (engine == "yade"):
         raise UsageError(ENDING, where=str(path), remedy="name the engine that it is written for")
     marked, found, copy = read_marked(path), list[Finding](), path

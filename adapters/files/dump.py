@@ -116,19 +116,16 @@ def describe_format(head: bytes) -> str:
 
 
 def open_dump(path: Path) -> Any:
-    """The bytes of a dump, unpacked; raises `UsageError` for what can not be opened, `DumpError`
-    where it is not packed as its name says."""
+    """The unpacked bytes of a dump; raises `UsageError`, and `DumpError` where packed otherwise."""
     try:
         if path.suffix in PACKED and path.is_file():
             with path.open("rb") as stream:
                 head = stream.read(8)
             said = describe_format(head)
             if head and f"ends in {path.suffix}" not in said:
+                what = f"this is no {path.suffix} file: it begins with {repr(head)[1:]}"
                 name = f"of plain text leave {path.suffix} out of the name; else copy it again"
-                raise DumpError(
-                    f"this is no {path.suffix} file: it begins with {repr(head)[1:]}",
-                    where=str(path), remedy=said or name,
-                )  # fmt: skip
+                raise DumpError(what, where=str(path), remedy=said or name)
         return PACKED.get(path.suffix, open)(path, "rb")
     except OSError as error:
         raise UsageError(

@@ -150,14 +150,12 @@ def read_dump_series(paths: Sequence[Path], steps_per_cycle: float | None = None
 def _refuse_changed(run: Path) -> None:
     """Refuse a run whose table may not be what it computed: a changed one, or links out of it."""
     refuse_links(run)
-    folder = RunFolder(run)
     if (run / MANIFEST).exists():
-        folder.manifest()  # raises where there is none in it
-    if damaged := [name for name in folder.list_damaged() if name != EVENTS]:
+        RunFolder(run).manifest()  # raises where there is none in it
+    if damaged := [name for name in RunFolder(run).list_damaged() if name != EVENTS]:
         raise UsageError(
             f"not as the run left it: {', '.join(damaged)}", where=str(run),
-            remedy=f"trackbed resume {shlex.quote(str(run))} makes it again; or give the table "
-            f"that you trust: {run / 'settlement.csv'}",
+            remedy=f"trackbed resume {shlex.quote(str(run))}, or give the table that you trust",
         )  # fmt: skip
 
 

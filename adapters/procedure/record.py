@@ -106,10 +106,9 @@ class Track:
         for name, outcome in self.jumps:
             if outcome.last_cycle == cycle:
                 return load_state(self._find_sound(name) / "relaxed.npz").position
-        path = self.folder.path
         raise UsageError(
-            f"no state was computed at cycle {cycle}", where=str(path),
-            remedy=f"where a stage is damaged or gone, trackbed resume {path} computes it again",
+            f"no state was computed at cycle {cycle}", where=str(self.folder.path),
+            remedy="where a stage is damaged or gone, trackbed resume RUN computes it again",
         )  # fmt: skip
 
 

@@ -284,14 +284,11 @@ def write_result(path: Path, summary: dict[str, Any]) -> None:
 
 
 def list_changed_tables(path: Path, summary: dict[str, Any]) -> list[str]:
-    """Tables of the run in ``path`` that are not as they were when its ``summary`` was written, and
-    the result itself."""
+    """Tables of a run in ``path``, and its result, that changed since its ``summary`` was made."""
     known = summary.get("digests")
     now = {one.name: whole.digest_file(one) for one in path.glob(TABLES) if one.is_file()}
     kept = known.items() if isinstance(known, dict) else ()
     changed = [str(name) for name, digest in kept if now.get(name) != digest]
-    try:
-        whole.open_seal(summary)
-    except ValueError:
+    if summary.get(whole.SEAL) not in (None, whole.seal_record(summary)[whole.SEAL]):
         changed.append(RESULT)
     return changed

@@ -100,21 +100,17 @@ def digest_file(path: Path) -> str:
 
 
 def seal_record(record: dict[str, Any]) -> dict[str, Any]:
-    """A record of JSON with its seal, whatever the order of its keys."""
-    record = json.loads(json.dumps(record))
-    return record | {SEAL: _digest_record(record)}
+    """A record of JSON with its seal, in place of one that it has, whatever its keys' order."""
+    bare = json.loads(json.dumps({key: record[key] for key in record if key != SEAL}))
+    text = json.dumps(bare, sort_keys=True)
+    return bare | {SEAL: hashlib.sha256(text.encode()).hexdigest()}
 
 
 def open_seal(record: dict[str, Any]) -> dict[str, Any]:
     """A record without its seal; raises `ValueError` where it is not the seal of this record."""
-    bare = {key: value for key, value in record.items() if key != SEAL}
-    if SEAL in record and record[SEAL] != _digest_record(bare):
+    if (seal := record.pop(SEAL, None)) is not None and seal != seal_record(record)[SEAL]:
         raise ValueError("changed since it was written")
-    return bare
-
-
-def _digest_record(record: dict[str, Any]) -> str:
-    return hashlib.sha256(json.dumps(record, sort_keys=True).encode()).hexdigest()
+    return record
 
 
 def sync_folder(path: Path) -> None:
