@@ -123,7 +123,7 @@ def open_dump(path: Path) -> Any:
                 head = stream.read(8)
             said = describe_format(head)
             if head and f"ends in {path.suffix}" not in said:
-                what = f"this is no {path.suffix} file: it begins with {repr(head)[1:]}"
+                what = f"this cannot be read as {path.suffix}: it begins with {repr(head)[1:]}"
                 name = f"of plain text leave {path.suffix} out of the name; else copy it again"
                 raise DumpError(what, where=str(path), remedy=said or name)
         return PACKED.get(path.suffix, open)(path, "rb")

@@ -39,9 +39,9 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         ("adopt qdem.toml --engine yade", 2, "this is a scene, no deck", "trackbed qdem qdem.toml"),
         ("relax scene.toml --out a.npz", 2, "this is a scene, no series", "trackbed run scene"),
         ("sweep scene.toml --into a.csv", 2, "can not be written", "a file is where the folder"),
-        ("fit text.gz", 6, "this is no .gz file: it begins with 'ITEM", "leave .gz out"),
-        ("fit bz2.gz", 6, "this is no .gz file", "a name that ends in .bz2"),
-        ("fit bz2.xz", 6, "this is no .xz file", "a name that ends in .bz2"),
+        ("fit text.gz", 6, "this cannot be read as .gz: it begins with 'ITEM", "leave .gz out"),
+        ("fit bz2.gz", 6, "this cannot be read as .gz", "a name that ends in .bz2"),
+        ("fit bz2.xz", 6, "this cannot be read as .xz", "a name that ends in .bz2"),
     ],
 )
 def test_wrong_files_are_named(
