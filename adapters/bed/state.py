@@ -84,12 +84,8 @@ def save_state(state: State, path: Path) -> None:
 
 def load_state(path: Path) -> State:
     """Read what `save_state` wrote; raises `UsageError` when ``path`` is no such file."""
-    remedy = "give a .npz written by trackbed, or a LIGGGHTS dump"
     try:
         data = read_arrays(path)
-        if data.get("position", np.empty(0)).ndim == 3:
-            remedy = "give the run folder: its last state is taken"
-            raise ValueError("it holds the ends of many cycles")
         height, cycle, step = map(float, data["scalars"])
         cycle, step = int(cycle), int(step)
         contacts = Contacts(**{n[8:]: value for n, value in data.items() if n[:8] == "contact_"})
@@ -103,7 +99,7 @@ def load_state(path: Path) -> State:
         raise UsageError(
             f"this is not a whole state file ({error})",
             where=str(path),
-            remedy=remedy,
+            remedy="give a .npz written by trackbed, or a LIGGGHTS dump",
         ) from error
     return State(
         **grains, contacts=contacts, wall_force=walls, piston_height=height, cycle=cycle,

@@ -121,8 +121,7 @@ def open_dump(path: Path) -> Any:
         if path.suffix in PACKED and path.is_file():
             with path.open("rb") as stream:
                 head = stream.read(8)
-            said = describe_format(head)
-            if head and f"ends in {path.suffix}" not in said:
+            if head and f"ends in {path.suffix}" not in (said := describe_format(head)):
                 what = f"this cannot be read as {path.suffix}: it begins with {repr(head)[1:]}"
                 name = f"of plain text leave {path.suffix} out of the name; else copy it again"
                 raise DumpError(what, where=str(path), remedy=said or name)

@@ -26,6 +26,11 @@ def read_state_file(path: Path, density: float) -> State:
     """
     if path.is_dir() and RunFolder(path).stage_names():
         return read_last_state(path)
+    if path.name == "states.npz" and (path.parent / "outcome.json").exists():
+        raise UsageError(
+            "this holds the ends of many cycles, not one state", where=str(path),
+            remedy="give the run folder: its last state is taken",
+        )  # fmt: skip
     if path.suffix == ".npz" and path.is_file():
         return load_state(path)
     frame = read_last_frame(path)

@@ -122,7 +122,7 @@ def test_relax_takes_a_run_and_names_a_window(
     states = next(run.glob("window_*/states.npz"))
     assert main(["relax", str(states), "--out", str(out)]) == 2
     said = capsys.readouterr().err
-    assert "it holds the ends of many cycles" in said
+    assert "this holds the ends of many cycles" in said
     assert "\n  -> give the run folder" in said
 
 

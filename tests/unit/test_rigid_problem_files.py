@@ -126,13 +126,13 @@ def test_fclib_every_storage(tmp_path_factory, dim, contacts, nz, seed):
 
 @pytest.mark.peer("h5py")
 def test_fclib_triplets_add_up(tmp_path: Path) -> None:
-    """Two triplets of one place are added, and those beyond nz are not read."""
+    """Two triplets of one place are added; zeros beyond nz are room that was not needed."""
     import h5py
 
     path = fclib_write(tmp_path / "one.h5", sp.eye_array(2), np.ones(2), np.ones(1), 2, nz=0)
     with h5py.File(path, "r+") as file:
         w = file["fclib_local/W"]
-        tables = {"p": [0, 0, 1, 1], "i": [0, 0, 1, 0], "x": [1.0, 2.0, 5.0, 9.0]}
+        tables = {"p": [0, 0, 1, 1], "i": [0, 0, 1, 0], "x": [1.0, 2.0, 5.0, 0.0]}
         for name, values in tables.items():
             del w[name]
             w[name] = np.array(values)
@@ -396,3 +396,50 @@ def test_a_file_cut_or_spoilt_anywhere_is_named(tmp_path: Path, written, checked
             if checked:
                 np.testing.assert_array_equal(problem.delassus.toarray(), W)
     assert named == 300
+
+
+def test_what_an_npz_holds_beside_a_problem_is_named(tmp_path: Path) -> None:
+    """Unknown arrays and a friction of degrees are warned of; two W, and two numbers of dim, are
+    refused."""
+    w, q, mu = posed(2, 3)
+    path = tmp_path / "one.npz"
+    np.savez(path, W=w.toarray(), q=q, mu=mu, V=np.eye(2), e=np.ones(1))
+    with pytest.warns(UserWarning, match="not used: V, e"):
+        assert_same(read_problem(path), w, q, mu, 2)
+    np.savez(path, W=w.toarray(), q=q, mu=np.full_like(mu, 30.0), dim=np.array([2]))
+    with pytest.warns(UserWarning, match="mu: a friction of 30 is above 2; as an angle in degrees"):
+        assert read_problem(path).dim == 2
+    np.savez(path, W=w.toarray(), q=q, mu=mu, dim=np.array([2, 3]))
+    with pytest.raises(ProblemError, match="not one whole number"):
+        read_problem(path)
+    np.savez(path, W=w.toarray(), q=q, mu=mu)
+    sp.save_npz(tmp_path / "one_W.npz", sp.csr_array(2 * w))
+    with pytest.raises(ProblemError, match=r"W is an array of this file, and of one_W\.npz too"):
+        read_problem(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("fclib_local/vectors/mu_r", 0.1, "mu_r would not be used"),
+        ("fclib_local/vectors/s", 1.0, "s would not be used"),
+        ("fclib_local/M", 1.0, "M would not be used"),
+        ("fclib_global", 1.0, "both groups"),
+        ("fclib_local/spacedim", 2.5, "not one whole number"),
+        ("fclib_local/W/x", 7.0, "x has 100 numbers, of which it says"),
+    ],
+)
+def test_what_is_more_in_fclib_is_refused(
+    tmp_path: Path, name: str, value: float, said: str
+) -> None:
+    """Rolling friction, constraints, a global problem beside the local one, numbers left over."""
+    h5py = pytest.importorskip("h5py")
+    path = fclib_write(tmp_path / "one.h5", *posed(2, 3), 2, nz=0)
+    with h5py.File(path, "a") as file:
+        old = np.ravel(file[name]) if name in file and name.endswith("x") else np.zeros(0)
+        if name in file:
+            del file[name]
+        size = 100 - len(old) if name.endswith("x") else 1
+        file[name] = np.concatenate((old, np.full(size, value)))
+    with pytest.raises(ProblemError, match=said):
+        read_problem(path)

@@ -1,4 +1,4 @@
-"""What reading a damaged file raises, and the error that names the file."""
+"""What reading a damaged file raises, and errors that name the file and a part of it."""
 
 from __future__ import annotations
 
@@ -7,9 +7,12 @@ import struct
 import tokenize
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
 
 from rigid_lcp.errors import ProblemError
 
@@ -37,3 +40,22 @@ def name_missing_part(path: Path, name: str, have: list[str], why: str = "") -> 
         f"it has no {name}" + (f"; {why}" if why else ""), where=str(path),
         remedy=f"it has {', '.join(have) or 'nothing'}; add {name}",
     )  # fmt: skip
+
+
+def refuse_unused_parts(path: Path, unused: Collection[str]) -> None:
+    """Raise `ProblemError` for parts of a file that would change the problem, were they read."""
+    if unused:
+        raise ProblemError(
+            f"{', '.join(sorted(unused))} would not be used", where=str(path),
+            remedy="only contacts with sliding friction are known: eliminate what is more",
+        )  # fmt: skip
+
+
+def take_whole_number(values: NDArray[Any], where: str) -> int:
+    """The one number of an array.  Raises `ProblemError` where it is not one whole number."""
+    if values.size != 1 or values.dtype.kind not in "iuf" or values.item() % 1:
+        raise ProblemError(
+            f"it is {values.tolist()}, and not one whole number", where=where,
+            remedy="give 2 in the plane, 3 in space",
+        )  # fmt: skip
+    return int(values.item())

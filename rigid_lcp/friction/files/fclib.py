@@ -25,7 +25,13 @@ from scipy.sparse.linalg import splu
 
 from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import LibraryMissing, ProblemError
-from rigid_lcp.friction.files.damaged import DAMAGED, describe_damage, name_missing_part
+from rigid_lcp.friction.files.damaged import (
+    DAMAGED,
+    describe_damage,
+    name_missing_part,
+    refuse_unused_parts,
+    take_whole_number,
+)
 from rigid_lcp.friction.problem import BODY_SIZE, BodySpace, FrictionProblem, make_problem
 from rigid_lcp.sparse import find_diagonal_blocks, split_csr
 
@@ -36,19 +42,19 @@ PARTS = {"fclib_local": (("W",), ("q", "mu")), "fclib_global": (("M", "H"), ("f"
 def read_fclib_problem(path: Path) -> FrictionProblem:
     """The problem of a file.  Raises `ProblemError`, and `LibraryMissing` without h5py."""
     with _open_fclib(path) as file:
-        kind = "fclib_global" if "fclib_global" in file else "fclib_local"
-        if kind not in file:
+        kinds = [kind for kind in PARTS if kind in file]
+        if len(kinds) != 1:
             raise ProblemError(
-                "it has no group fclib_local or fclib_global", where=str(path),
-                remedy="give a problem of FCLIB",
+                f"it has {'both groups' if kinds else 'no group'} fclib_local or fclib_global",
+                where=str(path), remedy="give one problem of FCLIB in a file",
             )  # fmt: skip
-        group = file[kind]
+        kind, group = kinds[0], file[kinds[0]]
         if any(name in group for name in ("V", "R", "G")):
             raise ProblemError(
                 "it has equality constraints (V, R or G) beside its contacts", where=str(path),
                 remedy="eliminate them first: W - V R^-1 V^T, q - V R^-1 s",
             )  # fmt: skip
-        dim = int(_read_numbers(group, "spacedim", path).ravel()[0])
+        dim = take_whole_number(_read_numbers(group, "spacedim", path), f"{path}: spacedim")
         if dim == 5:
             raise ProblemError(
                 "it has rolling friction (spacedim 5)", where=str(path),
@@ -57,6 +63,8 @@ def read_fclib_problem(path: Path) -> FrictionProblem:
         names, vectors = PARTS[kind]
         matrices = [_read_fclib_matrix(group, name, path) for name in names]
         given = [_read_numbers(group, f"vectors/{name}", path).ravel() for name in vectors]
+        parts = {*group, *group["vectors"]}
+        refuse_unused_parts(path, parts - {"spacedim", "vectors", "info", *names, *vectors})
     with describe_damage(path):
         if kind == "fclib_global":
             return build_global_problem(matrices[0], matrices[1], given[0], given[1], given[2], dim)
@@ -140,6 +148,9 @@ def _read_fclib_matrix(kind: Any, name: str, path: Path) -> sp.csr_array:
             raise ValueError(f"nz = {nz} is none of -2 (rows), -1 (columns), >= 0 (triplets)")
         if nz < 0:
             matrix.check_format(full_check=True)
+        used = nz if nz >= 0 else int(p[-1])
+        if x[used:].any():
+            raise ValueError(f"x has {x.size} numbers, of which it says that {used} are used")
         return sp.csr_array(matrix)
     except (ValueError, IndexError) as error:
         raise ProblemError(

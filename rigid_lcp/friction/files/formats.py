@@ -5,7 +5,7 @@
     problem = read_problem("RockPile_tob1.dat")          # text of Siconos
 
 npz: ``NAME.npz`` holds q (nc * dim,), mu (nc,) and, if their lengths do not show it, dim.
-W is an array W in the same file, or ``NAME_W.npz`` of `scipy.sparse.save_npz`; a problem that
+W is an array W in the same file, or else ``NAME_W.npz`` of `scipy.sparse.save_npz`; a problem that
 knows its bodies has J (nc * dim, ndof) as ``NAME_H.npz`` and the diagonal of M^-1, Minv (ndof,).
 
 Files that end in ``.hdf5`` or ``.h5`` are read by `rigid_lcp.friction.files.fclib`, those in
@@ -14,6 +14,7 @@ Files that end in ``.hdf5`` or ``.h5`` are read by `rigid_lcp.friction.files.fcl
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
@@ -25,12 +26,20 @@ from numpy.typing import NDArray
 
 from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import ProblemError
-from rigid_lcp.friction.files.damaged import DAMAGED, describe_damage, name_missing_part
+from rigid_lcp.friction.files.damaged import (
+    DAMAGED,
+    describe_damage,
+    name_missing_part,
+    take_whole_number,
+)
 from rigid_lcp.friction.files.fclib import read_fclib_forces, read_fclib_problem
 from rigid_lcp.friction.files.siconos import read_siconos_problem
 from rigid_lcp.friction.problem import BODY_SIZE, BodySpace, FrictionProblem, make_problem
 from trackbed.memory import read_arrays
+from trackbed.plausible import describe_implausible
 
+NPZ_ARRAYS = frozenset({"q", "mu", "dim", "W", "Minv", "r", "u", "vfree"})
+"""What a file may hold; r and u are a solution, vfree velocities that q was made of."""
 SAME_MATRIX = 1e-8
 """W and its factors, both stored, differ by less than this share of the largest entry of W."""
 
@@ -41,7 +50,11 @@ def read_problem(path: Path | str) -> FrictionProblem:
     Raises `ProblemError`, which names the file, the part of it and what is wrong with it, and
     `LibraryMissing` for HDF5 without h5py.
     """
-    return _choose_readers(path)[0](Path(path))
+    problem = _choose_readers(path)[0](Path(path))
+    most = float(problem.friction.max(initial=0.0))
+    if said := describe_implausible("friction", most, f"{path}: mu"):
+        warnings.warn(said, stacklevel=2)
+    return problem
 
 
 def read_forces(path: Path | str) -> Floats:
@@ -89,9 +102,12 @@ def _read_npz_problem(path: Path) -> FrictionProblem:
     for name in ("q", "mu"):
         if name not in parts:
             raise name_missing_part(path, name, sorted(parts))
+    if unused := sorted(set(parts) - NPZ_ARRAYS):
+        warnings.warn(f"{path}: not used: {', '.join(unused)}", stacklevel=4)
     q, mu = parts["q"], parts["mu"]
-    dim = parts["dim"].item() if "dim" in parts and parts["dim"].ndim == 0 else None
-    if dim is None:
+    if "dim" in parts:
+        dim = take_whole_number(parts["dim"], f"{path}: dim")
+    else:
         dim = q.size // mu.size if mu.ndim == 1 and mu.size else 0
     factor = path.with_name(f"{path.stem}_H.npz")
     with describe_damage(path):
@@ -131,9 +147,15 @@ def _read_npz_arrays(path: Path) -> dict[str, NDArray[Any]]:
 
 def _read_npz_matrix(path: Path, parts: dict[str, NDArray[Any]]) -> Any:
     """W, dense in the file itself or sparse beside it."""
-    if "W" in parts:
-        return parts["W"]
-    return _read_npz_sparse(path.with_name(f"{path.stem}_W.npz"))
+    beside = path.with_name(f"{path.stem}_W.npz")
+    if "W" not in parts:
+        return _read_npz_sparse(beside)
+    if beside.is_file():
+        raise ProblemError(
+            f"W is an array of this file, and of {beside.name} too", where=f"{path}: W",
+            remedy="remove the one that does not belong to this problem",
+        )  # fmt: skip
+    return parts["W"]
 
 
 def _read_npz_sparse(path: Path) -> sp.csr_array:

@@ -13,4 +13,7 @@ method, bed by bed; a finest level is judged by the other.  Error: mean over the
 difference to the reference over the reference's mean, with Student's interval of paired beds.
 """
 
-ROOMS = "rigid_lcp: collision contact friction motion shapes"
+ROOMS = (
+    "rigid_lcp: collision contact friction.attempts friction.auto friction.linear friction.methods "
+    "friction.pivots friction.problem friction.sweeps motion shapes"
+)

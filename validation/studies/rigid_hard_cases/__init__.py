@@ -9,4 +9,7 @@ Design, fixed before the runs: every engine is built from one description of the
 the same state, takes steps of 1 ms unless said, and is judged by the same number against one bar.
 """
 
-ROOMS = "rigid_lcp: collision contact friction motion shapes"
+ROOMS = (
+    "rigid_lcp: collision contact friction.attempts friction.auto friction.linear friction.methods "
+    "friction.pivots friction.problem friction.sweeps motion shapes"
+)

@@ -11,4 +11,7 @@ time by a program of its own (`springs`) and by LIGGGHTS where the grains are di
 greatest difference of a contact force from the direct limit over the weight of all grains.
 """
 
-ROOMS = "rigid_lcp: friction unique"
+ROOMS = (
+    "rigid_lcp: friction.attempts friction.auto friction.linear friction.methods "
+    "friction.pivots friction.problem friction.sweeps unique"
+)

@@ -13,4 +13,7 @@ Newton, OSQP where there is no friction (`peers`).  Unseen problems follow from 
 setting was chosen by (`validation.bench.rigid.examination`).
 """
 
-ROOMS = "rigid_lcp: friction sparse"
+ROOMS = (
+    "rigid_lcp: friction.attempts friction.auto friction.linear friction.methods "
+    "friction.pivots friction.problem friction.sweeps sparse"
+)
