@@ -23,7 +23,7 @@ from adapters.bed import GRAVITY, Container, FloatArray
 from adapters.engines.contract import EngineStart
 from adapters.engines.crib import find_crib_forces, load_settled
 from adapters.engines.plan import PLAN, count_cycle_steps, plan_seating, plan_settling
-from adapters.engines.process import ProcessEngine
+from adapters.engines.taps import TappingEngine
 from adapters.scene import Scene
 
 LOOP_TIME = re.compile(r"^Loop time of (\S+) on (\d+) procs", re.MULTILINE)
@@ -69,7 +69,7 @@ PARTS_PREPARE = ("in.prepare", "settings.in", "bed.in")
 PARTS_CYCLES = ("in.cycles", "settings.in", "bed.in", "piston.in")
 
 
-class DeckEngine(ProcessEngine):
+class DeckEngine(TappingEngine):
     """What LIGGGHTS and LAMMPS share: static decks copied, what the scene names written beside."""
 
     package: str  # where the static decks are

@@ -13,10 +13,15 @@ from adapters.scene import Scene
 
 @dataclass(frozen=True)
 class PlanNumbers:
-    """When a bed counts as settled, and how a piston finds it."""
+    """When a bed counts as settled, how it is tapped, and how a piston finds it."""
 
     equilibrium_ratio: float = 1e-6  # translational kinetic over potential energy [-]; section 2.3
     settle_times: int = 40  # falling times after which a bed that still moves is given up [-]
+    tap_fall: float = 0.3
+    """By which a tap drops the bed, in mean diameters: 0.1 takes more taps, 1 at times loosens."""
+
+    taps_most: int = 100  # after which a porosity that is not reached is given up
+    porosity_step: float = 0.005  # by which a bed may be denser than asked [-]
     seat_speed: float = 0.1  # greatest one of the piston while it finds the bed [m/s]
     seat_share: float = 1.0  # force that seats the piston, over the peak of the load [-]
     seat_drag_share: float = 0.5

@@ -39,7 +39,7 @@ from adapters.engines.plan import (
     plan_seating,
     plan_settling,
 )
-from adapters.engines.process import ProcessEngine
+from adapters.engines.taps import TappingEngine
 from adapters.scene import Scene
 
 SCRIPTS = {"in.prepare": "prepare.py", "in.cycles": "cycles.py"}
@@ -50,7 +50,7 @@ LOOP_TIME = re.compile(r"^LOOP (\S+) s()", re.MULTILINE)
 BANNER = re.compile(r"Yade version: ((\d{4})\S*)")
 
 
-class YadeEngine(ProcessEngine):
+class YadeEngine(TappingEngine):
     """Writes the parameters of a window, runs ``yade``, and knows its manners.
 
     YADE exits 0 with NaN and with escaped grains; the script's last line ``COMPLETE step N`` is

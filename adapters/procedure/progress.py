@@ -101,6 +101,11 @@ def warn_without_jumps(scene: Scene) -> Iterator[str]:
 def describe_plan(scene: Scene, height: float) -> Iterator[str]:
     """Cycles, jumps and cost of a run whose grains rain from ``height`` [m], in sentences."""
     p = scene.procedure
+    if scene.sample.porosity is not None:
+        yield (
+            f"behind the rain taps to a porosity of {scene.sample.porosity:g}: the run computes "
+            "this deck again with each, from the bed as it lay, lifted"
+        )
     to_compute = total = 0 if p is None else p.total_cycles
     if p is not None:
         stages = [(begin, stage.procedure) for begin, stage in list_stages(scene)]

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import shlex
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from math import isfinite, nan
 from typing import Any
 
 import numpy as np
 
+from adapters.errors import UsageError
 from adapters.jumps import Band
 from adapters.laws import get_law
 from adapters.procedure import (
@@ -30,7 +32,7 @@ from adapters.report.error import (
     measure_jump,
 )
 from adapters.report.verdict import FITTED, FULL, NOTHING, PROCEDURE, list_failures, split_cost
-from adapters.scene import flatten_keys, list_omissions, list_stages
+from adapters.scene import flatten_keys, list_omissions, list_stages, measure_porosity
 
 
 @dataclass(frozen=True)
@@ -112,7 +114,7 @@ def gather_numbers(record: Record) -> Numbers:
         compared_at=compared_at,
         error_rows=rows,
         jumps=jumps,
-        preparation={} if prepared is None else flatten_keys(prepared.notes["figures"]),
+        preparation=find_bed_figures(record),
         costs=costs,
         fails=tuple(list_failures(record, rows, jumps)),
         left_out=list_omissions(scene),
@@ -126,6 +128,18 @@ def gather_numbers(record: Record) -> Numbers:
         decks={k: v for o in run.outcomes for k, v in o.notes.get("decks", {}).items()},
         reproduce=_format_command(record),
     )
+
+
+def find_bed_figures(record: Record) -> dict[str, float]:
+    """Figures of the settled bed as its run noted them; porosity where its state is sound."""
+    if record.run.preparation is None:
+        return {}
+    figures: dict[str, float] = flatten_keys(record.run.preparation.notes["figures"])
+    if not record.scene.stones:
+        with suppress(UsageError, OSError):
+            bed, container = record.run.start(), record.scene.container
+            figures["porosity"] = measure_porosity(bed.position, bed.radius, container)
+    return figures
 
 
 def tabulate_errors(record: Record, cycle: int) -> tuple[Comparison, ...]:

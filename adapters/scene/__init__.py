@@ -3,6 +3,7 @@
 from adapters.scene.file import expand_schedule, load_scene
 from adapters.scene.inputs import INPUT_FILES, copy_inputs, record_scene
 from adapters.scene.model import list_omissions
+from adapters.scene.porosity import measure_porosity
 from adapters.scene.procedures import fill_procedure
 from adapters.scene.stages import bound_friction, draw_start, list_stages
 from adapters.scene.tables import MEMBERS_MOST, Procedure, Scene
@@ -11,5 +12,5 @@ from adapters.scene.values import flatten_keys
 __all__ = [
     "INPUT_FILES", "MEMBERS_MOST", "Procedure", "Scene", "bound_friction",
     "copy_inputs", "draw_start", "expand_schedule", "fill_procedure", "flatten_keys",
-    "list_omissions", "list_stages", "load_scene", "record_scene",
+    "list_omissions", "list_stages", "load_scene", "measure_porosity", "record_scene",
 ]  # fmt: skip

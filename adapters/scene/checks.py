@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from functools import partial
 from itertools import pairwise
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,15 @@ from adapters.errors import DumpError, SceneError, UsageError
 from adapters.files import read_load_series
 from adapters.scene import mechanics
 from adapters.scene.ballast import read_stored_bed
-from adapters.scene.values import Check, NotValid, Values, find_named_form, find_radii
+from adapters.scene.porosity import find_middle
+from adapters.scene.values import (
+    Check,
+    NotValid,
+    Values,
+    find_geometry,
+    find_named_form,
+    find_radii,
+)
 from trackbed.choices import explain_retired, find_choices
 from trackbed.scene_files import Problem, describe_error, suggest_word
 
@@ -139,6 +148,20 @@ def _check_stored_bed(scene: Values) -> Iterator[Problem]:
 def _check_rain(scene: Values) -> Iterator[Problem]:
     if scene.need("sample.rain_friction") > (most := scene.need("material.grain.friction")):
         yield Problem("sample.rain_friction", f"must be at most the grains' friction, {most:g}")
+
+
+def _check_porosity(scene: Values) -> Iterator[Problem]:
+    key = "sample.porosity"
+    if not scene.has(key):
+        return
+    grain, height = 2 * find_radii(scene).mean, scene.get("sample.fill_height") or inf
+    if find_named_form(scene) is not SPHERE:
+        yield Problem(key, "is reached by taps of spheres alone so far: leave it out")
+    elif find_middle(find_geometry(scene), grain, height) is None:
+        yield Problem(
+            key, "is measured a mean grain inside all sides, where this bed is less than two wide: "
+            f"give a larger one (a mean grain is {grain:.3g} m)"
+        )  # fmt: skip
 
 
 def _check_rolling(scene: Values) -> Iterator[Problem]:
@@ -282,9 +305,10 @@ def _check_relaxation(scene: Values) -> Iterator[Problem]:
 
 CHECKS: tuple[Check, ...] = (
     _check_alternatives, *(partial(_check_owned_keys, *row) for row in OWNED), _check_symmetry,
-    _check_grain_radius, _check_grading_scale, _check_stored_bed, _check_rain, _check_rolling,
-    _check_form, _check_series, _check_partial_piston, _check_crib, _check_stages, _check_procedure,
-    _check_jumps, _check_settlement, _check_seating, _check_launcher,
+    _check_grain_radius, _check_grading_scale, _check_stored_bed, _check_rain,
+    _check_porosity, _check_rolling, _check_form, _check_series, _check_partial_piston, _check_crib,
+    _check_stages, _check_procedure, _check_jumps, _check_settlement, _check_seating,
+    _check_launcher,
     *(partial(_check_choice, *row) for row in CHOICES), _check_relaxation, *mechanics.CHECKS,
 )  # fmt: skip
 

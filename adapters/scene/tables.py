@@ -87,6 +87,8 @@ class Sample(Table):
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 1  # seed of radii and start positions
     rain_friction: Positive | None = None
     """Coulomb's coefficient of all contacts while the bed rains [-]: less packs denser."""
+    porosity: Annotated[float, Field(ge=0.2, le=0.6, allow_inf_nan=False)] | None = None
+    """Share of voids in the middle of the bed [-], to which taps bring it after the rain."""
     grain_radius: GrainRadius | None = None
     grading: GradingKey | None = None
     """Grading by a standard's name, or sieves [mm] with the mass that passes [%], instead."""

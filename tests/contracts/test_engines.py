@@ -30,6 +30,7 @@ SCENES = {
     "loads in stages, series of stress": ("ballast", (
         "loading.stage=[{from_cycle=9,amplitude=1e5,mean=6e4,frequency=9.0}]",)),
     "less friction while it rains": ("ballast", ("sample.rain_friction=0.1",)),
+    "taps to a porosity": ("ballast", ("sample.porosity=0.4",)),
     "a bed from a saved state": ("ballast", ('sample.state="BED"',)),
     "stones of several spheres": ("karrech-coarse", ('sample.form="tetrahedron"',)),
 }  # fmt: skip
