@@ -25,6 +25,7 @@ from trackbed.series_file import SI
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 MEND = "mend it, in MeshLab by Close Holes and Re-Orient all faces coherently, or scan it again"
+PHYSICAL = "gmsh:physical"  # cell data of meshio with gmsh's physical groups
 FLAT = 1e-9
 """Volume over the cube of the extent [-] that is round-off."""
 LINES = 300
@@ -33,7 +34,7 @@ surface as they see it goes unnoticed in 5 % of meshes."""
 
 
 def list_groups(mesh: Any, kind: str) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Sets and physical groups of a meshio mesh by name: of nodes, and of cells of one ``kind``.
+    """Sets and groups (`find_marks`) of a meshio mesh by name: of nodes, of cells of one ``kind``.
 
     Cells are counted over all blocks of that kind, such as ``tetra``; a group of other cells is
     the set of their nodes.  Raises `ValueError` and others where cells and sets do not fit.
@@ -61,15 +62,27 @@ def list_groups(mesh: Any, kind: str) -> tuple[dict[str, Any], dict[str, Any]]:
         for name, entry in mesh.field_data.items()
         if np.shape(entry) == (2,)
     }
-    for block, tags in enumerate(mesh.cell_data.get("gmsh:physical", [])):
+    marks = find_marks(mesh)
+    for block, tags in enumerate(mesh.cell_data.get(marks, [])):
         for tag in np.unique(tags):
-            if tag:  # 0: in no group
+            if tag or marks != PHYSICAL:  # there 0 is in no group
                 name = names.get((mesh.cells[block].dim, int(tag)), str(int(tag)))
                 add(name, block, np.flatnonzero(np.asarray(tags) == tag))
     return (
         {name: np.unique(np.concatenate(parts)) for name, parts in nodes.items()},
         {name: np.unique(np.concatenate(parts)) for name, parts in elements.items()},
     )
+
+
+def find_marks(mesh: Any) -> str:
+    """Name of the cell data that number groups: gmsh's, or else the only array of whole numbers,
+    such as ``medit:ref`` or ``region``, of which some are alike; empty without one."""
+    if PHYSICAL in mesh.cell_data:
+        return PHYSICAL
+    joined = {k: np.concatenate(v) for k, v in mesh.cell_data.items() if not k.startswith("gmsh:")}
+    whole = [k for k, v in joined.items() if v.ndim == 1 and v.dtype.kind in "iu"]
+    marks = [name for name in whole if len(np.unique(joined[name])) < len(joined[name])]
+    return marks[0] if len(marks) == 1 else ""
 
 
 def read_mesh_file(path: str | os.PathLike[str], where: str) -> Any:

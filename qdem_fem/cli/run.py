@@ -163,6 +163,7 @@ def _print(content: dict[str, Any], as_json: bool) -> None:
         print(
             f"mass scaling adds {scaled['added_mass']:.4g} kg, "
             f"{100 * scaled['share']:.3g} % of the bodies' own mass"
+            + ("" if "gravity" in content["left_out"] else ", and as much of their weight")
         )
     if "estimated_s" in content:
         print(f"estimated time {content['estimated_s']:.3g} s on this machine")

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from qdem_fem.files import MeshError, warn_user
-from trackbed.mesh_file import list_groups, read_mesh_file
+from trackbed.mesh_file import PHYSICAL, find_marks, list_groups, read_mesh_file
 
 _ACCEPTED = (
     "give a skfem.MeshTet, a meshio.Mesh, a pair (nodes, elements) of arrays, "
@@ -121,6 +121,7 @@ def _read_meshio(mesh: Any, where: str) -> MeshParts:
     try:
         elements = np.concatenate(blocks)
         node_sets, element_sets = list_groups(mesh, "tetra")
+        marks = find_marks(mesh)
     except (IndexError, TypeError, ValueError, AttributeError, KeyError) as error:
         raise MeshError(
             f"cells and sets of the meshio mesh do not fit together: {error}",
@@ -132,8 +133,11 @@ def _read_meshio(mesh: Any, where: str) -> MeshParts:
             f"{where}: the groups {', '.join(sorted(lost))} are named, and their reader gives no "
             "cells of them: a cell in two groups keeps one in MSH 4; write MSH 2.2"
         )
-    if "gmsh:physical" in mesh.cell_data:
-        tags = [t for t, b in zip(mesh.cell_data["gmsh:physical"], mesh.cells, strict=True)
+    if unused := [k for k in mesh.cell_data if k != marks and not k.startswith("gmsh:")]:
+        rest = "" if marks else "; one array alone, of whole numbers, would number groups"
+        warn_user(f"{where}: these data of its cells are not used: {', '.join(unused)}{rest}")
+    if marks == PHYSICAL:
+        tags = [t for t, b in zip(mesh.cell_data[PHYSICAL], mesh.cells, strict=True)
                 if b.type == "tetra"]  # fmt: skip
         elements, element_sets = _join_groups(elements, np.concatenate(tags), element_sets)
     return MeshParts(mesh.points, elements, node_sets, element_sets)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from qdem_fem.files import ConditionError, QdemError, Series
-from qdem_fem.scene.doubts import warn_of_values
+from qdem_fem.scene.doubts import warn_of_unused, warn_of_values
 from qdem_fem.tables import BodyTable, choose_contact
 from trackbed.scene_files import Problem, describe_error
 
@@ -31,6 +31,7 @@ def make_simulation(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
     from qdem_fem.bodies import Body
     from qdem_fem.march import Simulation, check_held
 
+    warn_of_unused(prepared)
     if "track" in prepared.text.data:  # other scenes do not pay for its import
         from qdem_fem.track import TrackPrepared, enter_track
 
@@ -39,15 +40,10 @@ def make_simulation(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
         warn_of_values(prepared.scene, bodies)
         return run, bodies
     scene, table = prepared.scene, prepared.scene.simulation
-    bodies = {
-        body.name: Body(
-            prepared.meshes[body.name],
-            _make_material(body, prepared.meshes[body.name]),
-            name=body.name,
-            rigid=body.rigid,
-        )
-        for body in scene.body
-    }
+    bodies = {}
+    for body in scene.body:
+        mesh = prepared.meshes[body.name]
+        bodies[body.name] = Body(mesh, _make_material(body, mesh), name=body.name, rigid=body.rigid)
     warn_of_values(scene, bodies)
     options: dict[str, Any] = {name: getattr(table, name) for name in OPTIONS}
     run = Simulation(list(bodies.values()), contact=choose_contact(scene.contact), **options)

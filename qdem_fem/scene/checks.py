@@ -6,11 +6,12 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from pydantic import ValidationError
 
 from qdem_fem import tables
 from qdem_fem.element import MEASURES
-from qdem_fem.files import Integers, MeshError
+from qdem_fem.files import Integers, MeshError, warn_user
 from trackbed.scene_files import (
     Guide,
     Problem,
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
 
 GUIDE = Guide("cantilever", "simulation.duration=0.1")
+HELD_MOST = 0.5  # share of a load's nodes that may be held, as those of an edge are, unwarned [-]
 TRACK_GUIDE = Guide("track-small", "simulation.duration=0.1")
 """Of scenes with a table ``[track]``."""
 
@@ -59,6 +61,7 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> tables.Prepar
                 problems.append(step)
             else:
                 conditions.append(step)
+    problems += _find_vain_steps(conditions, meshes)
     probes: dict[str, tuple[str, Integers]] = {}
     for _, output in tables.list_tables(text, tables.Output):
         problems += _fill_probes(output, names, meshes, probes)
@@ -109,7 +112,7 @@ def _make_meshes(text: SceneText, folder: Path) -> tuple[dict[str, TetMesh], lis
             continue
         for region in body.regions if isinstance(body, tables.BodyTable) else ():
             if region not in mesh.element_sets:
-                near = suggest_word(region, mesh.element_sets) or "; the mesh has none"
+                near = suggest_word(region, mesh.element_sets) or "; the mesh has no sets or groups"
                 what = f"there is no element set {region!r}{near}"
                 problems.append(Problem(f"{key}.regions.{region}", what))
         meshes[name] = mesh
@@ -138,6 +141,26 @@ def _check_condition(
     yield from found
     if not found and mesh is not None:
         yield tables.Step(key, type(table).__name__.lower(), table.body, tuple(arguments))
+
+
+def _find_vain_steps(steps: list[tables.Step], meshes: dict[str, TetMesh]) -> Iterator[Problem]:
+    """Motions prescribed where all is fixed; loads that mostly go into supports are warned of."""
+    held = {name: np.zeros((len(mesh.nodes), 3), int) for name, mesh in meshes.items()}
+    order = ("fix", "prescribe", "load", "pressure")
+    for step in (one for verb in order for one in steps if one.verb == verb):
+        own, nodes, given = held[step.body], *step.arguments[:2]
+        if step.verb in order[:2]:
+            at = np.ix_(nodes, ["xyz".index(letter) for letter in given])
+            if step.verb == "prescribe" and (own[at] == 1).all():
+                yield Problem(f"{step.key}.component", "[[fix]] keeps it at zero at all its nodes")
+            own[at] = 1 + order.index(step.verb)
+            continue
+        still = own[nodes].all(axis=1, keepdims=True)  # whichever way a surface faces
+        if step.verb == "load":
+            still = own[nodes][:, given.values.any(axis=0)] > 0
+        if (share := still.mean(axis=0).max(initial=0.0)) > HELD_MOST:
+            warn_user(f"{step.key} acts on nodes of which {100 * share:.0f} % are held in its "
+                      "direction: that share strains nothing")  # fmt: skip
 
 
 def _fill_probes(

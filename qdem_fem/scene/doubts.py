@@ -9,9 +9,9 @@ import numpy as np
 
 from qdem_fem.bodies import estimate_bending
 from qdem_fem.element import MEASURES, find_displacement_gradient
-from qdem_fem.files import Floats, warn_user
+from qdem_fem.files import Floats, Series, warn_user
 from qdem_fem.march import split_motion
-from qdem_fem.tables import Scene
+from qdem_fem.tables import Prepared, Scene
 from trackbed.plausible import Quantity, describe_implausible
 
 
@@ -21,11 +21,14 @@ class DoubtNumbers:
 
     bending: float = 0.1  # shortfall of a deflection, of which a dry run warns [-]
     turned: float = 0.05  # share of a small strain that may be due to turning [-]
+    poisson: float = 0.49  # ratio above which the estimate of a mesh's error was seen to fail [-]
     single: float = 2e-6
     """Strain that rounding leaves in turning bodies in single precision, measured 1 to 2e-6 [-]."""
 
 
 DOUBT = DoubtNumbers()
+TIMED = "duration step safety sampling energy_interval vtu_interval checkpoint_interval audit modes"
+"""Keys of ``[simulation]`` and ``[output]`` that a static answer does not use."""
 
 
 def warn_of_values(scene: Scene, bodies: dict[str, Any]) -> None:
@@ -47,6 +50,32 @@ def warn_of_values(scene: Scene, bodies: dict[str, Any]) -> None:
     said = (describe_implausible(*value) for value in values)
     for text in dict.fromkeys(one for one in said if one):
         warn_user(text)
+    if locking := next(filter(is_locking, bodies.values()), None):
+        warn_user(
+            f"linear tetrahedra lock at a Poisson's ratio above {DOUBT.poisson:g}, as that of "
+            f"{locking.name}: displacements may be many times too small, and no error of the mesh "
+            f"is estimated; take {DOUBT.poisson:g}, or compare with a far finer mesh"
+        )
+
+
+def is_locking(body: Any) -> bool:
+    """Whether a body is so near to incompressible that linear tetrahedra lock."""
+    return not body.rigid and bool(np.max(body.material.poisson) > DOUBT.poisson)
+
+
+def warn_of_unused(prepared: Prepared) -> None:
+    """Warn of keys, given other than by default, and of series that the run does not use."""
+    table, given = prepared.scene.simulation, prepared.scene.model_dump(exclude_defaults=True)
+    unused = {"dynamic": "tolerance safety" if table.step else "tolerance", "static": TIMED}
+    rows = (f"{of}.{key}" for of in ("simulation", "output") for key in given.get(of, {}))
+    if keys := [row for row in rows if row.partition(".")[2] in unused[table.method].split()]:
+        beside = " of a given step" * (table.method == "dynamic" and "safety" in keys[-1])
+        warn_user(f"a {table.method} run{beside} does not use {', '.join(keys)}")
+    for step in prepared.conditions if table.method == "dynamic" else ():
+        for series in (one for one in step.arguments if isinstance(one, Series)):
+            if len(series.times) > 1 and (late := series.times[0]) >= table.duration:
+                text = f"{step.key} begins to change at {late:g} s, after the run has ended"
+                warn_user(f"{text}: it keeps its first value throughout")
 
 
 def sort_by_kind(bodies: dict[str, Any]) -> dict[str, list[Any]]:
@@ -63,7 +92,8 @@ def warn_of_bending(bodies: dict[str, Any]) -> None:
 
     No load is looked at, and no answer needed: whether a body bends is for the user to know."""
     for alike in sort_by_kind(bodies).values():
-        if not alike[0].rigid and (short := estimate_bending(alike[0])) > DOUBT.bending:
+        judged = not alike[0].rigid and not is_locking(alike[0])
+        if judged and (short := estimate_bending(alike[0])) > DOUBT.bending:
             warn_user(
                 f"if {alike[0].name} bends, it bends about {100 * short:.0f} % too little: linear "
                 "tetrahedra are too stiff; mesh it finer across"

@@ -189,7 +189,8 @@ def _format_step(summary: dict[str, Any]) -> str:
     if scaled := summary["mass_scaling"]:
         text += (
             f" Mass scaling added {scaled['added_mass']:.4g} kg, {100 * scaled['share']:.3g} % of "
-            "the bodies' own mass: inertia that they do not have."
+            "the bodies' own mass: inertia that they do not have"
+            + ("." if "gravity" in summary["left_out"] else ", and as much of their weight.")
         )
     return make_section("Time step", make_paragraph(escape(text)))
 

@@ -18,6 +18,7 @@ from qdem_fem.files import (
     EnergyLost,
     Floats,
     Interrupted,
+    NotConverged,
     Table,
     read_table,
     write_bodies_vtu,
@@ -33,6 +34,12 @@ ENERGIES = ("kinetic", "elastic", "external")
 CONTACT_ENERGIES = ("contact", "friction")
 VISCOUS_ENERGY = ("viscous",)
 CHECKPOINT, COST, PEAK, SEALS = "checkpoint.npz", "cost.json", "peak.npz", "tables"
+NO_REST = {
+    "inside out": "look at the units of material.young, of the mesh and of the loads",
+    "": "where a warning names parts of a mesh that share no face, join them or hold each, as they "
+    "turn about an edge or a point; else raise simulation.tolerance above the residual",
+}
+"""What to do about no static answer, by the words on how it ended."""
 
 
 @dataclass(frozen=True)
@@ -178,7 +185,11 @@ def run_static(prepared: Prepared, run: Any, bodies: dict[str, Any], folder: Run
     Raises `NotConverged` when the tolerance is not reached.
     """
     started, cpu = time.perf_counter(), time.process_time()
-    answer = run.relax(tolerance=prepared.scene.simulation.tolerance)
+    try:
+        answer = run.relax(tolerance=prepared.scene.simulation.tolerance)
+    except NotConverged as error:
+        remedy = next(text for end, text in NO_REST.items() if end in error.what)
+        raise NotConverged(error.what, where="simulation", remedy=remedy) from error
     cost = {"cpu_s": time.process_time() - cpu, "wall_s": time.perf_counter() - started}
     names = ("residual", "solver_bound", "steps")
     facts = {name: float(getattr(answer, name)) for name in names}

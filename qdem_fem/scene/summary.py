@@ -9,7 +9,7 @@ import numpy as np
 
 from qdem_fem.files import Floats, Series, read_table, warn_user
 from qdem_fem.report import Mode, find_peak_frequencies
-from qdem_fem.scene.doubts import sort_by_kind
+from qdem_fem.scene.doubts import is_locking, sort_by_kind
 from qdem_fem.scene.energy_account import list_energy_facts
 from qdem_fem.scene.run import Done, RunFolder
 from qdem_fem.tables import Prepared
@@ -56,6 +56,7 @@ def summarise_run(prepared: Prepared, done: Done, folder: RunFolder) -> dict[str
             name: getattr(done.discretisation, name)
             for name in ("displacement", "stress", "frequency")
             if done.discretisation is not None  # without elastic energy there are none
+            and not any(map(is_locking, done.bodies.values()))
         },
         "left_out": prepared.scene.list_left_out(),
     }

@@ -57,6 +57,9 @@ def find_output_faults(text: SceneText) -> Iterator[Problem]:
         return
     duration = simulation.duration
     if simulation.method == "static":
+        if simulation.mass_scaling is not None:
+            what = "a static answer has no time step, and the mass added would weigh: leave it out"
+            yield Problem("simulation.mass_scaling", what)
         return
     if duration is None:
         yield Problem("simulation.duration", "missing: a dynamic run needs it")

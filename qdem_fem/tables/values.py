@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from qdem_fem.files import Floats, Integers, Series, make_ramp
+from qdem_fem.files import Floats, Integers, Series, make_ramp, warn_user
 from qdem_fem.tables.keys import Mesh, Nodes, SeriesTable
 from qdem_fem.tables.types import WrongKey
 from trackbed.errors import LibraryMissing, UsageError
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 SIDE = 1e-6
 """Distance to a side, over the size of the mesh, within which a node lies on it; mesh files keep
 single precision or a few digits."""
+REACH = 0.6124
+"""Greatest distance of a point in an element from a corner, over its longest edge (Jung 1901)."""
 KINDS = ("set", "box", "plane", "nearest", "all")
 CELLS_MOST = 4_000_000
 """Most cells of a generated mesh: what 128 GB of memory hold."""
@@ -103,6 +105,11 @@ def find_named_nodes(nodes: Nodes, mesh: TetMesh, key: str) -> Integers:
     elif nodes.nearest is not None:
         distance = np.linalg.norm(x - np.array(nodes.nearest), axis=1)
         found = np.argmin(np.where(used, distance, np.inf)).reshape(1)
+        corners = x[mesh.elements[(mesh.elements == found).any(axis=1)]]
+        longest = np.linalg.norm(corners[:, :, None] - corners[:, None], axis=-1).max()
+        if (away := distance[found[0]]) > REACH * longest:
+            text = f"{key}.nearest is outside the body: the node at {x[found[0]]} m is taken"
+            warn_user(f"{text}, {away:.3g} m away; edges there are {longest:.3g} m long at most")
     else:
         found = np.flatnonzero(used)
     found = found[used[found]]

@@ -156,3 +156,16 @@ def test_a_mesh_in_millimetres_is_scaled(tmp_path: Path) -> None:
         make_body_mesh(
             Mesh(box=BoxMesh(size=(1, 1, 1), cells=(1, 1, 1)), scale=1e-3), tmp_path, "m"
         )
+
+
+def test_data_of_cells_that_are_not_used_are_named() -> None:
+    """Of a file with a modulus for each element, or with two arrays that may number groups."""
+    elements = bar().elements
+    for names, said in (
+        (["young"], "mesh: these data of its cells are not used: young"),
+        (["region", "part"], "not used: region, part; one array alone"),
+    ):
+        kind = float if names == ["young"] else int
+        held = {name: [np.ones(len(elements), kind)] for name in names}
+        with pytest.warns(q.SceneWarning, match=said):
+            read_mesh(meshio.Mesh(bar().nodes, [("tetra", elements)], cell_data=held))

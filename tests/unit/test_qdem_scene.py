@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import re
 import tomllib
+import warnings
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +15,10 @@ import meshio
 import numpy as np
 import pytest
 
-from qdem_fem.files.errors import SceneError
+from qdem_fem.files.errors import NotConverged, SceneError, SceneWarning
 from qdem_fem.files.series import Series
 from qdem_fem.mesh.generation import make_box_mesh
+from qdem_fem.scene import RunFolder, run_static, summarise_run
 from qdem_fem.scene.build import make_simulation
 from qdem_fem.scene.checks import load_scene
 from qdem_fem.tables.prepared import Prepared
@@ -95,7 +98,8 @@ def test_commented_keys_of_the_specification_are_valid(tmp_path: Path) -> None:
     text = text.replace('method = "static"', 'method = "dynamic"')
     text = text.replace("cells = [48, 6, 6]", SMALL)
     assert len(tomllib.loads(text)["simulation"]) == 9
-    prepared = load(tmp_path, text)
+    with pytest.warns(SceneWarning, match=r"load\.0 acts on nodes of which 100 % are held"):
+        prepared = load(tmp_path, text)
     verbs = [step.verb for step in prepared.conditions]
     assert sorted(verbs) == ["fix", "load", "periodic", "prescribe", "pressure", "roller"]
 
@@ -113,7 +117,7 @@ def test_commented_keys_of_the_specification_are_valid(tmp_path: Path) -> None:
 )
 def test_nodes_are_selected(tmp_path: Path, nodes: str, count: int) -> None:
     """Each way to name nodes, counted by hand on a grid of 5 x 3 x 3 nodes 0.5 m apart."""
-    prepared = load(tmp_path, BASE.replace('{ set = "x-max" }', nodes))
+    prepared = load(tmp_path, BASE.replace('{ set = "x-max" }', nodes), 'fix.0.components="x"')
     assert len(prepared.conditions[1].arguments[0]) == count
 
 
@@ -282,7 +286,8 @@ def test_conditions_that_contradict_one_another_are_problems_of_the_scene(tmp_pa
     with pytest.raises(SceneError, match=r"roller: a node is moved along x out of its plane"):
         make_simulation(prepared)
     prepared = load(tmp_path, BASE, 'simulation.method="static"', 'fix.0.components="xy"')
-    with pytest.raises(SceneError, match=r"fix: beam has no static answer: 1 of the 6"):
+    unused = pytest.warns(SceneWarning, match=r"a static run does not use simulation\.duration")
+    with unused, pytest.raises(SceneError, match=r"fix: beam has no static answer: 1 of the 6"):
         make_simulation(prepared)
 
 
@@ -290,3 +295,74 @@ def test_same_name_twice(tmp_path: Path) -> None:
     """Two bodies of one name."""
     body = BASE[: BASE.index("[simulation]")]
     assert "body.0 has this name already" in refusal(tmp_path, body + BASE)
+
+
+# ---------------------------------------------------------------------------- what has no effect
+
+
+MOVED = '[[prescribe]]\nbody = "beam"\nnodes = { set = "x-min" }\ncomponent = "z"\nvalue = 1e-4\n'
+STILL = BASE.replace("duration = 0.1", 'method = "static"')
+
+
+def test_what_contradicts_is_refused(tmp_path: Path) -> None:
+    """Mass added to a static answer only weighs; what is fixed is not moved."""
+    said = refusal(tmp_path, STILL, "simulation.mass_scaling=1e-5")
+    assert "scene.toml: 1 problem" in said
+    assert "simulation.mass_scaling: a static answer has no time step" in said
+    said = refusal(tmp_path, BASE.replace("[output.probes]", MOVED + "[output.probes]"))
+    assert "prescribe.0.component: [[fix]] keeps it at zero at all its nodes" in said
+    load(
+        tmp_path,
+        BASE.replace("[output.probes]", MOVED + "[output.probes]"),
+        'fix.0.components="xy"',
+    )
+
+
+@pytest.mark.parametrize(
+    ("overrides", "said"),
+    [
+        (["simulation.tolerance=1e-3"], "a dynamic run does not use simulation.tolerance"),
+        (["simulation.step=1e-5", "simulation.safety=0.5"], "a dynamic run of a given step does not use simulation.safety"),
+        (['simulation.method="static"', "output.modes=1"], "a static run does not use simulation.duration, output.modes"),
+        (['load.0.nodes.set="x-min"'], "load.0 acts on nodes of which 100 % are held in its direction"),
+        (["load.0.force={times=[0.2,0.3],values=[[1,0,0],[2,0,0]]}"], "load.0 begins to change at 0.2 s, after the run has ended"),
+        (["output.probes.tip.nearest=[1e3,1,1]"], "output.probes.tip.nearest is outside the body: the node at [2. 1. 1.] m is taken, 998 m away"),
+        (["body.0.material.poisson=0.4901"], "linear tetrahedra lock at a Poisson's ratio above 0.49, as that of beam"),
+    ],
+)  # fmt: skip
+def test_what_has_no_effect_is_named(tmp_path: Path, overrides: list[str], said: str) -> None:
+    """A key, a load or a place that the run computes without, and a mesh that can not be judged."""
+    with pytest.warns(SceneWarning, match=re.escape(said)):
+        make_simulation(load(tmp_path, BASE, *overrides))
+    make_simulation(load(tmp_path, BASE, "simulation.safety=0.9", "body.0.material.poisson=0.49"))
+    make_simulation(load(tmp_path, BASE, "output.probes.tip.nearest=[1.75,0.75,0.75]"))  # a centre
+
+
+def test_no_error_of_a_mesh_that_locks(tmp_path: Path) -> None:
+    """Near to incompressible the estimate said 33 % where 97 % were missing."""
+    folder = RunFolder(tmp_path)
+    for ratio, names in ((0.49, 3), (0.499, 0)):
+        prepared = load(tmp_path, STILL, f"body.0.material.poisson={ratio}")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SceneWarning)
+            done = run_static(prepared, *make_simulation(prepared), folder)
+        assert len(summarise_run(prepared, done, folder)["discretisation"]) == names
+
+
+def test_no_static_answer_by_its_cause(tmp_path: Path) -> None:
+    """Young's modulus in GPa turns elements inside out; what is slow may hang by an edge."""
+    for overrides, cause in (
+        (
+            ["body.0.material.young=45", "load.0.force=[0,0,-200]"],
+            r"inside out.*\n.*units of material\.young",
+        ),
+        (["simulation.tolerance=1e-14"], r"share no face.*simulation\.tolerance"),
+    ):
+        prepared = load(tmp_path, STILL, *overrides)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SceneWarning)
+            run, bodies = make_simulation(prepared)
+        if "tolerance" in cause:
+            run.relax = partial(run.relax, max_steps=5)
+        with pytest.raises(NotConverged, match=cause):
+            run_static(prepared, run, bodies, RunFolder(tmp_path))
