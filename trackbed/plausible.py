@@ -8,7 +8,7 @@ from typing import Literal
 
 Quantity = Literal[
     "friction", "density", "young", "grain", "body", "settlement", "strain",
-    "bending", "line_mass", "stiffness", "mass", "axle", "speed", "level",
+    "bending", "line_mass", "stiffness", "mass", "axle", "speed", "level", "crib",
 ]  # fmt: skip
 DEGREES = "an angle in degrees"
 
@@ -39,9 +39,9 @@ class PlausibleBounds:
         (("g/cm^3", 1e3), ("kN/m^3", 1e3 / 9.81), ("t/mm^3", 1e12), ("g/m^3", 1e-3)),
     )  # fmt: skip
     young: Bounds = Bounds(
-        "Young's modulus", "Pa", 1e5, 2e12, (1e6, 1e12), (("GPa", 1e9), ("MPa", 1e6), ("kPa", 1e3))
+        "Young's modulus", "Pa", 1e5, 2e12, (1e6, 7e11), (("GPa", 1e9), ("MPa", 1e6), ("kPa", 1e3))
     )
-    grain: Bounds = Bounds("grain", "m", 0.0, 1.0, (1e-4, 1.0), (("mm", 1e-3), ("um", 1e-6)))
+    grain: Bounds = Bounds("grain", "m", 1e-4, 1.0, (1e-4, 1.0), (("mm", 1e-3), ("um", 1e-6)))
     settlement: Bounds = Bounds("settlement", "m", 0.0, 1.0, (1e-5, 0.5), (("mm", 1e-3),))
     strain: Bounds = Bounds("strain", "", 0.0, 1.0, (1e-5, 0.5), (("%", 0.01),))
     body: Bounds = Bounds("body", "m", 0.0, 100.0, (1e-3, 100.0), (("mm", 1e-3), ("um", 1e-6)))
@@ -58,6 +58,7 @@ class PlausibleBounds:
     )
     speed: Bounds = Bounds("speed", "m/s", 0.0, 150.0, (5.0, 140.0), (("km/h", 1 / 3.6),))
     level: Bounds = Bounds("limit of a level", "m", 1e-5, 0.1, (1e-4, 0.05), (("mm", 1e-3),))
+    crib: Bounds = Bounds("crib's height", "m", 0.0, 1.0, (0.05, 0.6), (("mm", 1e-3), ("cm", 1e-2)))
 
 
 PLAUSIBLE = PlausibleBounds()

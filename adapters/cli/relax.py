@@ -54,7 +54,7 @@ def run_relax(arguments: argparse.Namespace) -> int:
     from adapters.engines import find_crib_forces
     from adapters.files import check_state_name, read_state_file, write_state_file
     from adapters.relaxation import relax, relax_bare
-    from adapters.scene import flatten_keys, load_scene
+    from adapters.scene import flatten_keys, judge_bed, load_scene
 
     if not arguments.out.parent.is_dir():
         raise UsageError(
@@ -76,8 +76,9 @@ def run_relax(arguments: argparse.Namespace) -> int:
     density = scene.material.grain.density
     state = read_state_file(arguments.state, density)
     walls = scene.walls(state.piston_height)
-    if doubt := judge_state(state, walls, str(arguments.state)):
-        print(f"warning: {doubt}", file=sys.stderr)
+    for judge in (judge_state, judge_bed):
+        if doubt := judge(state, walls, str(arguments.state)):
+            print(f"warning: {doubt}", file=sys.stderr)
     if arguments.before is None:
         load = float(scene.stress_at(0.0)) * scene.loaded_area
         if len(state.radius):
@@ -94,6 +95,10 @@ def run_relax(arguments: argparse.Namespace) -> int:
             state.position, before, scene.walls(before.piston_height), scene.stiffness,
             walls_after=walls, method=arguments.method,
         )  # fmt: skip
+    moved = np.linalg.norm(relaxation.position - state.position, axis=1) / state.radius
+    if moved.max() > 1:
+        said = f"{moved.max():.2g} of its radii: look whether radii and places belong together"
+        print(f"warning: grain {state.identifier[moved.argmax()]} moved {said}", file=sys.stderr)
     still = np.zeros_like(state.position)
     # Contacts and wall forces belong to the positions before and are left out.
     relaxed = state.move_to(

@@ -132,13 +132,9 @@ def run_command(arguments: argparse.Namespace) -> int:
         print_result(folder)
         return 0
     procedure.run_scene(
-        arguments.scene,
-        folder,
-        control=arguments.control,
-        overrides=overrides,
-        dry_run=arguments.dry_run,
-        cycle_by_cycle=arguments.cycle_by_cycle,
-    )
+        arguments.scene, folder, control=arguments.control, overrides=overrides,
+        dry_run=arguments.dry_run, cycle_by_cycle=arguments.cycle_by_cycle,
+    )  # fmt: skip
     if not arguments.dry_run:
         print_result(folder)
     return 0

@@ -13,12 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from adapters.bed import WHOLE, Container, FloatArray, IntArray, State, contact_law
-from adapters.engines.decks import (
-    PISTON_MARGIN,
-    STATE_COLUMNS,
-    cover_rectangle,
-    place_piston_atom,
-)
+from adapters.engines.decks import PISTON_MARGIN, STATE_COLUMNS, cover_rectangle, place_piston_atom
 from adapters.engines.plan import find_rolling_stiffness
 from adapters.files import Frame, read_frames
 from adapters.scene import Scene

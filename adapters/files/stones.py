@@ -67,8 +67,7 @@ def gather_stones(form: Form, spheres: State, bodies: Frame) -> State:
             remedy="a shorter time step; one process of the engine, without mpirun",
         )  # fmt: skip
     contacts = replace(
-        spheres.contacts,
-        pair=identifier[(spheres.contacts.pair - spheres.identifier[0]) // count],
+        spheres.contacts, pair=identifier[(spheres.contacts.pair - spheres.identifier[0]) // count]
     )
     walls = {
         name: force.reshape(-1, count, 3).sum(axis=1) for name, force in spheres.wall_force.items()

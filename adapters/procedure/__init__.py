@@ -3,13 +3,7 @@
 from adapters.procedure import run
 from adapters.procedure.checks import BOUNDS
 from adapters.procedure.forecast import estimate_gain, estimate_sinking
-from adapters.procedure.history import (
-    AVERAGED,
-    History,
-    find_speed_up,
-    list_jumped_spans,
-    sum_cost,
-)
+from adapters.procedure.history import AVERAGED, History, find_speed_up, list_jumped_spans, sum_cost
 from adapters.procedure.members import (
     Settled,
     describe_result,

@@ -11,7 +11,7 @@ from adapters.bed import GRAVITY, OVERLAP_BOUND, FloatArray, State, find_sample_
 from adapters.bed.stones import find_kinetic_energies, find_touching
 from adapters.errors import EngineFailed, NotCredible
 from adapters.files import Window
-from adapters.scene import Scene
+from adapters.scene import DOUBTFUL, Scene, estimate_swing
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,6 @@ class BoundNumbers:
 
     force_error: float = 0.25  # greatest rms of force minus target in a cycle over its peak [-]
     force_error_goal: float = 0.03  # the same, as the report's goal [-]
-    own_frequency: float = 4.0  # of a piston on its bed over the load's: below, inertia is felt [-]
     force_start_cycles: int = 3  # in which the piston finds the bed: its force is not judged
     rise_floor: float = 1e-3  # less of the mean radius hurts nothing, whatever the window shows [-]
 
@@ -48,40 +47,35 @@ def check_complete(scene: Scene, window: Window, cycles: int) -> None:
     """
     if len(window) != cycles or np.any(np.diff(window.time_step) != scene.steps_per_cycle):
         raise EngineFailed(
-            f"{len(window)} of {cycles} cycle ends were written",
-            where="states.dump",
+            f"{len(window)} of {cycles} cycle ends were written", where="states.dump",
             remedy="the engine ended early; resume computes the window again",
-        )
+        )  # fmt: skip
     lost = np.setdiff1d(np.arange(1, scene.grain_count + 1), window.identifier)
     if len(lost):
         raise NotCredible(
-            f"{len(lost)} grains are lost: {', '.join(map(str, lost[:10]))}",
-            where="states.dump",
+            f"{len(lost)} grains are lost: {', '.join(map(str, lost[:10]))}", where="states.dump",
             remedy="a shorter time step; look whether the container holds them",
-        )
+        )  # fmt: skip
     for name in ("position", "velocity", "spin"):
         bad = ~np.isfinite(getattr(window, name)).all(axis=(1, 2))
         if bad.any():
             raise NotCredible(
-                f"{name} is not finite from cycle {window.cycle[bad][0]} on",
-                where="states.dump",
+                f"{name} is not finite from cycle {window.cycle[bad][0]} on", where="states.dump",
                 remedy="a shorter time step; grains may share one centre",
-            )
+            )  # fmt: skip
     track = window.piston
     if not np.isin(window.time_step[1:], track.time_step).all():
         raise EngineFailed(
             f"the piston's record ends at step {track.time_step.max(initial=0)}, "
             f"the window at {window.time_step[-1]}",
-            where="piston.txt",
-            remedy="the engine ended early; resume computes the window again",
-        )
+            where="piston.txt", remedy="the engine ended early; resume computes the window again",
+        )  # fmt: skip
     finite = np.isfinite([getattr(track, f.name) for f in fields(track)]).all(axis=0)
     if not finite.all():
         raise NotCredible(
             f"the piston's record is not finite from step {track.time_step[~finite][0]} on",
-            where="piston.txt",
-            remedy="a shorter time step, or a heavier piston",
-        )
+            where="piston.txt", remedy="a shorter time step, or a heavier piston",
+        )  # fmt: skip
 
 
 def check_state(scene: Scene, state: State) -> None:
@@ -89,26 +83,23 @@ def check_state(scene: Scene, state: State) -> None:
     lost = scene.grain_count - len(state.identifier)
     if lost:
         raise NotCredible(
-            f"{lost} of {scene.grain_count} grains are lost",
-            where="preparation",
+            f"{lost} of {scene.grain_count} grains are lost", where="preparation",
             remedy="a shorter time step, a looser start (sample.relative_density_start); look "
             "whether the container holds them",
-        )
+        )  # fmt: skip
     if not np.isfinite(state.position).all():
         raise NotCredible(
-            "a position of the settled bed is not finite",
-            where="preparation",
+            "a position of the settled bed is not finite", where="preparation",
             remedy="a shorter time step",
-        )
+        )  # fmt: skip
     touching = find_touching(scene.form, state, scene.container.walls())
     radius = float(state.radius.min()) * scene.form.usual
     share = float(touching.overlap.max(initial=0.0)) / radius
     if not share <= OVERLAP_BOUND:
         raise NotCredible(
             f"the greatest overlap of the settled bed is {share:.3g} of the smallest radius",
-            where="preparation",
-            remedy="a shorter time step, or stiffer grains",
-        )
+            where="preparation", remedy="a shorter time step, or stiffer grains",
+        )  # fmt: skip
 
 
 def measure(scene: Scene, window: Window) -> WindowFigures:
@@ -167,8 +158,9 @@ def advise_other_piston(scene: Scene, own_frequency: float) -> str:
     radius = np.array([scene.sample.radii.mean])
     grains = scene.loading.piston_mass / find_sample_mass(radius, scene.material.grain.density)[0]
     why, other = f"as heavy as {grains:.2g} mean grains", "heavier"
-    if own_frequency < BOUNDS.own_frequency:
-        why, other = f"swinging on its bed {own_frequency:.2g} times as fast as the load", "lighter"
+    times = np.fmin(own_frequency, estimate_swing(scene))  # a piston too heavy shows none
+    if times < DOUBTFUL.own_frequency:
+        why, other = f"swinging on its bed {times:.2g} times as fast as the load", "lighter"
     return (
         f"the piston, {why}, does not follow its load: a {other} one (loading.piston_mass), or a "
         "lower loading.frequency"

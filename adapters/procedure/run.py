@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from adapters.engines import allow_interrupts, find_engine, get_engine, list_real_engines
-from adapters.errors import EngineMissing, SceneError, UsageError
+from adapters.errors import EngineMissing, NotConverged, SceneError, UsageError
 from adapters.files import RunFolder, explain_full_disk
 from adapters.procedure import stages
 from adapters.procedure.controlled import settle_controlled
@@ -27,10 +27,12 @@ from adapters.scene import (
     Scene,
     bound_friction,
     copy_inputs,
+    count_layers,
     draw_start,
     list_stages,
     load_scene,
     record_scene,
+    warn_of_bed,
 )
 from trackbed.memory import refuse_more_memory
 from trackbed.run_files import list_differences, record_provenance, refuse_writing, write_whole
@@ -88,7 +90,7 @@ def run_scene(
     refuse_large(scene)
     if control:
         refuse_unloaded(scene, scene_path)
-    for warning in (*scene.warnings, *warn_without_jumps(scene)):
+    for warning in (*scene.warnings, *warn_of_bed(scene), *warn_without_jumps(scene)):
         progress.print_line(f"warning: {warning}")
     if dry_run:
         _write_dry_run(scene, run_path)
@@ -248,10 +250,13 @@ def run_variant(
     if variant == Variant():
         run.clock = Clock(0.0)  # it bears the start-up of Python; the others come in its wake
     progress.start()
-    if scene.procedure is None or scene.loading is None:
-        stages.prepare(run)
-    else:
-        settle(run)
+    try:
+        (settle if scene.procedure and scene.loading else stages.prepare)(run)
+    except NotConverged as error:
+        if count_layers(scene) >= 1:
+            raise
+        remedy = "more grains: these make less than one layer, and roll on whatever damps them"
+        raise NotConverged(error.what, where=error.where, remedy=remedy) from error
     here.write_settlement()  # a run killed after its last stage may miss a row
     return here
 

@@ -35,6 +35,10 @@ class DoubtfulNumbers:
     """Greatest time step over the Rayleigh time [-], which the scene's word "fast" stands for: what
     it costs in accuracy is measured in docs/engines.md."""
     width: int = 8  # least one of a container [mean grain diameters]
+    own_frequency: float = 4.0  # of a piston on its bed over the load's: below, inertia is felt [-]
+    wall_give: float = 10.0  # of what a grain enters a wall over what it enters another grain [-]
+    gap: float = 0.5
+    """Gap to all below from which a grain floats [mean radii]; none of 265 settled beds has it."""
     steps: int = 100  # least number of time steps a cycle
     jump: int = 10  # most cycles of one for each cycle fitted: above, noise is extrapolated
 
@@ -225,17 +229,18 @@ def _warn_of_far_jump(scene: Values) -> Iterator[Problem]:
 SIZES: tuple[tuple[str, Quantity, float], ...] = (
     ("material.grain.friction", "friction", 1), ("material.wall.friction", "friction", 1),
     ("material.grain.young", "young", 1), ("material.wall.young", "young", 1),
-    ("material.grain.density", "density", 1), ("sample.grain_radius.mean", "grain", 2),
+    ("material.grain.density", "density", 1), ("loading.crib", "crib", 1), ("", "grain", 2),
     ("sample.radius", "body", 2), ("sample.size_x", "body", 1), ("sample.size_y", "body", 1),
-    ("loading.crib", "body", 1),
 )  # fmt: skip
-"""Keys whose values are looked at for a unit that is not SI, and factors from radii to sizes."""
+"""Keys (none: the mean radius) that are looked at for other units than SI, factors to sizes."""
 
 
 def _warn_of_implausible_size(
     key: str, quantity: Quantity, factor: float, scene: Values
 ) -> Iterator[Problem]:
-    if said := describe_implausible(quantity, factor * scene.need(key), key):
+    key = key or name_radii(scene)
+    value = find_radii(scene).mean if quantity == "grain" else scene.need(key)
+    if said := describe_implausible(quantity, factor * value, key):
         yield Problem(key, said.removeprefix(f"{key}: "))
 
 

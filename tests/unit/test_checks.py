@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adapters.bed.contact_law import OVERLAP_BOUND
+from adapters.bed.contact_law import OVERLAP_BOUND, find_overlap_under_force
 from adapters.bed.sample import GRAVITY
 from adapters.bed.state import make_no_contacts
 from adapters.errors import EngineFailed, NotCredible
@@ -18,6 +18,7 @@ from adapters.files.window import PistonTrack, Window
 from adapters.procedure.checks import (
     BOUNDS,
     WindowFigures,
+    advise_other_piston,
     check_bounds,
     check_complete,
     check_rise,
@@ -25,6 +26,7 @@ from adapters.procedure.checks import (
     check_window,
     measure,
 )
+from adapters.scene.bearing import estimate_swing
 from adapters.scene.tables import Scene
 
 RADIUS = 3e-3
@@ -224,6 +226,25 @@ def test_a_piston_that_swings_is_to_be_lighter(times: float, word: str) -> None:
     with pytest.raises(NotCredible) as caught:
         check_bounds(SCENE, replace(figures, force_error=0.3))
     assert f"a {word} one (loading.piston_mass)" in caught.value.remedy
+
+
+def test_a_piston_that_the_bed_hardly_moves_is_to_be_lighter() -> None:
+    """k = 3/2 sigma A/(n delta): so heavy that it swings 3.9 times as fast, whatever it shows."""
+    assert SCENE.loading is not None
+    mass = SCENE.loading.piston_mass * (estimate_swing(SCENE) / 3.9) ** 2
+    own = SCENE.loading.model_copy(update={"piston_mass": mass})
+    heavy = SCENE.model_copy(update={"loading": own})
+    assert estimate_swing(heavy) == pytest.approx(3.9)
+    radius, modulus = np.array(RADIUS), SCENE.stiffness.grain
+    force = 1000.0 * (2 * RADIUS) ** 2  # on a grain; 1 Pa more closes delta by d delta/d sigma
+    bend = np.diff(find_overlap_under_force(force * np.array([1, 1 + 1e-6]), modulus, radius / 2))
+    stiffness = 1000.0 * 1e-6 * SCENE.loaded_area / bend[0]  # of less than a layer: n = 1
+    times = np.sqrt(stiffness / mass) / (2 * np.pi) * SCENE.loading.period
+    assert times == pytest.approx(3.9, rel=1e-5)
+    for shown in (np.nan, 9.0):
+        assert "3.9 times as fast as the load, does not follow its load: a lighter" in (
+            advise_other_piston(heavy, shown)
+        )
 
 
 def test_missing_cycles() -> None:

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from adapters.engines.contract import get_engine, list_engines, list_real_engines
 from adapters.errors import SceneError
 from adapters.files.load_series import read_load_series
+from adapters.scene.bearing import count_layers, warn_of_bed
 from adapters.scene.file import load_scene
 from adapters.scene.procedures import schedule_jumps
 from adapters.scene.tables import Loading, Procedure, Scene
@@ -73,7 +74,7 @@ def test_shipped_scenes_load_without_doubts() -> None:
     assert names == ["ballast", "cluster", "karrech", "karrech-coarse", "karrech-partial"]
     for name in names:
         scene = load_scene(Path(__file__).parents[2] / "trackbed" / "scenes" / f"{name}.toml")
-        assert scene.warnings == ()
+        assert (*scene.warnings, *warn_of_bed(scene)) == ()
         assert scene.engine.name == "auto"
     with pytest.raises(KeyError, match="karrech-coarse"):
         read_template("carrech")
@@ -255,6 +256,23 @@ def test_doubts_are_warnings(tmp_path: Path, override: str, words: str) -> None:
     history = [override, 'procedure.settlement="history"']
     warnings = load_scene(write(tmp_path, KARRECH), history).warnings
     assert len(said) - len(warnings) == ("procedure.h" in override)
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("sample.radius=20.0", "sample: the grains make 0.00014 of a layer"),
+        ("material.wall.young=210e3", "material.wall.young: grains enter walls"),
+        ("loading.piston_mass=5000.0", "loading.piston_mass: it swings on its bed at most 0.18"),
+    ],
+)
+def test_what_hardly_bears_is_said(tmp_path: Path, override: str, words: str) -> None:
+    """By each key alone; 1,085 grains of 3.2 mm make 4 N r^2/(pi R^2/4) layers."""
+    scene = load_scene(write(tmp_path, KARRECH), [override])
+    said = list(warn_of_bed(scene))
+    assert any(words in one for one in said), said
+    thin = 1085 * (2 * 3.2e-3) ** 2 / (np.pi * 20.0**2 / 4)
+    assert "radius" not in override or count_layers(scene) == pytest.approx(thin)
 
 
 # ---------------------------------------------------------------------------- what is refused

@@ -13,6 +13,7 @@ from adapters.errors import SceneError
 from adapters.files.states import write_state_file
 from adapters.files.window import load_window
 from adapters.procedure.run import resume, run_scene
+from adapters.scene.bearing import warn_of_bed
 from adapters.scene.file import load_scene
 from adapters.scene.stages import draw_start
 from tests.engine_sample import QUIET, TINY
@@ -90,6 +91,16 @@ def test_a_bed_of_another_container_is_refused(
             continue
         with pytest.raises(SceneError, match=re.escape(words)):
             draw_start(scene)
+
+
+def test_a_bed_that_floats_is_said(bed: State, tmp_path: Path) -> None:
+    """All of it, or a grain of it; it may fall as the rain does, so it is no error."""
+    for grains, words in ((slice(0), None), (slice(2), "2 of 3 grains"), (slice(1), "1 of 3")):
+        position = bed.position.copy()
+        position[grains, 2] += 0.03
+        write_state_file(bed.move_to(position), path := tmp_path / "bed.npz")
+        said = [*warn_of_bed(load_scene(COARSE, [f'sample.state="{path}"']))]
+        assert [words in one for one in said if "rest neither" in one] == [True] * bool(words)
 
 
 def test_a_run_keeps_its_bed(tmp_path: Path) -> None:

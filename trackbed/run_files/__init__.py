@@ -21,12 +21,7 @@ from trackbed.run_files.folder import (
     write_result,
 )
 from trackbed.run_files.provenance import record_provenance
-from trackbed.run_files.signals import (
-    hold_signals,
-    note_interrupts,
-    note_signals,
-    raise_on_signals,
-)
+from trackbed.run_files.signals import hold_signals, note_interrupts, note_signals, raise_on_signals
 from trackbed.run_files.whole import (
     SEAL,
     append_text,
