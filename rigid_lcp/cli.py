@@ -62,7 +62,7 @@ def _preview_run(file: SceneFile) -> dict[str, Any]:
 
     _, run = make_simulation(file)
     tables = file.tables.run
-    steps, step = plan_steps(file)
+    steps, step = plan_steps(tables)
     seconds = time_step(run.advance, step, steps)
     return {
         "title": file.tables.title,

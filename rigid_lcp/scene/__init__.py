@@ -7,7 +7,6 @@ from rigid_lcp.scene.run import (
     describe_scans,
     list_left_out,
     make_simulation,
-    plan_steps,
     read_frame,
     read_history,
     rebuild_frame_scene,
@@ -15,6 +14,7 @@ from rigid_lcp.scene.run import (
     summarise_run,
 )
 from rigid_lcp.scene.simulation import Simulation
+from rigid_lcp.scene.types import plan_steps
 
 __all__ = [
     "RunFolder", "SceneFile", "Simulation", "count_unknowns", "describe_scans", "list_doubts",

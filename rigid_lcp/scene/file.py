@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from math import ceil, inf
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from rigid_lcp.scene.types import (
     SceneTables,
     Stones,
     find_faults,
+    plan_steps,
 )
 from trackbed.errors import MeshError
 from trackbed.plausible import describe_implausible
@@ -240,7 +242,7 @@ def refuse_lost_vertices(given: Floats, shape: shapes.Polyhedron) -> None:
 
 
 def list_doubts(tables: SceneTables) -> list[str]:
-    """Sentences on values that are likely in another unit than SI."""
+    """Sentences on values that are likely in another unit than SI, and on what is not used."""
     named: list[tuple[str, Any]] = [("surface", tables.surface)]
     for kind in ("ground", "body", "grains", "stones"):
         named += [(f"{kind}.{i}", one) for i, one in enumerate(getattr(tables, kind) or ())]
@@ -256,7 +258,33 @@ def list_doubts(tables: SceneTables) -> list[str]:
                 np.ptp(np.array(one.vertices), axis=0).max()
             )  # fmt: skip
             found.append(describe_implausible("body", max(size, *(one.box or [0.0])), key))
-    return [said for said in found if said]
+    return [*(said for said in found if said), *list_unused(tables)]
+
+
+def list_unused(tables: SceneTables) -> Iterator[str]:
+    """Sentences on keys that are given and change nothing in the run."""
+    steps, step = plan_steps(tables.run)
+    for i, body in enumerate(tables.body):
+        given = [k for k in ("density", "velocity", "spin") if np.any(getattr(body, k) or 0.0)]
+        if body.fixed and given:
+            yield f"body.{i}: not used, as {body.name} is fixed: {', '.join(given)}; leave them out"
+    for i, load in enumerate(tables.load):
+        if not is_felt(load, tables):
+            said = f"the run, {steps} steps of {step:g} s, takes no force between its begin and end"
+            yield f"load.{i}: not used, as {said}; change these, or run.duration"
+    worn = tables.grains or tables.stones or [b for b in tables.body if not (b.fixed or b.radius)]
+    for name, act in (("wear", "wear"), ("strength", "break")):
+        if (table := getattr(tables, name)) and not (worn and table.every <= steps):
+            said = f"discs and spheres never {act}, others every {table.every} of {steps} steps"
+            yield f"{name}: not used, as {said}; give another every, or leave the table out"
+
+
+def is_felt(load: Load, tables: SceneTables) -> bool:
+    """Whether a load acts in the middle of a step, or at acceleration level before the end."""
+    steps, step = plan_steps(tables.run)
+    first = max(ceil(load.begin / step - 0.5), 0)
+    felt = first < steps and (first + 0.5) * step <= (load.end or inf)
+    return felt or (tables.run.method == "acceleration" and load.begin < tables.run.duration)
 
 
 def make_loads(file: SceneFile) -> Loads | None:
@@ -264,9 +292,8 @@ def make_loads(file: SceneFile) -> Loads | None:
     tables = file.tables
     if not tables.load:
         return None
-    first = len(tables.ground)
     names = [body.name for body in tables.body]
-    rows = [first + names.index(load.body) for load in tables.load]
+    rows = [len(tables.ground) + names.index(load.body) for load in tables.load]
     columns = 3 if tables.dimensions == 2 else 6
 
     def sum_loads(time: float, motion: Motion) -> Floats:

@@ -12,7 +12,6 @@ import io
 import time
 from collections.abc import Callable
 from dataclasses import astuple, fields, replace
-from math import ceil
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -23,8 +22,8 @@ from rigid_lcp.contact import ContactForces
 from rigid_lcp.errors import SceneError, UsageError
 from rigid_lcp.friction.files import DAMAGED
 from rigid_lcp.motion import Motion, Pace, Scene, make_world
-from rigid_lcp.scene.file import SceneFile, build_scene, make_loads
-from rigid_lcp.scene.simulation import SIMULATION, Simulation
+from rigid_lcp.scene.file import SceneFile, build_scene, is_felt, list_unused, make_loads
+from rigid_lcp.scene.simulation import Simulation
 from rigid_lcp.wear import Breakage, Broken, Wear, WearState, WornShape
 from trackbed.memory import read_arrays
 from trackbed.run_files import RESULT, write_whole
@@ -237,15 +236,6 @@ def read_history(folder: RunFolder) -> dict[str, Floats]:
     return dict(zip(HISTORY, np.array(rows).reshape(-1, len(HISTORY)).T, strict=True))
 
 
-def plan_steps(file: SceneFile) -> tuple[int, float]:
-    """Number of the steps of a whole run and the length of each [s]: equal steps, not longer than
-    the scene's, that end at every frame.  At acceleration level the fewest and the longest."""
-    table = file.tables.run
-    span = table.duration / table.frames
-    count = max(ceil(span / table.step - SIMULATION.time_round_off), 1)
-    return count * table.frames, span / count
-
-
 def count_unknowns(file: SceneFile) -> int:
     """Forces that are solved for at a contact: the normal one alone where no surface has friction,
     else one for each dimension."""
@@ -265,14 +255,14 @@ def describe_scans(file: SceneFile) -> dict[str, list[str]]:
 
 
 def list_left_out(file: SceneFile) -> list[str]:
-    """Physics that the scene does not name, and that is therefore not computed."""
+    """Physics that the scene does not name, or gives in vain: it is not computed."""
     tables = file.tables
-    absent = []
+    absent = list(list_unused(tables))
     if not _has_any(file, "friction"):
         absent.append("friction: no surface has any; one unknown a contact, no tangential forces")
     if not _has_any(file, "restitution"):
         absent.append("restitution: every impact is inelastic")
-    if not tables.load:
+    if not any(is_felt(load, tables) for load in tables.load):
         absent.append("loads: none but gravity")
     absent.append("elastic deformation: grains are rigid; forces where they are not unique are one "
                   "of many")  # fmt: skip

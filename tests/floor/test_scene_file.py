@@ -208,3 +208,25 @@ def test_a_scene_names_its_verb(tmp_path, name: str, verb: str, capsys) -> None:
     said = capsys.readouterr().err
     assert f"this is a scene of the verb {own}, not of {verb}\n  -> trackbed {own} {path}" in said
     assert "unknown key" not in said
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "use"),
+    [
+        ("a.stl", b"solid stone", "trackbed stone 'a b/a.stl' packs spheres"),
+        ("a.vtu", b"\0\xff", "mesh = { file = \"'a b/a.vtu'\" }"),
+        ("a.csv", b"cycle,settlement\n1,2\n", "trackbed fit 'a b/a.csv'"),
+        ("run/manifest.json", b'{"scene": {"simulation": {}}}', "trackbed status 'a b/run' says"),
+    ],
+)
+def test_what_is_no_scene_names_its_use(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, content: bytes, use: str
+) -> None:
+    """A mesh, a table or the folder of a run where a scene should be."""
+    monkeypatch.chdir(tmp_path)
+    path = Path("a b") / name
+    path.parent.mkdir(parents=True)
+    path.write_bytes(content)
+    with pytest.raises((SceneError, UsageError)) as caught:
+        read_scene(path if path.parent == Path("a b") else path.parent, guide=GUIDE)
+    assert use in (caught.value.remedy or "")

@@ -9,7 +9,15 @@ import numpy as np
 import pytest
 
 from rigid_lcp.errors import SceneError, ShapeError
-from rigid_lcp.scene.file import build_scene, find_force, list_doubts, load_scene, make_loads
+from rigid_lcp.scene.file import (
+    build_scene,
+    find_force,
+    list_doubts,
+    list_unused,
+    load_scene,
+    make_loads,
+)
+from rigid_lcp.scene.run import list_left_out
 from rigid_lcp.scene.types import Load
 from rigid_lcp.shapes.irregular import draw_polygon
 
@@ -221,3 +229,55 @@ def test_the_same_seed_gives_the_same_stones() -> None:
     np.testing.assert_array_equal(first.vertices, again.vertices)
     assert len(first.vertices) == 7
     assert first.reach < 0.05
+
+
+@pytest.mark.parametrize("frequency", [201.0, 700.0, 1000.0, 5000.0])
+def test_a_load_of_too_few_steps_a_period_is_refused(tmp_path: Path, frequency: float) -> None:
+    """The step that the refusal names is taken, frames that shorten the steps count, and ten
+    forces at the middles have the impulse of half a sine within 2 %."""
+    text = SMALL + f'[[load]]\nbody = "block"\nforce = [1, 0]\nfrequency = {frequency}\n'
+    with pytest.raises(
+        SceneError, match=r"load\.0\.frequency: .*fewer than 10.*run\.step"
+    ) as caught:
+        load_scene(written(tmp_path, text))
+    step = re.search(r"run\.step = (\S+)", str(caught.value))[1]
+    load_scene(written(tmp_path, text), [f"run.step={step}"])
+    load_scene(written(tmp_path, text), [f"run.frames={int(0.1 * frequency) + 1}"])
+    middles = (np.arange(5) + 0.5) * np.pi / 5
+    assert 1.0 < np.sin(middles).sum() * np.pi / 5 / 2.0 < 1.02
+
+
+FIXED = '[[body]]\nname = "wall"\nbox = [1, 1]\nfixed = true\nposition = [5, 0]\n'
+LOAD = '[[load]]\nbody = "block"\nforce = [1, 0]\n'
+
+
+@pytest.mark.parametrize(("text", "words"), [
+    (FIXED + "velocity = [1, 0]\nspin = 3.0", "body.1: .*wall is fixed: velocity, spin;"),
+    (FIXED + "density = 2700", "body.1: .*: density;"),
+    (LOAD + "begin = 0.01", "load.0: not used, .* 20 steps of 0.0005 s"),
+    (LOAD + "begin = 0.0053\nend = 0.0057", "load.0: not used"),
+    ("[wear]\ncoefficient = 1e-13\nevery = 21", "wear: not used, .*every 21 of 20 steps"),
+    ("[strength]\ntension = 1e5\nevery = 21", "strength: not used, .*every 21 of 20 steps"),
+    ("DISC[wear]\ncoefficient = 1e-13", "wear: not used"),
+    ("DISC[strength]\ntension = 1e5", "strength: not used"),
+])  # fmt: skip
+def test_what_is_given_in_vain_is_named(tmp_path: Path, text: str, words: str) -> None:
+    """Once, and among what is left out; a load that does not act is none."""
+    small = SMALL
+    if text.startswith("DISC"):
+        text, small = text[4:], SMALL.replace("box = [0.2, 0.1]", "radius = 0.05")
+    file = load_scene(written(tmp_path, small + text + "\n"))
+    (said,) = list_unused(file.tables)
+    assert re.search(words, said)
+    assert said in list_left_out(file)
+    assert "loads: none but gravity" in list_left_out(file)
+
+
+@pytest.mark.parametrize("text", [
+    FIXED + "velocity = [0, 0]",
+    LOAD + "begin = 0.0097",
+    LOAD + "begin = 0.0052\nend = 0.0053",
+    "[wear]\ncoefficient = 1e-13\nevery = 20",
+])  # fmt: skip
+def test_what_is_used_is_not_named(tmp_path: Path, text: str) -> None:
+    assert list(list_unused(load_scene(written(tmp_path, SMALL + text + "\n")).tables)) == []

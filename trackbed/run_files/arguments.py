@@ -57,7 +57,7 @@ def place_run(arguments: argparse.Namespace) -> Path:
     if arguments.resume and arguments.force:
         raise UsageError("--resume and --force exclude each other", remedy="give one of them")
     scene: Path = arguments.scene
-    return arguments.run_folder or scene.with_name(f"{scene.stem}-run")
+    return arguments.run_folder or scene.parent / f"{scene.stem}-run"
 
 
 def make_manifest(scene: dict[str, Any]) -> dict[str, Any]:

@@ -21,7 +21,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from trackbed.errors import SceneError, TrackbedError, UsageError
-from trackbed.run_verbs import KINDS, find_scene_kind
+from trackbed.run_verbs import KINDS, find_kind, find_scene_kind
 from trackbed.scene_files.lines import find_key_lines
 from trackbed.scene_files.types import NAME_PATTERN
 from trackbed.scenes import find_scene_verb
@@ -37,6 +37,12 @@ HARDLY = 1e-12
 """A least value up to this stands for "above zero"."""
 LONGEST = 1 << 24
 """Most bytes of a scene file."""
+NO_SCENES = {
+    "stl obj ply vtk vtu msh mesh inp": 'a scene names it: [[stones]] of rigid by mesh = "PATH",'
+    ' [[body]] of qdem by mesh = { file = "PATH" }; trackbed stone PATH packs spheres into it',
+    "csv": "trackbed fit PATH reads a series of settlement; a scene names that of a load",
+    "npz dump lammpstrj vtkhdf": "trackbed relax PATH reads a state, trackbed fit a series of them",
+}  # endings of files that are no scenes, and what to do with one
 
 
 @dataclass(frozen=True)
@@ -256,7 +262,7 @@ def _list_keys(model: type[BaseModel], names: Sequence[str]) -> list[str]:
 
 
 def _read_text(path: Path, guide: Guide) -> str:
-    remedy = f"give a scene file; {guide.copy}"
+    remedy = _advise_use(path, f"give a scene file; {guide.copy}")
     try:
         with path.open("rb") as stream:  # which may be a pipe, or a device without an end
             data = stream.read(LONGEST + 1)
@@ -285,8 +291,17 @@ def _refuse_syntax(path: Path, text: str, error: Exception) -> SceneError:
     return SceneError(
         f"this is not TOML: {reason}\n  {source:.200}",
         where=f"{path}:{line}",
-        remedy='one key = value a line, strings in "quotes"; toml.io explains the format',
+        remedy=_advise_use(path, 'one key = value a line, strings in "quotes"; see toml.io'),
     )
+
+
+def _advise_use(path: Path, otherwise: str) -> str:
+    """What to do with a run folder, or a file with an ending of no scene; else ``otherwise``."""
+    use = "trackbed status PATH says how far this run is; its scene is in there"
+    if not find_kind(path):
+        end = path.suffix.lower()[1:]
+        use = next((use for ends, use in NO_SCENES.items() if end in ends.split()), otherwise)
+    return use.replace("PATH", shlex.quote(str(path)))
 
 
 def _set_key(data: dict[str, Any], override: str, guide: Guide) -> str:
