@@ -116,9 +116,11 @@ def test_fit_reads_nothing_strange(
 def test_relax_takes_a_run_and_names_a_window(
     run: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The last state of a run, by its scene; a window, which has many, points to it."""
+    """The last state of a run, by its scene (the fake engine's grains do not touch); a window,
+    which has many, points to it."""
     out = run.parent / "rest.npz"
-    assert main(["relax", str(run), "--out", str(out)]) == 0
+    assert main(["relax", str(run), "--out", str(out)]) == 2
+    assert "nothing bears this bed" in capsys.readouterr().err
     states = next(run.glob("window_*/states.npz"))
     assert main(["relax", str(states), "--out", str(out)]) == 2
     said = capsys.readouterr().err
