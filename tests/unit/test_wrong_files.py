@@ -38,7 +38,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         ("adopt scene.toml --engine liggghts", 2, "this is a scene, no deck", "trackbed run scene"),
         ("adopt qdem.toml --engine yade", 2, "this is a scene, no deck", "trackbed qdem qdem.toml"),
         ("relax scene.toml --out a.npz", 2, "this is a scene, no series", "trackbed run scene"),
-        ("sweep scene.toml --into a.csv", 2, "can not be written", "a file is where the folder"),
+        ("sweep scene.toml --engine fake --into a.csv", 2, "not be written", "a file is where"),
         ("fit text.gz", 6, "this cannot be read as .gz: it begins with 'ITEM", "leave .gz out"),
         ("fit bz2.gz", 6, "this cannot be read as .gz", "a name that ends in .bz2"),
         ("fit bz2.xz", 6, "this cannot be read as .xz", "a name that ends in .bz2"),
