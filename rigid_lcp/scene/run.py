@@ -121,6 +121,13 @@ class RunFolder(run_folder.RunFolder):
     states = "frame_*.npz"
     compared = ("scene", "files")
 
+    def find_extended(self, before: Any, after: Any) -> tuple[str, ...]:
+        """Of a longer run whose frames are as far apart, and its steps so as long: both keys."""
+        old, new = before["scene"]["run"], after["scene"]["run"]
+        alike = old["duration"] / old["frames"] == new["duration"] / new["frames"]
+        longer = new["duration"] > old["duration"]
+        return ("scene.run.duration", "scene.run.frames") if alike and longer else ()
+
     def write_frame(self, number: int, run: Simulation, cpu: float) -> None:
         """Keep the state of a run as frame ``number``; ``cpu``: processor time so far [s].
 

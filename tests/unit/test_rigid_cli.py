@@ -52,6 +52,24 @@ def test_a_run_goes_on_from_its_last_sound_frame_to_the_same_end(scene: Path) ->
     np.testing.assert_array_equal(again["motion"].rates, last["motion"].rates)
 
 
+def test_a_finished_run_is_made_longer(scene: Path, capsys) -> None:
+    """To the bits of one that was so long from the start; with other steps, or shorter, it is
+    another scene."""
+    words = ["rigid", str(scene), "--no-pictures", "--set", "run.duration=0.04", "--set"]
+    short, whole = (["--run-folder", str(scene.with_name(name))] for name in ("short", "whole"))
+    assert command.main([*words, "run.frames=2", *short]) == 0
+    words[4] = "run.duration=0.08"
+    assert command.main([*words, "run.frames=3", *short, "--resume"]) == 2
+    assert "run.duration: 0.04 there, 0.08 now" in capsys.readouterr().err
+    assert command.main([*words, "run.frames=4", *short, "--resume"]) == 0
+    assert command.main([*words, "run.frames=4", *whole]) == 0
+    ends = [read_frame(RunFolder(Path(one)).frames()[4])["motion"] for _, one in (short, whole)]
+    np.testing.assert_array_equal(ends[0].position, ends[1].position)
+    np.testing.assert_array_equal(ends[0].rates, ends[1].rates)
+    words[4] = "run.duration=0.04"
+    assert command.main([*words, "run.frames=2", *short, "--resume"]) == 2
+
+
 def test_another_scene_needs_force(scene: Path, capsys, monkeypatch) -> None:
     """The folder is looked at before anything is compiled."""
     run = ["rigid", str(scene), "--no-pictures"]

@@ -38,7 +38,6 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         ("adopt scene.toml --engine liggghts", 2, "this is a scene, no deck", "trackbed run scene"),
         ("adopt qdem.toml --engine yade", 2, "this is a scene, no deck", "trackbed qdem qdem.toml"),
         ("relax scene.toml --out a.npz", 2, "this is a scene, no series", "trackbed run scene"),
-        ("sweep scene.toml --engine fake --into a.csv", 2, "not be written", "a file is where"),
         ("fit text.gz", 6, "this cannot be read as .gz: it begins with 'ITEM", "leave .gz out"),
         ("fit bz2.gz", 6, "this cannot be read as .gz", "a name that ends in .bz2"),
         ("fit bz2.xz", 6, "this cannot be read as .xz", "a name that ends in .bz2"),
@@ -53,6 +52,15 @@ def test_wrong_files_are_named(
     said, _, do = capsys.readouterr().err.partition("\n  -> ")
     assert what in said
     assert remedy in do
+
+
+@pytest.mark.peer("distributed")
+def test_a_sweep_needs_a_folder(capsys: pytest.CaptureFixture[str]) -> None:
+    """A file in its place is named."""
+    assert main(["sweep", "scene.toml", "--engine", "fake", "--into", "a.csv"]) == 2
+    said, _, do = capsys.readouterr().err.partition("\n  -> ")
+    assert "can not be written" in said
+    assert "a file is where" in do
 
 
 def test_a_dump_may_be_called_csv() -> None:

@@ -229,6 +229,11 @@ class RunFolder:
             )  # fmt: skip
         return False
 
+    def find_extended(self, _before: Any, _after: Any) -> tuple[str, ...]:
+        """Keys that may change as well, since a run of `compared` parts ``before`` that goes on
+        becomes one of those ``after``: it is the longer of two that begin alike."""
+        return ()
+
     def _refuse_strangers(self) -> None:
         """Refuse a folder with files that are no run's: there may be anything behind a typo."""
         names = sorted(path.name for path in self.path.iterdir())
@@ -250,7 +255,8 @@ class RunFolder:
             )  # fmt: skip
         refuse_format(self.path, there)
         before, after = ({part: one.get(part) for part in self.compared} for one in (there, now))
-        if changes := list(list_differences("", before, after, self.free)):
+        free = (*self.free, *self.find_extended(before, after))
+        if changes := list(list_differences("", before, after, free)):
             raise UsageError(
                 "this folder holds the run of another scene:\n  " + "\n  ".join(changes),
                 where=str(self.path), remedy=remedy,
