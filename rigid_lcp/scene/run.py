@@ -123,9 +123,12 @@ class RunFolder(run_folder.RunFolder):
 
     def find_extended(self, before: Any, after: Any) -> tuple[str, ...]:
         """Of a longer run whose frames are as far apart, and its steps so as long: both keys."""
-        old, new = before["scene"]["run"], after["scene"]["run"]
-        alike = old["duration"] / old["frames"] == new["duration"] / new["frames"]
-        longer = new["duration"] > old["duration"]
+        try:
+            old, new = before["scene"]["run"], after["scene"]["run"]
+            alike = old["duration"] / old["frames"] == new["duration"] / new["frames"]
+            longer = new["duration"] > old["duration"]
+        except (LookupError, TypeError, ArithmeticError):  # no manifest of ours
+            return ()
         return ("scene.run.duration", "scene.run.frames") if alike and longer else ()
 
     def write_frame(self, number: int, run: Simulation, cpu: float) -> None:
