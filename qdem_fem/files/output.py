@@ -7,7 +7,7 @@ writer cut short is cut back to its last sound row (`Table.cut`).
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from pathlib import Path
 from typing import Any
 
@@ -70,11 +70,11 @@ class Table:
         """Length of the file so far [bytes], all of it on the disk, and its SHA-256."""
         return self.path.stat().st_size, seal_file(self.path)
 
-    def cut(self, time: float, count: int, seal: tuple[int, str] = (0, NOTHING)) -> None:
+    def cut(self, time: float, counts: Set[int], seal: tuple[int, str] = (0, NOTHING)) -> None:
         """Keep the sound rows up to ``time`` [s], as they were when the run had come there.
 
         Raises `UsageError` when the file has other columns, is not there, was changed since it had
-        this ``seal``, or has not the ``count`` rows that were written by then; it is left as it is.
+        this ``seal``, or has none of the ``counts`` of rows written by then; it is left as it is.
         """
         header = (",".join(self.columns) + "\n").encode()
         kept, rows = len(header), 0
@@ -86,8 +86,8 @@ class Table:
                     if not line.endswith(b"\n") or float(line.partition(b",")[0]) > time:
                         break
                     kept, rows = kept + len(line), rows + 1
-                if rows != count:
-                    what = f"{count} rows up to {time:.6g} s were written, {rows} are there"
+                if rows not in counts:
+                    what = f"{max(counts)} rows up to {time:.6g} s were written, {rows} are there"
                     raise self._refuse(what)
                 stream.seek(0)
                 if hashlib.sha256(stream.read(seal[0])).hexdigest() != seal[1]:

@@ -69,6 +69,16 @@ class RunFolder(run_folder.RunFolder):
         "scene.output.audit", "scene.output.magnification", "scene.output.modes",
     )  # fmt: skip
 
+    def find_extended(self, before: Any, after: Any) -> tuple[str, ...]:
+        """Of a longer run that names what else would follow from its duration: the duration."""
+        try:
+            old, new = (one["scene"]["simulation"]["duration"] for one in (before, after))
+            output = after["scene"]["output"]
+            named = output["sampling"] and output["energy_interval"] and new > old
+        except (LookupError, TypeError):  # no manifest of ours, or a key that is not named
+            return ()
+        return ("scene.simulation.duration",) if named else ()
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -229,10 +239,10 @@ class _Record:
         """Take back what was written behind the checkpoint; ``seals`` of the tables by name."""
         now = (self.run.steps_done + 0.5) * self.plan.step
         done, plan = self.run.steps_done, self.plan
-        at_end = done == plan.total and done % plan.energy > 0
-        counts = (done // plan.sampling + 1, done // plan.energy + 1 + at_end)
-        for table, count in zip((self.rows, self.energies), counts, strict=True):
-            table.cut(now, count, *([seals[table.path.name]] if table.path.name in seals else []))
+        rows, energies = done // plan.sampling + 1, done // plan.energy + 1
+        at_end = energies + (done % plan.energy > 0)  # one more where this run, or a shorter, ended
+        for table, counts in ((self.rows, {rows}), (self.energies, {energies, at_end})):
+            table.cut(now, counts, *([seals[table.path.name]] if table.path.name in seals else []))
         self.account.add_rows(read_table(self.energies.path))
         if (self.path / PEAK).exists():  # an earlier version wrote none
             self.peak, self.peak_energy = read_peak(self.path / PEAK, self.peak.shape)

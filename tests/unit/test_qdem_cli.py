@@ -23,7 +23,7 @@ import qdem_fem.scene as scene_room
 from qdem_fem.cli import run as cli
 from qdem_fem.files.errors import Interrupted, SceneError, StepWarning, UsageError
 from qdem_fem.files.output import read_table
-from trackbed.run_files import digest_file
+from trackbed.run_files import digest_file, open_seal
 
 ROOT = Path(__file__).parents[2]
 SCENE = """\
@@ -96,7 +96,7 @@ def test_run_writes_what_it_promises(scene: Path, capsys: pytest.CaptureFixture[
     assert command(scene, "--json") == 0
     printed = json.loads(capsys.readouterr().out)
     folder = scene.with_name("scene-run")
-    kept = json.loads((folder / "result.json").read_text())
+    kept = open_seal(json.loads((folder / "result.json").read_text()))
     tables = {name: digest_file(folder / name) for name in ("energy.csv", "probes.csv")}
     assert printed | {"digests": tables} == kept | {"folder": str(folder)}
     assert (folder / "scene.toml").read_text() == SCENE
@@ -224,6 +224,28 @@ def test_killed_run_goes_on_to_the_same_bits(scene: Path) -> None:
             break
     assert kills
     assert results(parts) == results(whole)
+
+
+def test_a_finished_run_is_made_longer(scene: Path, capsys) -> None:
+    """To the bits of one that was so long from the start, and a row more in energy.csv, where the
+    first one ended; a run whose rows follow from its duration is not."""
+    words = ["--no-pictures", "--set", "output.vtu_interval=0.0005"]
+    named = ["--set", "output.sampling=1e-4", "--set", "output.energy_interval=7e-4"]
+    short, long = (["--set", f"simulation.duration={one}"] for one in ("0.001", "0.002"))
+    part, whole = (["--run-folder", scene.with_name(name)] for name in ("part", "whole"))
+    command(scene, *words, *short, "--run-folder", scene.with_name("bare"))
+    with pytest.raises(UsageError, match=r"duration: 0\.001 there, 0\.002 now"):
+        command(scene, *words, *long, "--run-folder", scene.with_name("bare"), "--resume")
+    command(scene, *words, *named, *short, *part)
+    command(scene, *words, *named, *long, *part, "--resume")
+    command(scene, *words, *named, *long, *whole)
+    for name in ("probes.csv", "checkpoint.npz", "fields_000003.vtu"):
+        assert (part[1] / name).read_bytes() == (whole[1] / name).read_bytes()
+    rows, there = ((one[1] / "energy.csv").read_text().splitlines() for one in (part, whole))
+    assert [row for row in rows if row in there] == there
+    assert len(rows) == len(there) + 1
+    with pytest.raises(UsageError, match="of another scene"):
+        command(scene, *words, *named, *short, *part, "--resume")
 
 
 def test_folder_is_never_lost_unasked(scene: Path) -> None:

@@ -85,10 +85,10 @@ def test_cut_leaves_sound_rows_up_to_a_time(tmp_path: Path, torn: str) -> None:
     whole = table.path.read_bytes()
     with table.path.open("a") as stream:
         stream.write(torn)
-    table.cut(1.5, 2)
+    table.cut(1.5, {2})
     assert table.path.read_text() == "time,a\n0.0,5.0\n1.0,6.0\n"
     table.append(np.array([[2.0, 7.0], [3.0, 8.0]]))
-    table.cut(3.0, 4)
+    table.cut(3.0, {4})
     assert table.path.read_bytes() == whole
 
 
@@ -97,19 +97,19 @@ def test_cut_refuses_another_table(tmp_path: Path) -> None:
     (tmp_path / "t.csv").write_text("time,b\n0,1\n")
     for name in ("t.csv", "none.csv"):
         with pytest.raises(UsageError, match=name):
-            Table(tmp_path / name, ["time", "a"]).cut(1.0, 1)
+            Table(tmp_path / name, ["time", "a"]).cut(1.0, {1})
     (tmp_path / "t.csv").write_text("time,a\n0.0,1.0\n1.0,")
     with pytest.raises(UsageError, match="2 rows up to 1 s were written, 1 are there"):
-        Table(tmp_path / "t.csv", ["time", "a"]).cut(1.0, 2)
+        Table(tmp_path / "t.csv", ["time", "a"]).cut(1.0, {2})
     assert (tmp_path / "t.csv").read_text() == "time,a\n0.0,1.0\n1.0,"
     (tmp_path / "t.csv").write_text("time,a\n0.0,1.0\n")
     seal = Table(tmp_path / "t.csv", ["time", "a"]).seal()
     with (tmp_path / "t.csv").open("a") as stream:
         stream.write("1.0,1.0\n")
-    Table(tmp_path / "t.csv", ["time", "a"]).cut(0.5, 1, seal)
+    Table(tmp_path / "t.csv", ["time", "a"]).cut(0.5, {1}, seal)
     (tmp_path / "t.csv").write_text("time,a\n0.0,2.0\n")
     with pytest.raises(UsageError, match="was changed since it was written"):
-        Table(tmp_path / "t.csv", ["time", "a"]).cut(0.5, 1, seal)
+        Table(tmp_path / "t.csv", ["time", "a"]).cut(0.5, {1}, seal)
     (tmp_path / "t.csv").write_text("time,a\n0,x\n")
     with pytest.raises(UsageError, match="no table"):
         read_table(tmp_path / "t.csv")
