@@ -165,7 +165,9 @@ def test_long_tables_are_read_fast(tmp_path: Path) -> None:
 )
 @settings(max_examples=50)
 def test_csv_is_read_exactly(tmp_path: Path, rows: dict[float, float], bom: bool, end: str) -> None:
-    """Any cycles and settlements written in full come back to the last bit, sorted."""
+    """Any cycles and settlements written in full come back to the last bit, sorted; between a
+    first and a last reading from which none is far."""
+    rows |= {0.0: -1.0, 2e7: 1.0}
     lines = ["cycle,settlement", *(f"{cycle!r},{value!r}" for cycle, value in rows.items())]
     path = tmp_path / "series.csv"
     path.write_bytes(("\ufeff" * bom + end.join(lines)).encode())
