@@ -96,7 +96,7 @@ def run_relax(arguments: argparse.Namespace) -> int:
             walls_after=walls, method=arguments.method,
         )  # fmt: skip
     moved = np.linalg.norm(relaxation.position - state.position, axis=1) / state.radius
-    if moved.max() > 1:
+    if moved.max(initial=0.0) > 1:
         said = f"{moved.max():.2g} of its radii: look whether radii and places belong together"
         print(f"warning: grain {state.identifier[moved.argmax()]} moved {said}", file=sys.stderr)
     still = np.zeros_like(state.position)

@@ -135,7 +135,7 @@ def read_dump_series(paths: Sequence[Path], steps_per_cycle: float | None = None
             first = height if len(steps) == 1 else first
             heights.append(float(height.mean()))
             if "radius" in frame.columns:
-                widest = 2 * float(frame.column("radius").max())
+                widest = 2 * float(frame.column("radius").max(initial=0.0))
     if steps_per_cycle is None:
         cycle = np.arange(len(steps), dtype=float)
     else:
@@ -162,9 +162,11 @@ def _refuse_changed(run: Path) -> None:
 def describe_thrown(grains: FloatArray, sunk: FloatArray) -> str | None:
     """A sentence on a grain that makes most of what the mean of grains (n,) sank by, (n,) [m]; None
     where none does."""
+    if len(sunk) < 3:
+        return None
     others = sunk - np.median(sunk)
     most = int(np.argmax(np.abs(others)))
-    if len(sunk) < 3 or abs(others[most]) <= 0.5 * abs(float(sunk.sum())):
+    if abs(others[most]) <= 0.5 * abs(float(sunk.sum())):
         return None
     rest = float(np.abs(np.delete(sunk, most)).max())
     if abs(sunk[most]) <= THROWN * rest:

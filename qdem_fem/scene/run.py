@@ -70,7 +70,7 @@ class RunFolder(run_folder.RunFolder):
     )  # fmt: skip
 
     def find_extended(self, before: Any, after: Any) -> tuple[str, ...]:
-        """Of a longer run that names what else would follow from its duration: the duration."""
+        """The duration, where the scene names the intervals that would else follow from it."""
         try:
             old, new = (one["scene"]["simulation"]["duration"] for one in (before, after))
             output = after["scene"]["output"]

@@ -122,7 +122,7 @@ class RunFolder(run_folder.RunFolder):
     compared = ("scene", "files")
 
     def find_extended(self, before: Any, after: Any) -> tuple[str, ...]:
-        """Of a longer run whose frames are as far apart, and its steps so as long: both keys."""
+        """Duration and frames, where frames stay as far apart: the steps are the same then."""
         try:
             old, new = before["scene"]["run"], after["scene"]["run"]
             alike = old["duration"] / old["frames"] == new["duration"] / new["frames"]

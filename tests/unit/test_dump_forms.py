@@ -14,6 +14,7 @@ import adapters.files.meshio_dump  # noqa: F401
 from adapters.errors import DumpError, UsageError
 from adapters.files import Frame, read_frames, read_series, write_dump
 from adapters.files.dump import find_cell
+from adapters.files.series import describe_thrown
 from adapters.files.states import read_state_file
 
 PLACE = np.array([[0.1, 0.2, 0.5], [1.3, -0.4, 2.4]])
@@ -90,6 +91,7 @@ def test_a_grain_that_was_thrown_off_is_named(tmp_path: Path) -> None:
     rows = np.column_stack((grains, np.full(64, 2.0), grains, grains, np.linspace(0, 0.1, 64)))
     write_text(path, "id radius x y z", rows)
     assert not [one for one in read_series([path]).doubts if "alone" in one]
+    assert describe_thrown(np.empty(0), np.empty(0)) is None
     rows[:, 4] -= 1e-3
     rows[7, 4] += 0.4
     write_text(path, "id radius x y z", rows, step=1)

@@ -230,8 +230,8 @@ class RunFolder:
         return False
 
     def find_extended(self, _before: Any, _after: Any) -> tuple[str, ...]:
-        """Keys that may change as well, since a run of `compared` parts ``before`` that goes on
-        becomes one of those ``after``: it is the longer of two that begin alike."""
+        """Keys that may change too, where the run ``after`` is the run ``before`` made longer (both
+        the `compared` parts of a manifest): none, unless a story says which."""
         return ()
 
     def _refuse_strangers(self) -> None:

@@ -42,7 +42,8 @@ NO_SCENES = {
     ' [[body]] of qdem by mesh = { file = "PATH" }; trackbed stone PATH packs spheres into it',
     "csv": "trackbed fit PATH reads a series of settlement; a scene names that of a load",
     "npz dump lammpstrj vtkhdf": "trackbed relax PATH reads a state, trackbed fit a series of them",
-}  # endings of files that are no scenes, and what to do with one
+}
+"""Endings of files that are no scenes, and what to do with one."""
 
 
 @dataclass(frozen=True)
