@@ -75,17 +75,23 @@ def jump(name: str, family: str, *settings: str) -> Method:
     return Method(name, family, ('procedure.name="growing"', *settings), JUMPING)
 
 
+LONGER = jump("growing, k = 30", "growing", "procedure.k=30")
+"""Windows three times as long: what a jump stirs up is over before they end."""
+
+
 def list_methods(kind: Kind) -> tuple[Method, ...]:
     """The ways that are judged on a bed, beside every cycle and the law of the first cycles."""
     growing = jump("growing", "growing")
     both = jump("growing, step x 2", "growing", DOUBLED)
-    if kind in (FAR, PARTIAL, UNSEEN):
+    if kind is UNSEEN:
+        return growing, both, LONGER
+    if kind in (FAR, PARTIAL):
         return growing, both
     material, loading = kind.scene(1).material, kind.scene(1).loading
     assert loading is not None
     assert loading.frequency is not None
     return (
-        growing, both,
+        growing, both, *((LONGER,) if kind is COARSE else ()),
         Method("tolerance", "tolerance", ('procedure.name="tolerance"',), JUMPING),
         jump("nothing moved", "nothing moved", *STILL),
         Method("step x 2", "longer step", (DOUBLED,)),
