@@ -52,6 +52,7 @@ def is_deck_scene(path: Path) -> bool:
 def load_deck_scene(path: Path, overrides: Sequence[str] = ()) -> tuple[DeckScene, Adopted]:
     """Read and check the scene of a deck, and the deck; raises as `adapters.scene.load_scene`."""
     text = read_scene(path, overrides, guide=GUIDE)
+    text.convert_numbers(DeckScene)
     if isinstance(text.data.get("procedure"), dict):
         text.data["procedure"] = fill_procedure(text.data["procedure"])
     problems = list(expand_schedule(text.data))

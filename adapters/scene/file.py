@@ -40,6 +40,7 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
     wrong: file, line, dotted key and sentence of each.
     """
     text = read_scene(path, overrides, guide=GUIDE, after_override=_drop_alternatives)
+    text.convert_numbers(Scene)
     data = text.data
     tables = {name: value for name, value in data.items() if isinstance(value, dict)}
     loading, sample, engine = (tables.get(name, {}) for name in ("loading", "sample", "engine"))

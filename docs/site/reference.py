@@ -1,17 +1,10 @@
-"""Reference pages made from the code: keys of scenes, verbs with their flags, exit codes.
-
-A key is described where its model declares it: by the comment at the end of its line, or by the
-string below; its unit stands there in brackets.
-"""
+"""Reference pages made from the code: keys of scenes, verbs with their flags, exit codes."""
 
 from __future__ import annotations
 
 import argparse
-import ast
-import inspect
 import json
 import re
-import textwrap
 from collections.abc import Iterator
 from importlib import import_module
 from typing import Any
@@ -21,6 +14,7 @@ from pydantic import BaseModel
 from trackbed.command import VERBS, build_parser
 from trackbed.errors import EXIT_CODES
 from trackbed.scene_files import find_model
+from trackbed.scene_files.units import read_notes, split_note
 
 PACKAGES = ("trackbed", "adapters", "qdem_fem", "rigid_lcp", "track_line")
 SCENES = {
@@ -50,21 +44,6 @@ def make_table(head: str, rows: list[Row]) -> str:
 
     lines = [head, re.sub(r"[^|]+", "---", head), *(" | ".join(map(escape, row)) for row in rows)]
     return "".join(f"| {line} |\n" for line in lines)
-
-
-def read_notes(model: type) -> dict[str, str]:
-    """What the source of a model, and of those that it extends, says of each key."""
-    notes: dict[str, str] = {}
-    for one in reversed([base for base in model.__mro__ if base.__module__.startswith(PACKAGES)]):
-        lines = textwrap.dedent(inspect.getsource(one)).splitlines()
-        body = ast.parse("\n".join(lines)).body[0].body  # type: ignore[attr-defined]
-        for node, below in zip(body, [*body[1:], None], strict=True):
-            if isinstance(node, ast.AnnAssign):
-                said = lines[node.end_lineno - 1].partition("  # ")[2]
-                if isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant):
-                    said = f"{said} {below.value.value}".strip()
-                notes[node.target.id] = said
-    return notes
 
 
 def describe_type(schema: dict[str, Any]) -> str:
@@ -114,9 +93,8 @@ def list_tables(
             inner.append((found, f"[[{path}]]" if kind.startswith("list") else f"[{path}]"))
             if kind.startswith(("list", "table")):
                 continue
-        unit = re.search(r"\s*\[([^\]]+)\]", said)
-        words = said.replace(unit[0], "", 1).lstrip("; ") if unit else said
-        rows.append([f"`{key}`", kind, unit[1] if unit else "", format_default(field), words])
+        unit, words = split_note(said)
+        rows.append([f"`{key}`", kind, unit, format_default(field), words])
     yield name, rows
     for found, path in inner:
         yield from list_tables(found, path, seen)
@@ -133,7 +111,8 @@ def list_scenes() -> Iterator[tuple[str, str, list[Row]]]:
 def write_keys() -> str:
     """The page of all keys of all scenes."""
     parts = [
-        "# Keys of scenes\n\nMade from the models that check them.  Units are SI; `-` has none."
+        "# Keys of scenes\n\nMade from the models that check them.  A number may have a unit, as "
+        'in `"14.15 kPa"`; without one it is in the unit of its key, and `-` has none.'
     ]
     parts.append("Of `[procedure]` only `total_cycles` is needed: the rest follows from `name`.")
     for title, table, rows in list_scenes():

@@ -14,12 +14,20 @@ from trackbed.scene_files.reader import (
     Problem,
     SceneText,
     describe_error,
-    find_model,
     read_scene,
     suggest_word,
 )
 from trackbed.scene_files.sieving import find_sieve_size
-from trackbed.scene_files.types import LengthUnit, Name, NonNegative, Positive, Real, Table, Text
+from trackbed.scene_files.types import (
+    LengthUnit,
+    Name,
+    NonNegative,
+    Positive,
+    Real,
+    Table,
+    Text,
+    find_model,
+)
 
 __all__ = [
     "GRADINGS", "Grading", "GradingKey", "Guide", "LengthUnit", "Name", "NonNegative", "Positive",

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
@@ -23,7 +23,8 @@ from pydantic_core import ErrorDetails
 from trackbed.errors import SceneError, TrackbedError, UsageError
 from trackbed.run_verbs import KINDS, find_kind, find_scene_kind
 from trackbed.scene_files.lines import find_key_lines
-from trackbed.scene_files.types import NAME_PATTERN
+from trackbed.scene_files.types import NAME_PATTERN, find_model
+from trackbed.scene_files.units import convert_table
 from trackbed.scenes import find_scene_verb
 
 BOUNDS = {
@@ -107,6 +108,7 @@ class SceneText:
                 f"this is a scene of the verb {given.verb}, not of {own}", where=str(self.path),
                 remedy=f"trackbed {given.verb} {shlex.quote(str(self.path))}",
             )  # fmt: skip
+        self.convert_numbers(model)
         for name, definition in model.model_fields.items():
             value, inner = self.data.get(name), find_model(definition.annotation)
             entries = {name: value}
@@ -117,13 +119,22 @@ class SceneText:
             for key, entry in entries.items():
                 with suppress(ValidationError):
                     self.tables[key] = inner.model_validate(entry)
+        explained = {problem.key for problem in self.problems}
         try:
             model.model_validate(self.data)
         except ValidationError as error:
             for one in error.errors(include_url=False):
                 short = one["type"] == "too_short"  # maybe only as its entries have faults
-                if not short or len(one["input"]) < one["ctx"]["min_length"]:
-                    self.problems.append(_explain(model, one))
+                problem = _explain(model, one)
+                if problem.key in explained or (
+                    short and len(one["input"]) >= one["ctx"]["min_length"]
+                ):
+                    continue
+                self.problems.append(problem)
+
+    def convert_numbers(self, model: type[BaseModel]) -> None:
+        """Numbers as people write them, ``"50 Hz"`` and a count of 1e5, as the model wants them."""
+        self.problems += [Problem(key, what) for key, what in convert_table(self.data, model)]
 
     def refuse(self, problems: Iterable[Problem]) -> None:
         """Raise `SceneError` with all problems, in the order of the file, if there are any."""
@@ -191,14 +202,6 @@ def suggest_word(word: str, known: Iterable[str]) -> str:
     if near:
         return f"; did you mean {near[0]}?"
     return f"; known: {', '.join(known[:20])}" if known else ""
-
-
-def find_model(annotation: Any) -> type[BaseModel] | None:
-    """The model inside a field's type, however deep; None when there is none."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    found = (find_model(argument) for argument in get_args(annotation))
-    return next((model for model in found if model), None)
 
 
 def _explain(model: type[BaseModel], error: ErrorDetails) -> Problem:

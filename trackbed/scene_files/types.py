@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -23,3 +24,19 @@ class Table(BaseModel):
     """A table of a scene file: frozen, of strict types, without unknown keys."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+
+def find_model(annotation: Any) -> type[BaseModel] | None:
+    """The model inside a field's type, however deep; None when there is none."""
+    models = (
+        kind for kind in list_kinds(annotation)
+        if isinstance(kind, type) and issubclass(kind, BaseModel)
+    )  # fmt: skip
+    return next(models, None)
+
+
+def list_kinds(annotation: Any) -> Iterator[Any]:
+    """The types inside a field's type, however deep."""
+    arguments = get_args(annotation)
+    yield from (kind for argument in arguments for kind in list_kinds(argument))
+    yield annotation
