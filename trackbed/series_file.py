@@ -50,6 +50,8 @@ FACTOR = re.compile(
     re.IGNORECASE,
 )
 """Signs in a column's name that its numbers are to be multiplied, or are logarithms."""
+LABEL = re.compile(r"([^\[\]()]*[^\d.,])?[\d.,]+\s*(kPa|MPa|Pa|kN|MN|N|Hz)")
+"""What a specimen was tested at, such as ``70 kPa``: no settlement is in it."""
 MARKS = "' \u2019\u00a0\u2009\u202f"
 """Apostrophes and blanks, which mark thousands and nothing else."""
 GROUPS = re.compile(rf"([+-]?\d{{1,3}}(?:[{MARKS}]\d{{3}})+)(?=[.,]|$)(.*)")
@@ -87,9 +89,12 @@ class Table:
         return title.lower(), unit if unit.lower() in {one.lower() for one in units} else ""
 
     def find_unit(self, place: int) -> str:
-        """What stands in brackets behind a column's name, else in the row of units; or nothing."""
+        """What stands in brackets behind a column's name, if no `LABEL`, else in the row of units;
+        or nothing."""
         bracketed = BRACKETED.fullmatch(self.header[place])
-        return bracketed[2] if bracketed else self.units[place] if self.units else ""
+        if bracketed and not LABEL.fullmatch(bracketed[2]):
+            return bracketed[2]
+        return self.units[place] if self.units else ""
 
     def read_numbers(self, places: Sequence[int], names: Sequence[str]) -> Floats:
         """Columns as numbers, shape (columns, k); ``names`` for errors.

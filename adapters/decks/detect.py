@@ -68,8 +68,8 @@ PATTERNS = (
     ("both", r"if .*\binclude\s", "stops",
      "include inside of if: LIGGGHTS refuses it, and a window can not know what it does",
      "the included lines instead"),
-    ("both", r"jump (?!SELF(?!\S))\S", "stops", "'{all}' goes on in another file",
-     "jump SELF LABEL, or include that file"),
+    ("both", r"jump (?!SELF(?!\S))\S", "stops", "'{all}' goes on in a file that is named",
+     "jump SELF LABEL, or include another file"),
 )  # fmt: skip
 """Where a command stands (standing: above the cycle, and not undone; live: that or inside), how it
 begins, the kind of finding, what is said of it, and what to write instead."""
@@ -242,9 +242,20 @@ def find_losses(deck: Deck, engine: str) -> Iterator[Finding]:
     yield from find_outside(one for one in deck.commands if one.name not in OUTPUTS)
 
 
+def find_missing(deck: Deck, engine: str) -> Iterator[Finding]:
+    """Beds and meshes that are read from files which are not there."""
+    for one in deck.commands:
+        named = one.words[1:2] if one.name == "read_data" else []
+        if one.name == "fix" and one.word(3).startswith("mesh/") and "file" in one.words[:-1]:
+            named = [one.words[one.words.index("file") + 1]]
+        for name in named:
+            if "$" not in name and not (deck.path.parent / name).exists():
+                yield stop(one, f"there is no file {name}", "put it there, as seen from the deck")
+
+
 RULES: Sequence[Callable[[Deck, str], Iterator[Finding]]] = (
     find_unfinished, find_absolute_runs, find_frozen_values, find_lying_forces, find_patterns,
-    find_branches, find_losses,
+    find_branches, find_losses, find_missing,
 )  # fmt: skip
 """What is looked for."""
 

@@ -52,7 +52,7 @@ class Adopted:
 
 
 def list_inputs(deck: Deck) -> list[Path]:
-    """Files that a deck names, from its folder: meshes, data, tables, included decks."""
+    """Files that a deck names but itself, from its folder: meshes, data, tables, included decks."""
     included = () if deck.is_script else list_included(deck.lines, deck.path.parent)
     found = {Path(one) for one in included}
     for word in (word for one in deck.commands for word in one.words[1:]):
@@ -60,7 +60,7 @@ def list_inputs(deck: Deck) -> list[Path]:
             pattern = VARIABLE.sub("*", word) if "$" in word else glob.escape(word)
             names = glob.glob(pattern, root_dir=deck.path.parent)
             found.update(Path(n) for n in names if (deck.path.parent / n).is_file())
-    return sorted(found)
+    return sorted(found - {Path(deck.path.name)})
 
 
 def list_output_folders(deck: Deck) -> list[Path]:

@@ -268,6 +268,26 @@ def test_the_loaded_body_is_the_mesh_that_moves(tmp_path: Path) -> None:
     assert (tmp_path / "mybed" / "plate.stl").exists()
 
 
+def test_a_deck_that_jumps_to_itself_by_name_does_not_read_itself(tmp_path: Path) -> None:
+    """Its marked copy is not in the way of what it reads; the loop around the cycle is noted."""
+    before = own_decks.LIGGGHTS.partition(BEGIN)[0]
+    cycle = "variable i loop 9\nlabel a\n# trackbed: cycle\nrun 5\n# trackbed: end\n"
+    path = write_deck(tmp_path, f"{before}{cycle}next i\njump in.mybed a\n")
+    assert list_inputs(read_deck(path)) == [Path("walls.in")]
+    for _ in range(2):
+        adoption = adopt(path, "liggghts")
+        assert not adoption.stops
+        assert [one for one in adoption.findings if "loop a around the cycle" in one.what]
+
+
+def test_a_mesh_or_a_bed_that_is_not_there_is_named(tmp_path: Path) -> None:
+    """Before the engine is started; a name that a variable makes is left to it."""
+    mesh = "fix plate all mesh/surface file meshes/plate.stl type 1\nread_data ${bed}.data\n"
+    path = write_deck(tmp_path, own_decks.LIGGGHTS.replace(BEGIN, mesh + BEGIN))
+    missing = [one.what for one in adopt(path, "liggghts").stops if "there is no" in one.what]
+    assert missing == ["there is no file meshes/plate.stl"]
+
+
 @pytest.mark.parametrize(("override", "said"), [
     ("deck.engine=yade", "no other decks, end with .py"),
     ("procedure.tolerance=0.02", "jumps that choose themselves"),

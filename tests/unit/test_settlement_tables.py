@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from adapters.errors import UsageError
-from adapters.files import read_series
+from adapters.files import UNKNOWN, read_series
 from trackbed.command import main
 
 ROWS = "\n".join(
@@ -37,6 +37,16 @@ def test_factors_in_headers_are_refused(tmp_path: Path, header: str) -> None:
     for one in (header, "Cycles in 1000,strain", "kcycles,strain", "log10(N),strain"):
         with pytest.raises(UsageError, match="have a factor"):
             read_series([write(tmp_path / "a.csv", one)], columns=one.split(","))
+
+
+@pytest.mark.parametrize("title", ["S1 (70 kPa)", "S1 [sigma_3 = 140 kPa]", "S1 (20 Hz)"])
+def test_what_a_specimen_was_tested_at_is_no_factor(tmp_path: Path, title: str) -> None:
+    """Nor the unit of its settlement, which is then not known."""
+    for columns in (["N", title], ["N", "S1"]):
+        series = read_series([write(tmp_path / "a.csv", f"N,{title}")], columns=columns)
+        assert series.unit == UNKNOWN
+    with pytest.raises(UsageError, match="have a factor"):
+        read_series([write(tmp_path / "a.csv", "N,S1 (70 mm)")], columns=["N", "S1 (70 mm)"])
 
 
 @pytest.mark.parametrize(
