@@ -6,10 +6,15 @@ import argparse
 import sys
 from math import floor, inf, log10
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from adapters.cli.arguments import add_json, print_json
 from adapters.errors import UsageError
 from trackbed.plausible import Quantity, describe_implausible
+
+if TYPE_CHECKING:
+    from adapters.files import Series
+    from adapters.laws.fit import Prediction
 
 FARTHEST = 1e12
 """Load cycles that are asked for at most: a hundred thousand years of the busiest line."""
@@ -163,6 +168,8 @@ def run_fit(arguments: argparse.Namespace) -> int:
     if found.laws:
         agreeing = ", ".join(name for name, said in found.laws.items() if said.agrees)
         print(f"laws that agree to {fit.AGREE:.0%} of the increment: {agreeing or 'none'}")
+    if auto and arguments.frequency is None:
+        say_prior(series, ahead, found, unit)
     settled, low, high = round_to_band(fitted["prediction"], *fitted["band"])
     print(f"settlement at cycle {to_cycle:.10g}: {settled} {unit}".rstrip(), end=", ")
     if ahead == series.cycle.max(initial=0.0):
@@ -172,6 +179,21 @@ def run_fit(arguments: argparse.Namespace) -> int:
     if found.failure_excluded is False:
         print(f"  so that failure at {arguments.fail_at:g} is not excluded")
     return 0
+
+
+def say_prior(series: Series, to_cycle: float, found: Prediction, unit: str) -> None:
+    """Print what the laws say without the prior, where that moved the increment by a tenth."""
+    from adapters.laws.fit.outlook import AGREE, find_outlook
+
+    rows = series.cycle > 0
+    cycle, settlement = series.cycle[rows], series.settlement[rows]
+    alone = float(find_outlook(cycle, settlement[:, None], to_cycle).alone[0])
+    if abs(alone - found.prediction) > AGREE * abs(found.prediction - settlement[-1]):
+        said, *_ = round_to_band(alone, *found.band)
+        print(
+            f"the laws alone: {said} {unit}".rstrip() + "; the rest is the prior that ballast "
+            f"comes to rest, as {len(cycle)} readings hold it back too little (docs/laws.md)"
+        )
 
 
 def round_to_band(value: float, low: float, high: float) -> list[str]:

@@ -94,3 +94,20 @@ def test_fit_shows_its_formula_and_a_picture(tmp_path: Path, capsys) -> None:
         "--load-change 9 --frequency 9",
     ):
         assert main([*words, "auto", *wrong.split()]) == 2
+
+
+@pytest.mark.parametrize(("readings", "said"), [(5, True), (9, True), (120, False)])
+def test_what_the_prior_changes_is_printed(
+    readings: int, said: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """u = N^0.3 to 1e4 is 31.6 at 1e5: few readings of it are drawn to an end, many are not."""
+    cycle = np.unique(np.rint(np.geomspace(1, 1e4, readings)))
+    table = tmp_path / "a.csv"
+    table.write_text("N,settlement [mm]\n" + "".join(f"{n:g},{n**0.3:.9f}\n" for n in cycle))
+    assert main(["fit", str(table), "--law", "auto", "--to-cycle", "1e5"]) == 0
+    printed = capsys.readouterr().out
+    assert ("the laws alone: " in printed) == said
+    if said:
+        alone = float(printed.partition("the laws alone: ")[2].split()[0])
+        joint = float(printed.partition("at cycle 100000: ")[2].split()[0])
+        assert joint < alone < 31.7
