@@ -32,14 +32,7 @@ from adapters.errors import EngineFailed, NotCredible, SceneError
 from adapters.files import EXCHANGE, Outcome, RunFolder, explain_full_disk
 from adapters.files import restart as kept
 from adapters.jumps import SLOPES
-from adapters.procedure import (
-    CONTROL,
-    Progress,
-    estimate_gain,
-    estimate_sinking,
-    refuse_differences,
-    settle_by,
-)
+from adapters.procedure import CONTROL, Progress, estimate_gain, estimate_sinking, settle_by
 from adapters.procedure import run as procedure
 from adapters.scene import Procedure
 from trackbed.memory import refuse_more_memory
@@ -97,7 +90,7 @@ def run_deck_scene(
     record["deck"]["digest"] = digest_deck(bed)
     with allow_interrupts(), explain_full_disk(run_path), folder.lock():
         if (run_path / "manifest.json").exists():
-            refuse_differences(folder.manifest()["scene"], record, run_path)
+            procedure.refuse_differences(folder.manifest()["scene"], record, run_path)
             control |= folder.manifest()["control"]
         else:
             procedure.refuse_strangers(folder)

@@ -7,17 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from adapters.bed import WHOLE, Container, FloatArray
+from adapters.engines import decks
 from adapters.engines.contract import EngineStart
-from adapters.engines.decks import (
-    GRAIN,
-    MIRROR,
-    STATE_COLUMNS,
-    WALL,
-    bound_box,
-    clip_convex,
-    cover_rectangle,
-    place_piston_atom,
-)
 from adapters.files import Frame, write_dump
 from adapters.scene import Scene
 
@@ -73,7 +64,7 @@ def format_scene(scene: Scene) -> str:
     for name, mirror, shape in primitives:
         # With friction 0 LIGGGHTS still damps a tangential velocity at the start of every run,
         # where a spring of length zero counts as sticking; a mirror knows no tangential force.
-        model, kind = ("hertz", MIRROR) if mirror else ("${contact_model}", WALL)
+        model, kind = ("hertz", decks.MIRROR) if mirror else ("${contact_model}", decks.WALL)
         lines.append(
             f"fix {name} grains wall/gran model {model} primitive type {kind} {shape} "
             "store_force yes"
@@ -83,7 +74,7 @@ def format_scene(scene: Scene) -> str:
 
 def format_dump_states(names: tuple[str, ...]) -> str:
     """``dump_states.in``: full-precision state of the grains at every cycle end."""
-    columns = STATE_COLUMNS.split()
+    columns = decks.STATE_COLUMNS.split()
     columns += [f"f_force_{name}[{axis}]" for name in names for axis in (1, 2, 3)]
     return (
         "# dump_states.in : generated\n"
@@ -105,12 +96,12 @@ def write_piston_stl(
     import meshio
 
     if np.isinf(reach):
-        corners = cover_rectangle(container, edges, margin)
+        corners = decks.cover_rectangle(container, edges, margin)
     else:
         angle = np.linspace(0.0, 2 * np.pi, 97)[:-1]
         circle = reach * np.column_stack([np.cos(angle), np.sin(angle)])
         floor = [-margin if axis in container.symmetry else -np.inf for axis in "xy"]
-        cut = drop_near_corners(clip_convex(circle, floor), floor, PISTON_EDGE * reach)
+        cut = drop_near_corners(decks.clip_convex(circle, floor), floor, PISTON_EDGE * reach)
         corners = [tuple(point) for point in cut]
     fan = [[0, i + 1, i] for i in range(1, len(corners) - 1)]
     points = np.column_stack([np.array(corners), np.zeros(len(corners))])
@@ -136,13 +127,13 @@ def write_moved(container: Container, start: EngineStart, folder: Path) -> None:
     count = len(moved.radius)
     values = np.zeros((count + 1, 9))
     values[:-1, 0] = moved.identifier
-    values[:-1, 1] = GRAIN
+    values[:-1, 1] = decks.GRAIN
     values[:-1, 2:5] = moved.position
     values[:-1, 8] = moved.radius
-    x, y = place_piston_atom(container, moved.radius)
+    x, y = decks.place_piston_atom(container, moved.radius)
     radius = float(moved.radius.min())
-    values[-1] = [count + 1, WALL, x, y, start.piston_height, 0.0, 0.0, 0.0, radius]
+    values[-1] = [count + 1, decks.WALL, x, y, start.piston_height, 0.0, 0.0, 0.0, radius]
     columns = ("id", "type", "x", "y", "z", "vx", "vy", "vz", "radius")
-    box = bound_box(container, moved.radius, float(moved.position[:, 2].max()))
+    box = decks.bound_box(container, moved.radius, float(moved.position[:, 2].max()))
     frame = Frame(start.time_step, columns, values, np.column_stack(box), "atoms")
     write_dump(folder / "moved.dump", [frame])

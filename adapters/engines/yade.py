@@ -11,34 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from adapters.bed import (
-    DAMPING_FACTOR,
-    GRAVITY,
-    WHOLE,
-    Container,
-    FloatArray,
-    Radii,
-    find_rebound_damping,
-)
+from adapters.bed import GRAVITY, WHOLE, Container, FloatArray, Radii, contact_law
+from adapters.engines import decks, plan
 from adapters.engines.contract import EngineStart
 from adapters.engines.crib import find_crib_forces, load_settled
-from adapters.engines.decks import (
-    PISTON_MARGIN,
-    bound_box,
-    bound_section,
-    clip_convex,
-    copy_deck,
-    cover_rectangle,
-)
 from adapters.engines.liggghts_decks import MIRROR_YOUNG
-from adapters.engines.plan import (
-    PLAN,
-    find_rolling_stiffness,
-    has_friction,
-    has_rolling,
-    plan_seating,
-    plan_settling,
-)
 from adapters.engines.taps import TappingEngine
 from adapters.scene import Scene
 
@@ -78,8 +55,8 @@ class YadeEngine(TappingEngine):
     ) -> dict[str, str]:
         """Write the rain of grains; see `adapters.engines.contract.Engine`."""
         content = gather_shared_parameters(scene, height)
-        content["settle"] = asdict(plan_settling(scene, height))
-        content["settle"]["equilibrium_ratio"] = PLAN.equilibrium_ratio
+        content["settle"] = asdict(plan.plan_settling(scene, height))
+        content["settle"]["equilibrium_ratio"] = plan.PLAN.equilibrium_ratio
         content["grains"] = {"position": position.tolist(), "radius": radius.tolist()}
         return self._write(folder, "prepare.py", content)
 
@@ -103,7 +80,7 @@ class YadeEngine(TappingEngine):
             "track_steps": steps // scene.samples_per_cycle, "load": _describe_load(scene),
         }  # fmt: skip
         if start.first:
-            content["window"]["seat"] = asdict(plan_seating(scene))
+            content["window"]["seat"] = asdict(plan.plan_seating(scene))
             if scene.sample.rain_friction is not None:
                 content["window"]["renew_friction"] = True
         if scene.loading.crib:
@@ -119,7 +96,7 @@ class YadeEngine(TappingEngine):
     def _write(folder: Path, script: str, content: dict[str, Any]) -> dict[str, str]:
         """The parameters and the static scripts; returns the digests of the scripts."""
         (folder / PARAMETERS).write_text(json.dumps(content, indent=1, allow_nan=False) + "\n")
-        return copy_deck(folder, (script, "bed.py", "record.py"), "yade_scripts")
+        return decks.copy_deck(folder, (script, "bed.py", "record.py"), "yade_scripts")
 
 
 def _describe_load(scene: Scene) -> dict[str, Any]:
@@ -172,8 +149,8 @@ def find_damping_ratio(scene: Scene) -> float:
     """
     grain = scene.material.grain
     if grain.viscous_alpha is not None:
-        return DAMPING_FACTOR * grain.viscous_alpha
-    return find_rebound_damping(scene.restitution)
+        return contact_law.DAMPING_FACTOR * grain.viscous_alpha
+    return contact_law.find_rebound_damping(scene.restitution)
 
 
 def gather_shared_parameters(scene: Scene, height: float) -> dict[str, Any]:
@@ -191,17 +168,17 @@ def gather_shared_parameters(scene: Scene, height: float) -> dict[str, Any]:
     rolling = {
         "grain": material.grain.rolling_friction or 0.0, "mirror": 0.0,
         "wall": material.wall.rolling_friction or 0.0, "radius": scene.sample.radii.mean,
-        "spring": find_rolling_stiffness(scene),
+        "spring": plan.find_rolling_stiffness(scene),
     }  # fmt: skip
-    return ({"rolling": rolling} if has_rolling(scene) else {}) | {
+    return ({"rolling": rolling} if plan.has_rolling(scene) else {}) | {
         "grain_count": scene.grain_count,
         "time_step": scene.time_step,
         "gravity": GRAVITY,
         "verlet_distance": YADE.verlet_share * scene.sample.radii.mean,
-        "frictional": has_friction(scene),
+        "frictional": plan.has_friction(scene),
         "materials": {m: dict(zip(names, values, strict=True)) for m, values in materials.items()},
         "pairs": _list_pairs(scene),
-        "box": np.column_stack(bound_box(container, radius, height)).tolist(),
+        "box": np.column_stack(decks.bound_box(container, radius, height)).tolist(),
         "walls": list_walls(container, height),
     }
 
@@ -270,15 +247,15 @@ def cover_piston(
     ``plane_reach`` [m] of the axis, and triangles for those further out; a block between ``edges``
     [m] is a plane within ``plane_edges`` [m].  ``grain``: radii.
     """
-    margin = PISTON_MARGIN * grain.greatest
+    margin = decks.PISTON_MARGIN * grain.greatest
     if edges != WHOLE:
-        corners = np.array(cover_rectangle(container, edges, margin))
+        corners = np.array(decks.cover_rectangle(container, edges, margin))
         rim = YADE.rim_width * grain.mean * np.array([1, -1, 1, -1])
         inside = np.clip(np.array(edges) + rim, -FAR, FAR)
         triangles = cover_rim(corners[::-1], corners.mean(axis=0))
         return {"triangles": triangles.tolist(), "plane_edges": inside.tolist()}
     if np.isinf(reach):
-        low, high = bound_section(container)
+        low, high = decks.bound_section(container)
         corner = np.array(low) - margin
         across = 2 * (np.array(high) + margin - corner)
         face = [corner, corner + np.array([0.0, across[1]]), corner + np.array([across[0], 0.0])]
@@ -287,7 +264,7 @@ def cover_piston(
     circle = reach * np.column_stack([np.cos(angle), np.sin(angle)])
     floor = [-margin if axis in container.symmetry else -np.inf for axis in "xy"]
     return {
-        "triangles": cover_rim(clip_convex(circle, floor)).tolist(),
+        "triangles": cover_rim(decks.clip_convex(circle, floor)).tolist(),
         "plane_reach": max(reach - YADE.rim_width * grain.mean, 0.0),
     }
 

@@ -11,33 +11,12 @@ from dataclasses import asdict
 from math import nan
 from typing import Any
 
+from adapters import jumps
 from adapters.errors import EngineFailed, JumpRefused, NotConverged, NotCredible
 from adapters.files import explain_full_disk
-from adapters.jumps import (
-    Control,
-    Decision,
-    Landing,
-    Settings,
-    Stretch,
-    accept,
-    decide,
-    estimate_slopes,
-    find_rates,
-    fit_forecast,
-    join_stretch,
-    judge,
-    observe,
-    reject,
-    remove_moves,
-)
+from adapters.jumps import Control, Decision, Landing, Settings, Stretch
 from adapters.laws.fit import Regime
-from adapters.procedure import stages
-from adapters.procedure.forecast import (
-    estimate_sinking,
-    follow_loaded_body,
-    list_stretches,
-    make_stretch,
-)
+from adapters.procedure import forecast, stages
 from adapters.procedure.history import sum_cost
 from adapters.procedure.record import CHECK, DECISION, make_plain
 from adapters.procedure.seating import seat_piston, warn_if_hung
@@ -66,7 +45,7 @@ def settle_controlled(run: Run, bed: Bed) -> Bed:
         if (seated := seat_piston(run, bed, procedure.carried_cycles)).cycle > bed.cycle:
             bed = seated
             control = Control(bed.cycle, float(run.outcome(bed.window).rows[-1]["settlement"]))
-        decision = decide(control, settings, find_piston_regime(run, control))
+        decision = jumps.decide(control, settings, find_piston_regime(run, control))
         if decision.action == "end":
             return bed
         journal.write(DECISION, decision.cycle, decision.attempt, asdict(decision))
@@ -75,8 +54,8 @@ def settle_controlled(run: Run, bed: Bed) -> Bed:
         if decision.action == "compute":
             bed = stages.compute(run, bed, decision.window)
             rows = run.outcome(bed.window).rows
-            stretch = make_stretch(rows, control.settlement)
-            control = observe(control, stretch, float(rows[-1]["settlement"]))
+            stretch = forecast.make_stretch(rows, control.settlement)
+            control = jumps.observe(control, stretch, float(rows[-1]["settlement"]))
         else:
             warn_if_hung(run, bed)
             bed, control = jump_and_check(run, bed, control, decision, settings, journal)
@@ -92,9 +71,9 @@ def find_piston_regime(run: Run, control: Control) -> Regime | None:
     if run.scene.loaded_area >= run.scene.container.area or not control.stretches:
         return None
     sunk: tuple[Stretch, ...] = ()
-    body = follow_loaded_body(run.folder.outcomes())
-    for stretch in list_stretches(body, control.stretches[0].first_cycle, control.cycle):
-        sunk = join_stretch(sunk, stretch)
+    body = forecast.follow_loaded_body(run.folder.outcomes())
+    for stretch in forecast.list_stretches(body, control.stretches[0].first_cycle, control.cycle):
+        sunk = jumps.join_stretch(sunk, stretch)
     return find_sinking_regime(sunk, control.landings)
 
 
@@ -102,9 +81,10 @@ def find_sinking_regime(sunk: Sequence[Stretch], landings: Sequence[Landing]) ->
     """Regime of what a piston has ``sunk`` by, less what it sinks more behind ``landings``: jumps
     lower it by what they move the mean grain by.  That excess does not fall with N, and would pass
     for ratcheting where jumps grow.  None where it does not sink."""
-    kappa = estimate_slopes(sunk, landings).kappa()[0] if landings else 0.0
-    forecast = fit_forecast(find_rates([remove_moves(one, landings, kappa) for one in sunk]))
-    return forecast.regime if forecast.rate @ forecast.weight > 0 else None
+    kappa = jumps.estimate_slopes(sunk, landings).kappa()[0] if landings else 0.0
+    own = [jumps.remove_moves(one, landings, kappa) for one in sunk]
+    found = jumps.fit_forecast(jumps.find_rates(own))
+    return found.regime if found.rate @ found.weight > 0 else None
 
 
 def jump_and_check(
@@ -118,11 +98,11 @@ def jump_and_check(
     name = f"jump_{bed.cycle:06d}_{decision.attempt}"
     if run.folder.failure(name):
         error = run.folder.failure_details(name).get("error", nan)
-        return bed, reject(control, decision, float(error), settings)
+        return bed, jumps.reject(control, decision, float(error), settings)
     healing = settings.healing
     try:
         with explain_full_disk(run.folder.path):
-            gains = Gains(decision.moved, estimate_sinking(run, bed, decision.jump))
+            gains = Gains(decision.moved, forecast.estimate_sinking(run, bed, decision.jump))
             moved = stages.jump(run, bed, decision.jump, decision.attempt, gains)
             after = stages.compute(run, moved, healing + decision.window, healing)
     except (EngineFailed, NotCredible, NotConverged) as error:
@@ -132,15 +112,15 @@ def jump_and_check(
         run.progress.print_line(
             f"the jump of {decision.jump} cycles from {bed.cycle} failed: {error}"
         )
-        return bed, reject(control, decision, nan, settings)
+        return bed, jumps.reject(control, decision, nan, settings)
     rows = run.outcome(after.window).rows
     settlement = float(rows[-1]["settlement"])
-    stretch = make_stretch(rows, float(run.outcome(name).rows[-1]["settlement"]))
-    check = judge(control, decision, settings, stretch, settlement)
+    stretch = forecast.make_stretch(rows, float(run.outcome(name).rows[-1]["settlement"]))
+    check = jumps.judge(control, decision, settings, stretch, settlement)
     record = {"jump": decision.jump, "window": healing + decision.window, **asdict(check)}
     journal.write(CHECK, decision.cycle, decision.attempt, record)
     if check.accepted:
-        return after, accept(control, decision, check, settings, stretch, settlement)
+        return after, jumps.accept(control, decision, check, settings, stretch, settlement)
     why = (
         f"taken back: the bed gained {1e6 * check.gained:.3g} um, and the rates on both sides give "
         f"{1e6 * check.expected:.3g} um: an error of {100 * check.error:+.3g} % of the total"
@@ -151,7 +131,7 @@ def jump_and_check(
     run.folder.discard(run.folder.path / after.window)
     run.folder.write_settlement()
     run.progress.print_line(f"the jump of {decision.jump} cycles from {bed.cycle} was {why}")
-    return bed, reject(control, decision, check.error, settings)
+    return bed, jumps.reject(control, decision, check.error, settings)
 
 
 def make_refusal(run: Run, decision: Decision) -> JumpRefused:
