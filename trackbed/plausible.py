@@ -26,42 +26,38 @@ class Bounds:
     """Units that are mistaken for it, each with its factor to SI, the likeliest first."""
 
 
-@dataclass(frozen=True)
-class PlausibleBounds:
-    """Between soft rubber and diamond, cork and gold, a grain of sand and a long bridge span; of
-    lines, between a field railway's and ten times the heaviest there are."""
-
-    friction: Bounds = Bounds(
-        "friction", "", 0.0, 2.0, (0.05, 2.0), ((DEGREES, radians(1)), ("%", 0.01))
-    )
-    density: Bounds = Bounds(
+PLAUSIBLE: dict[Quantity, Bounds] = {
+    "friction": Bounds(
+        "friction", "", 0.0, 2.0, (0.05, 2.0), ((DEGREES, radians(1)), ("%", 0.01)),
+    ),
+    "density": Bounds(
         "density", "kg/m^3", 500.0, 20_000.0, (1000.0, 9000.0),
         (("g/cm^3", 1e3), ("kN/m^3", 1e3 / 9.81), ("t/mm^3", 1e12), ("g/m^3", 1e-3)),
-    )  # fmt: skip
-    young: Bounds = Bounds(
-        "Young's modulus", "Pa", 1e5, 2e12, (1e6, 7e11), (("GPa", 1e9), ("MPa", 1e6), ("kPa", 1e3))
-    )
-    grain: Bounds = Bounds("grain", "m", 1e-4, 1.0, (1e-4, 1.0), (("mm", 1e-3), ("um", 1e-6)))
-    settlement: Bounds = Bounds("settlement", "m", 0.0, 1.0, (1e-5, 0.5), (("mm", 1e-3),))
-    strain: Bounds = Bounds("strain", "", 0.0, 1.0, (1e-5, 0.5), (("%", 0.01),))
-    body: Bounds = Bounds("body", "m", 0.0, 100.0, (1e-3, 100.0), (("mm", 1e-3), ("um", 1e-6)))
-    bending: Bounds = Bounds(
-        "bending stiffness", "N m^2", 1e4, 1e8, (1e5, 1e8), (("MN m^2", 1e6), ("kN m^2", 1e3))
-    )
-    line_mass: Bounds = Bounds("rail", "kg/m", 0.0, 200.0, (10.0, 100.0), (("g/m", 1e-3),))
-    stiffness: Bounds = Bounds(
-        "stiffness", "N/m", 1e4, 1e11, (1e6, 1e10), (("MN/m or kN/mm", 1e6), ("kN/m", 1e3))
-    )
-    mass: Bounds = Bounds("mass", "kg", 0.0, 1e4, (10.0, 1e3), (("g", 1e-3),))
-    axle: Bounds = Bounds(
-        "axle load", "N", 1e3, 1e6, (5e4, 5e5), (("kN", 1e3), ("t", 9.81e3), ("kg", 9.81))
-    )
-    speed: Bounds = Bounds("speed", "m/s", 0.0, 150.0, (5.0, 140.0), (("km/h", 1 / 3.6),))
-    level: Bounds = Bounds("limit of a level", "m", 1e-5, 0.1, (1e-4, 0.05), (("mm", 1e-3),))
-    crib: Bounds = Bounds("crib's height", "m", 0.0, 1.0, (0.05, 0.6), (("mm", 1e-3), ("cm", 1e-2)))
-
-
-PLAUSIBLE = PlausibleBounds()
+    ),
+    "young": Bounds(
+        "Young's modulus", "Pa", 1e5, 2e12, (1e6, 7e11), (("GPa", 1e9), ("MPa", 1e6), ("kPa", 1e3)),
+    ),
+    "grain": Bounds("grain", "m", 1e-4, 1.0, (1e-4, 1.0), (("mm", 1e-3), ("um", 1e-6))),
+    "settlement": Bounds("settlement", "m", 0.0, 1.0, (1e-5, 0.5), (("mm", 1e-3),)),
+    "strain": Bounds("strain", "", 0.0, 1.0, (1e-5, 0.5), (("%", 0.01),)),
+    "body": Bounds("body", "m", 0.0, 100.0, (1e-3, 100.0), (("mm", 1e-3), ("um", 1e-6))),
+    "bending": Bounds(
+        "bending stiffness", "N m^2", 1e4, 1e8, (1e5, 1e8), (("MN m^2", 1e6), ("kN m^2", 1e3)),
+    ),
+    "line_mass": Bounds("rail", "kg/m", 0.0, 200.0, (10.0, 100.0), (("g/m", 1e-3),)),
+    "stiffness": Bounds(
+        "stiffness", "N/m", 1e4, 1e11, (1e6, 1e10), (("MN/m or kN/mm", 1e6), ("kN/m", 1e3)),
+    ),
+    "mass": Bounds("mass", "kg", 0.0, 1e4, (10.0, 1e3), (("g", 1e-3),)),
+    "axle": Bounds(
+        "axle load", "N", 1e3, 1e6, (5e4, 5e5), (("kN", 1e3), ("t", 9.81e3), ("kg", 9.81)),
+    ),
+    "speed": Bounds("speed", "m/s", 0.0, 150.0, (5.0, 140.0), (("km/h", 1 / 3.6),)),
+    "level": Bounds("limit of a level", "m", 1e-5, 0.1, (1e-4, 0.05), (("mm", 1e-3),)),
+    "crib": Bounds("crib's height", "m", 0.0, 1.0, (0.05, 0.6), (("mm", 1e-3), ("cm", 1e-2))),
+}  # fmt: skip
+"""Between soft rubber and diamond, cork and gold, a grain of sand and a long bridge span; of lines,
+between a field railway's and ten times the heaviest there are."""
 
 
 def describe_implausible(quantity: Quantity, value: float, where: str) -> str | None:
@@ -70,7 +66,7 @@ def describe_implausible(quantity: Quantity, value: float, where: str) -> str | 
     It names the place ``where`` it stands (a key, a file, a body), the number, and the unit in
     which the number would be a usual one.  Not a reason to refuse: zero is for the caller to judge.
     """
-    bounds: Bounds = getattr(PLAUSIBLE, quantity)
+    bounds = PLAUSIBLE[quantity]
     if bounds.least <= value <= bounds.most:
         return None
     low, high = bounds.usual

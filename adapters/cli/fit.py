@@ -121,15 +121,11 @@ def run_fit(arguments: argparse.Namespace) -> int:
             where=series.where,
             remedy="give the first height less each; of a heave, give negative readings",
         )
-    to_cycle = arguments.to_cycle
-    if to_cycle is None:
-        to_cycle = series.cycle.max(initial=0.0)
+    to_cycle = series.cycle.max(initial=0.0) if arguments.to_cycle is None else arguments.to_cycle
     ahead = to_cycle
     if arguments.load_change is not None:
-        series, ahead = (
-            series.restart_after(arguments.load_change),
-            to_cycle - arguments.load_change,
-        )
+        ahead = to_cycle - arguments.load_change
+        series = series.restart_after(arguments.load_change)
     series = series.keep_from(arguments.from_cycle)
 
     def predict(cycle: float) -> fit.Prediction:

@@ -129,12 +129,11 @@ def run_command(arguments: argparse.Namespace) -> int:
                 remedy="trackbed adopt DECK --check runs two of its cycles",
             )  # fmt: skip
         run_deck_scene(arguments.scene, folder, control=arguments.control, overrides=overrides)
-        print_result(folder)
-        return 0
-    procedure.run_scene(
-        arguments.scene, folder, control=arguments.control, overrides=overrides,
-        dry_run=arguments.dry_run, cycle_by_cycle=arguments.cycle_by_cycle,
-    )  # fmt: skip
+    else:
+        procedure.run_scene(
+            arguments.scene, folder, control=arguments.control, overrides=overrides,
+            dry_run=arguments.dry_run, cycle_by_cycle=arguments.cycle_by_cycle,
+        )  # fmt: skip
     if not arguments.dry_run:
         print_result(folder)
     return 0

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import shlex
 from pathlib import Path
-from typing import Any
 
 from adapters.cli.arguments import add_json, print_json
 from adapters.errors import EngineMissing, UsageError
@@ -19,17 +18,15 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
         add_json(parser)
     elif verb == "new":
         parser.add_argument("name", metavar="NAME", help="; ".join(list_scenes()))
-        parser.add_argument("--list", action=ListScenes, help="print what each scene is, and end")
+        parser.add_argument(
+            "--list", action=ListScenes, nargs=0, help="print what each scene is, and end"
+        )
         parser.add_argument("folder", metavar="FOLDER", type=Path, help="made when it is not there")
     parser.set_defaults(command={"doctor": run_doctor, "new": run_new, "cite": run_cite}[verb])
 
 
 class ListScenes(argparse.Action):
     """Prints name, verb and title of the scenes that ship."""
-
-    def __init__(self, **keywords: Any) -> None:
-        """As of any flag without a value."""
-        super().__init__(nargs=0, **keywords)
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         """Print them; end with exit code 0."""

@@ -74,10 +74,11 @@ def compare_runs(
     the first of them.
     """
     mine, truth = own.row(own_cycle), full.row(full_cycle)
-    coordination, deflection, stiffness = (
-        (own.late_mean(column, own_cycle), full.late_mean(column, full_cycle))
-        for column in ("coordination_number", "elastic_deflection", "stiffness")
-    )
+    late: dict[str, float] = {}
+    for column in ("stiffness", "coordination_number", "elastic_deflection"):
+        late[column] = own.late_mean(column, own_cycle)
+        error = find_relative_error(late[column], full.late_mean(column, full_cycle))
+        late[f"{column}_error"] = error
     sunk, settled = float(own.loaded_body[mine]), float(own.settlement[mine])
     cost, full_cost = float(own.cpu_s[mine]), float(full.cpu_s[truth])
     displacement = coordinates = nan
@@ -94,12 +95,7 @@ def compare_runs(
         loaded_body_error=full.gain_error(sunk, before, full_cycle, "loaded_body"),
         settlement=settled,
         settlement_error=full.gain_error(settled, before, full_cycle),
-        stiffness=stiffness[0],
-        stiffness_error=find_relative_error(*stiffness),
-        coordination_number=coordination[0],
-        coordination_number_error=find_relative_error(*coordination),
-        elastic_deflection=deflection[0],
-        elastic_deflection_error=find_relative_error(*deflection),
+        **late,
         jump_displacement_error=displacement,
         coordinates_error=coordinates,
         cpu_s=cost,

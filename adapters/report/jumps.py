@@ -19,12 +19,6 @@ HEADER = (
 
 def describe_jumps(record: Record, numbers: Numbers) -> str:
     """What each step of a jump adds to the error, and what the bed made of it."""
-    if not numbers.jumps:
-        return report.make_section(
-            "Jumps and relaxation",
-            report.make_paragraph("No jump was made."),
-            describe_hung_cycles(record),
-        )
     rows = [
         (
             f"{jump.first_cycle} → {jump.last_cycle}",
@@ -40,9 +34,9 @@ def describe_jumps(record: Record, numbers: Numbers) -> str:
         )
         for jump in numbers.jumps
     ]
-    return report.make_section(
-        "Jumps and relaxation",
-        report.make_table(
+    figures = report.make_paragraph("No jump was made.")
+    if rows:
+        figures = report.make_table(
             "By what a jump lowers the loaded body and the mean grain, and what each of its "
             "steps adds to the error of the mean grain (µm, positive: too much). The full run is "
             "no twin of this one after the first jump: where the beds have parted, its increment "
@@ -52,9 +46,9 @@ def describe_jumps(record: Record, numbers: Numbers) -> str:
             "taken for a hundredth of the gain since the first jump at least.",
             HEADER,
             rows,
-        ),
-        describe_shortfall(record),
-        describe_hung_cycles(record),
+        )
+    return report.make_section(
+        "Jumps and relaxation", figures, describe_shortfall(record), describe_hung_cycles(record)
     )
 
 

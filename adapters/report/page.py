@@ -184,9 +184,8 @@ def _describe_error(numbers: Numbers) -> str:
         f"time of 180 % is <i>S</i> {MINUS} 1 = 1.8."
     )
     header = (
-        f"at cycle {numbers.compared_at}", "cycles computed", "loaded body (µm), error",
-        "stiffness (kN/mm), error", "mean grain (µm), error", "coordination number, error",
-        "elastic deflection (µm), error",
+        f"at cycle {numbers.compared_at}", "cycles computed",
+        *(f"{title}, error" for title, _, _ in COMPARED.values()),
         "E<sub>r</sub> of displacements", "E<sub>r</sub> of coordinates", "CPU time (s)",
         "speed-up",
     )  # fmt: skip
@@ -194,13 +193,7 @@ def _describe_error(numbers: Numbers) -> str:
         (
             row.name,
             str(row.computed),
-            show_with_error(row, format_um(row.loaded_body), row.loaded_body_error),
-            show_with_error(row, format_stiffness(row.stiffness), row.stiffness_error),
-            show_with_error(row, format_um(row.settlement), row.settlement_error),
-            show_with_error(
-                row, format_number(row.coordination_number, ".3f"), row.coordination_number_error
-            ),
-            show_with_error(row, format_um(row.elastic_deflection), row.elastic_deflection_error),
+            *(show_with_error(row, name) for name in COMPARED),
             format_number(row.jump_displacement_error, ".2f"),
             format_number(row.coordinates_error, ".4f"),
             format_number(row.cpu_s, ".1f"),
@@ -241,15 +234,21 @@ LIMITS = (
 )
 
 
-def format_stiffness(value: float) -> str:
-    """A stiffness in N/m, shown in kN/mm without the unit."""
-    return mark_number(value, f"{1e-6 * value:.3g}")
+COMPARED = {
+    "loaded_body": ("loaded body (µm)", 1e6, ".1f"),
+    "stiffness": ("stiffness (kN/mm)", 1e-6, ".3g"),
+    "settlement": ("mean grain (µm)", 1e6, ".1f"),
+    "coordination_number": ("coordination number", 1.0, ".3f"),
+    "elastic_deflection": ("elastic deflection (µm)", 1e6, ".1f"),
+}  # fmt: skip
+"""Quantities of a `Comparison`: title, its unit in SI ones, format; each has an error."""
 
 
-def show_with_error(row: Comparison, value: str, error: float) -> str:
-    """A value and its error; the full run has none."""
-    shown = "" if row.name == FULL else format_share(error)
-    return f'{value} <span class="error">{shown}</span>'
+def show_with_error(row: Comparison, name: str) -> str:
+    """A quantity of `COMPARED` and its error; the full run has none."""
+    (_, scale, form), value = COMPARED[name], getattr(row, name)
+    error = "" if row.name == FULL else format_share(getattr(row, f"{name}_error"))
+    return f'{mark_number(value, f"{scale * value:{form}}")} <span class="error">{error}</span>'
 
 
 def _describe_cost(numbers: Numbers) -> str:

@@ -38,7 +38,6 @@ def split_cost(record: Record, track: Track) -> dict[str, Any]:
         purpose: sum(outcome.cost.get(purpose, 0.0) for outcome in loading)
         for purpose in ("engine", "start_up", "parse", "fit", "relax", "other")
     }
-    python = sum(parts[purpose] for purpose in ("parse", "fit", "relax", "other"))
     failed = sum(jump.lost_s for jump in track.failed_jumps)
     # The engine's count of time steps goes on through jumps.
     ends = [o.notes["time_step"] for o in track.outcomes if o.stage in ("preparation", "window")]
@@ -48,7 +47,7 @@ def split_cost(record: Record, track: Track) -> dict[str, Any]:
         **{purpose: parts[purpose] for purpose in ("start_up", "parse", "fit", "relax")},
         other_python=parts["other"],
         failed_jumps=failed,
-        total=parts["engine"] + python + failed,
+        total=sum_cost(parts) + failed,
         preparation=nan if track.preparation is None else sum_cost(track.preparation.cost),
         cycles_computed=sum(o.last_cycle - o.first_cycle for o in loading if o.stage == "window"),
         grain_steps=float(record.scene.grain_count * (ends[-1] - ends[0])) if ends else 0.0,

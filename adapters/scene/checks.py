@@ -78,6 +78,54 @@ MPI_STARTERS = {"mpirun", "mpiexec", "mpiexec.hydra", "orterun", "srun"}
 """Programs that start the program behind them several times."""
 
 
+DEMANDS: tuple[tuple[str, Callable[[Values], Any], str], ...] = (
+    ("sample.symmetry", lambda of: len({*of["sample.symmetry"]}) < len(of["sample.symmetry"]),
+     "each mirror plane only once"),
+    ("sample.grading_scale", lambda of: not of.has("sample.grading"),
+     "there is no sample.grading to scale"),
+    ("sample.rain_friction", lambda of: of["sample.rain_friction"] > of["material.grain.friction"],
+     "must be at most the grains' friction, {0[material.grain.friction]:g}"),
+    *((f"material.{one}.rolling_friction", lambda of: not of["material.grain.friction"],
+       "grains without friction slip in place of rolling: give them friction")
+      for one in ("grain", "wall")),
+    ("loading.crib", lambda of: not of.has("loading.footprint"),
+     "is the height of ballast beside a block: give loading.footprint"),
+    ("loading.crib", lambda of: find_named_form(of) is not SPHERE,
+     "lies on spheres alone so far: leave it out"),
+    ("loading.crib", lambda of: of["procedure.relaxation"] == "karrech2007",
+     "eq. 29 knows no weight of it: another procedure.relaxation"),
+    ("loading.stage", lambda of: of["loading.waveform"] != "sine", "follows a sine, not a series"),
+    ("procedure", lambda of: not of.has_table("loading"),
+     "there are no cycles without a loading table"),
+    ("procedure.total_cycles", lambda of: of["procedure.total_cycles"] <= of["procedure.k_i"],
+     "must exceed k_i = {0[procedure.k_i]}, is {0[procedure.total_cycles]}"),
+    ("procedure.settlement",
+     lambda of: of["procedure.settlement"] != "law" and of.has(TOLERANCE_KEY),
+     "with a tolerance jumps forecast the settlement: leave this out"),
+    ("procedure.settlement",
+     lambda of: of["procedure.settlement"] != "law" and of["procedure.move"] == "still",
+     "move 'still' moves nothing, so no settlement: leave one of them out"),
+    ("procedure.seating_cycles", lambda of: of.get("procedure.seating") in (None, "any"),
+     'only a run that waits for its piston counts them: seating = "waits"'),
+    ("procedure.seating_cycles",
+     lambda of: of["procedure.seating"] == "waits"
+     and of["procedure.seating_cycles"] >= of["procedure.total_cycles"],
+     "with no fewer than total_cycles a run that waits never jumps"),
+    ("engine.launcher",
+     lambda of: of["engine.name"] == "yade"
+     and MPI_STARTERS & {Path(word).name for word in of["engine.launcher"]},
+     "YADE runs in one process: several would write the same files"),
+)  # fmt: skip
+"""A key or table that a scene gives, when that is wrong, and what to say; {0[...]} is a value."""
+
+
+def _check_demand(
+    key: str, is_wrong: Callable[[Values], Any], said: str, scene: Values
+) -> Iterator[Problem]:
+    if scene.has(key) and is_wrong(scene):
+        yield Problem(key, said.format(scene))
+
+
 def _check_alternatives(scene: Values) -> Iterator[Problem]:
     for first, second in ALTERNATIVES:
         given = [key for key in (first, second) if scene.has(key)]
@@ -94,19 +142,13 @@ def _check_owned_keys(
     table = choice.partition(".")[0]
     if not scene.has_table(table):
         return
-    chosen = scene.need(choice)
+    chosen = scene[choice]
     for owner, names in owners.items():
         for name in names:
             given = scene.has(f"{table}.{name}")
             if given != (owner == chosen):
                 said = idle if given else missing
                 yield Problem(f"{table}.{name}", said.format(owner=chosen, key=name))
-
-
-def _check_symmetry(scene: Values) -> Iterator[Problem]:
-    planes = scene.get("sample.symmetry") or ()
-    if len(set(planes)) != len(planes):
-        yield Problem("sample.symmetry", "each mirror plane only once")
 
 
 def _check_grain_radius(scene: Values) -> Iterator[Problem]:
@@ -122,11 +164,6 @@ def _check_grain_radius(scene: Values) -> Iterator[Problem]:
         yield Problem(key, f"too wide: the smallest radius would be {radii.smallest:g} m")
 
 
-def _check_grading_scale(scene: Values) -> Iterator[Problem]:
-    if scene.has("sample.grading_scale") and not scene.has("sample.grading"):
-        yield Problem("sample.grading_scale", "there is no sample.grading to scale")
-
-
 def _check_stored_bed(scene: Values) -> Iterator[Problem]:
     if not scene.has(STATE_KEY):
         return
@@ -134,20 +171,15 @@ def _check_stored_bed(scene: Values) -> Iterator[Problem]:
         if scene.has(key):
             yield Problem(key, "a saved bed has its own grains, spheres: leave it or state out")
     for key, default in (("seed", 1), ("relative_density_start", 0.05)):
-        if scene.need(f"sample.{key}") != default:
+        if scene[f"sample.{key}"] != default:
             yield Problem(f"sample.{key}", "nothing is drawn for a saved bed: leave it out")
     try:
-        if read_stored_bed(scene.need(STATE_KEY)).orientation is not None:
+        if read_stored_bed(scene[STATE_KEY]).orientation is not None:
             yield Problem(STATE_KEY, "is a bed of stones: spheres alone can be taken over so far")
     except (UsageError, DumpError) as error:
         yield Problem(STATE_KEY, describe_error(error), error.where)
     except OSError as error:
-        yield Problem(STATE_KEY, f"cannot be read ({error.strerror}): {scene.need(STATE_KEY)}")
-
-
-def _check_rain(scene: Values) -> Iterator[Problem]:
-    if scene.need("sample.rain_friction") > (most := scene.need("material.grain.friction")):
-        yield Problem("sample.rain_friction", f"must be at most the grains' friction, {most:g}")
+        yield Problem(STATE_KEY, f"cannot be read ({error.strerror}): {scene[STATE_KEY]}")
 
 
 def _check_porosity(scene: Values) -> Iterator[Problem]:
@@ -164,27 +196,20 @@ def _check_porosity(scene: Values) -> Iterator[Problem]:
         )  # fmt: skip
 
 
-def _check_rolling(scene: Values) -> Iterator[Problem]:
-    grain, wall = (scene.get(f"material.{one}.rolling_friction") for one in ("grain", "wall"))
-    key = f"material.{'grain' if grain else 'wall'}.rolling_friction"
-    if (grain or wall) and not scene.need("material.grain.friction"):
-        yield Problem(key, "grains without friction slip in place of rolling: give them friction")
-
-
 def _check_series(scene: Values) -> Iterator[Problem]:
     try:
-        read_load_series(Path(scene.need("loading.series")))
+        read_load_series(Path(scene["loading.series"]))
     except SceneError as error:
         yield Problem("loading.series", error.what, error.where)
 
 
 def _check_partial_piston(scene: Values) -> Iterator[Problem]:
-    box = scene.need("sample.container") == "box"
-    if scene.need("loading.area_share") < 1 and box:
+    box = scene["sample.container"] == "box"
+    if scene["loading.area_share"] < 1 and box:
         said = "a disc on a part of the section needs a cylinder; a box takes loading.footprint"
         yield Problem("loading.area_share", said)
     lengths = scene.get("loading.footprint")
-    sizes = [scene.need(f"sample.size_{axis}") for axis in "xy"] if box else [0.0, 0.0]
+    sizes = [scene[f"sample.size_{axis}"] for axis in "xy"] if box else [0.0, 0.0]
     if lengths and np.greater(lengths, sizes).any():
         have = f"this one is {sizes[0]:g} m by {sizes[1]:g} m" if box else "not a cylinder"
         yield Problem("loading.footprint", f"needs a box that holds it, {have}")
@@ -196,35 +221,19 @@ def _check_crib(scene: Values) -> Iterator[Problem]:
         return
     lengths = scene.get("loading.footprint")
     sizes = [scene.get(f"sample.size_{axis}") or 0.0 for axis in "xy"]
-    if not lengths:
-        yield Problem(key, "is the height of ballast beside a block: give loading.footprint")
-    elif np.subtract(sizes, lengths).max() < 2 * find_radii(scene).mean:
+    if lengths and np.subtract(sizes, lengths).max() < 2 * find_radii(scene).mean:
         yield Problem(key, "no grain has room beside this block: leave it out")
-    if find_named_form(scene) is not SPHERE:
-        yield Problem(key, "lies on spheres alone so far: leave it out")
-    if scene.get("procedure.relaxation") == "karrech2007":
-        yield Problem(key, "eq. 29 knows no weight of it: another procedure.relaxation")
 
 
 def _check_stages(scene: Values) -> Iterator[Problem]:
-    key, stages = "loading.stage", scene.need("loading.stage")
-    begins = [0, *(one["from_cycle"] for one in stages), scene.need("procedure.total_cycles")]
+    key, stages = "loading.stage", scene["loading.stage"]
+    begins = [0, *(one["from_cycle"] for one in stages), scene["procedure.total_cycles"]]
     if any(after <= before for before, after in pairwise(begins)):
         yield Problem(key, f"from_cycle must grow, to below total_cycles = {begins[-1]}")
-    if scene.need("loading.waveform") != "sine":
-        yield Problem(key, "follows a sine, not a series")
     if scene.has(TOLERANCE_KEY) or scene.get("procedure.settlement") != "history":
         yield Problem(key, 'jumps by history alone know when a load began: name = "growing"')
-    elif scene.get("procedure.name") is None and scene.need("procedure.k_i") >= begins[1]:
-        yield Problem(key, f"from_cycle must be above k_i = {scene.need('procedure.k_i')}")
-
-
-def _check_procedure(scene: Values) -> Iterator[Problem]:
-    if scene.has_table("procedure") and not scene.has_table("loading"):
-        yield Problem("procedure", "there are no cycles without a loading table")
-    first, total = scene.need("procedure.k_i"), scene.need("procedure.total_cycles")
-    if total <= first:
-        yield Problem("procedure.total_cycles", f"must exceed k_i = {first}, is {total}")
+    elif scene.get("procedure.name") is None and scene["procedure.k_i"] >= begins[1]:
+        yield Problem(key, f"from_cycle must be above k_i = {scene['procedure.k_i']}")
 
 
 def _check_jumps(scene: Values) -> Iterator[Problem]:
@@ -242,24 +251,6 @@ def _check_jumps(scene: Values) -> Iterator[Problem]:
                 yield Problem(key, "missing: give k and h, or a tolerance instead of both")
 
 
-def _check_settlement(scene: Values) -> Iterator[Problem]:
-    if not scene.has_table("procedure") or scene.need("procedure.settlement") == "law":
-        return
-    key = "procedure.settlement"
-    if scene.has(TOLERANCE_KEY):
-        yield Problem(key, "with a tolerance jumps forecast the settlement: leave this out")
-    if scene.need("procedure.move") == "still":
-        yield Problem(key, "move 'still' moves nothing, so no settlement: leave one of them out")
-
-
-def _check_seating(scene: Values) -> Iterator[Problem]:
-    key = "procedure.seating_cycles"
-    if scene.has(key) and scene.get("procedure.seating") in (None, "any"):
-        yield Problem(key, 'only a run that waits for its piston counts them: seating = "waits"')
-    elif scene.has(key) and scene.need(key) >= scene.need("procedure.total_cycles"):
-        yield Problem(key, "with no fewer than total_cycles a run that waits never jumps")
-
-
 def _check_form(scene: Values) -> Iterator[Problem]:
     """Stones want an engine that carries them, and what is known to be right for them in a jump."""
     try:
@@ -267,29 +258,21 @@ def _check_form(scene: Values) -> Iterator[Problem]:
             return
     except SceneError as error:
         yield Problem("sample.form", describe_error(error), error.where)
-    engine = scene.need("engine.name")
+    engine = scene["engine.name"]
     if engine not in ("auto", *STONE_ENGINES):
         yield Problem("engine.name", f"{engine} carries no stones yet: {STONE_ENGINES[0]} does")
     for key in ("material.grain.rolling_friction", "material.wall.rolling_friction"):
         if scene.has(key):
             yield Problem(key, "it stands for the form of stones, which these have: leave it out")
-    if scene.has_table("procedure") and scene.need("procedure.relaxation") == "karrech2007":
+    if scene.has_table("procedure") and scene["procedure.relaxation"] == "karrech2007":
         yield Problem("procedure.relaxation", 'eq. 29 is for spheres: leave it out, or "none"')
-
-
-def _check_launcher(scene: Values) -> Iterator[Problem]:
-    words = [Path(word).name for word in scene.get("engine.launcher") or ()]
-    if scene.need("engine.name") == "yade" and set(words) & MPI_STARTERS:
-        yield Problem(
-            "engine.launcher", "YADE runs in one process: several would write the same files"
-        )
 
 
 def _check_choice(
     key: str, what: str, list_known: Callable[[], Iterable[str]], retired: Mapping[str, str],
     scene: Values,
 ) -> Iterator[Problem]:  # fmt: skip
-    name, known = scene.need(key), tuple(list_known())
+    name, known = scene[key], tuple(list_known())
     if name not in known:
         hint = explain_retired(name, retired) or suggest_word(name, known)
         yield Problem(key, f"unknown {what} {name!r}{hint}")
@@ -297,18 +280,17 @@ def _check_choice(
 
 def _check_relaxation(scene: Values) -> Iterator[Problem]:
     key, usual = "procedure.relaxation", ("smallest-move", "none")
-    if scene.need(key) not in usual:
+    if scene[key] not in usual:
         from adapters.relaxation import METHODS, RETIRED  # loads the compiler
 
         yield from _check_choice(key, "relaxation", lambda: (*METHODS, "none"), RETIRED, scene)
 
 
 CHECKS: tuple[Check, ...] = (
-    _check_alternatives, *(partial(_check_owned_keys, *row) for row in OWNED), _check_symmetry,
-    _check_grain_radius, _check_grading_scale, _check_stored_bed, _check_rain,
-    _check_porosity, _check_rolling, _check_form, _check_series, _check_partial_piston, _check_crib,
-    _check_stages, _check_procedure, _check_jumps, _check_settlement, _check_seating,
-    _check_launcher,
+    _check_alternatives, *(partial(_check_owned_keys, *row) for row in OWNED),
+    *(partial(_check_demand, *row) for row in DEMANDS), _check_grain_radius, _check_stored_bed,
+    _check_porosity, _check_form, _check_series, _check_partial_piston, _check_crib, _check_stages,
+    _check_jumps,
     *(partial(_check_choice, *row) for row in CHOICES), _check_relaxation, *mechanics.CHECKS,
 )  # fmt: skip
 

@@ -59,7 +59,7 @@ def _check_room(scene: Values) -> Iterator[Problem]:
 
 def _list_levels(scene: Values) -> list[tuple[float, float]]:
     """Mean and amplitude of each stage of a sine [Pa]."""
-    first = scene.need("loading.mean"), scene.need("loading.amplitude")
+    first = scene["loading.mean"], scene["loading.amplitude"]
     stages = scene.get("loading.stage") or ()
     return [first, *((stage["mean"], stage["amplitude"]) for stage in stages)]
 
@@ -77,14 +77,14 @@ def _find_rayleigh_time(scene: Values) -> float:
     radii = find_radii(scene)
     if radii.smallest <= 0:
         raise NotValid
-    named = (scene.need(f"material.grain.{one}") for one in ("density", "young", "poisson"))
+    named = (scene[f"material.grain.{one}"] for one in ("density", "young", "poisson"))
     return bed.find_rayleigh_time(find_named_form(scene).least * radii.smallest, *named)
 
 
 def _find_rayleigh_share(scene: Values) -> float:
     if scene.get("engine.time_step") is None:
-        return float(scene.need("engine.rayleigh_share"))
-    return float(scene.need("engine.time_step")) / _find_rayleigh_time(scene)
+        return float(scene["engine.rayleigh_share"])
+    return float(scene["engine.time_step"]) / _find_rayleigh_time(scene)
 
 
 def _check_time_step(scene: Values) -> Iterator[Problem]:
@@ -98,7 +98,7 @@ def _check_time_step(scene: Values) -> Iterator[Problem]:
 
 
 def _check_fill_height(scene: Values) -> Iterator[Problem]:
-    height = scene.need("sample.fill_height")
+    height = scene["sample.fill_height"]
     count = bed.expect_grains(find_radii(scene), find_geometry(scene), height)
     if not 1 <= count <= COUNT_GREATEST:
         yield Problem("sample.fill_height", f"{height:g} m would take {count:.3g} grains")
@@ -109,20 +109,20 @@ def _find_overlap_share(scene: Values) -> tuple[str, float, float]:
 
     A grain of a layer carries the stress on the square that it fills, (2 r)^2.
     """
-    if scene.need("loading.waveform") == "sine":
+    if scene["loading.waveform"] == "sine":
         key = "loading.amplitude"
         stress = max(mean + amplitude / 2 for mean, amplitude in _list_levels(scene))
     else:
         key = "loading.series"
         try:
-            series = read_load_series(Path(scene.need(key)))
+            series = read_load_series(Path(scene[key]))
         except SceneError as error:
             raise NotValid from error
         stress = float(series.stress.max())
     radii, grain = find_radii(scene), "material.grain."
     if radii.smallest <= 0:
         raise NotValid
-    young, poisson = scene.need(grain + "young"), scene.need(grain + "poisson")
+    young, poisson = scene[grain + "young"], scene[grain + "poisson"]
     modulus = bed.combine_moduli(young, poisson, young, poisson)
     usual, force = find_named_form(scene).usual, stress * (2 * radii.mean) ** 2
     overlap = bed.find_overlap_under_force(force, modulus, usual * radii.mean / 2)
@@ -183,7 +183,7 @@ def find_wedge_ratio(friction: float) -> float:
 
 
 def _warn_of_size_ratio(scene: Values) -> Iterator[Problem]:
-    radii, friction = find_radii(scene), scene.need("material.grain.friction")
+    radii, friction = find_radii(scene), scene["material.grain.friction"]
     if radii.smallest <= 0:
         raise NotValid
     ratio, limit = radii.greatest / radii.smallest, find_wedge_ratio(friction)
@@ -198,7 +198,7 @@ def _warn_of_size_ratio(scene: Values) -> Iterator[Problem]:
 
 def _warn_of_few_steps(scene: Values) -> Iterator[Problem]:
     longest = _find_rayleigh_share(scene) * _find_rayleigh_time(scene)
-    steps = 1 / (scene.need("loading.frequency") * longest)
+    steps = 1 / (scene["loading.frequency"] * longest)
     if steps < DOUBTFUL.steps:
         yield Problem("loading.frequency", f"a cycle is only {steps:.3g} time steps long")
 
@@ -217,7 +217,7 @@ def _warn_of_deep_chains(scene: Values) -> Iterator[Problem]:
 def _warn_of_far_jump(scene: Values) -> Iterator[Problem]:
     if scene.get("procedure.settlement") == "history":  # by all cycles computed so far
         return
-    h, k = max(scene.need("procedure.h")), scene.need("procedure.k")
+    h, k = max(scene["procedure.h"]), scene["procedure.k"]
     if h > DOUBTFUL.jump * k:
         yield Problem(
             "procedure.h",
@@ -239,7 +239,7 @@ def _warn_of_implausible_size(
     key: str, quantity: Quantity, factor: float, scene: Values
 ) -> Iterator[Problem]:
     key = key or name_radii(scene)
-    value = find_radii(scene).mean if quantity == "grain" else scene.need(key)
+    value = find_radii(scene).mean if quantity == "grain" else scene[key]
     if said := describe_implausible(quantity, factor * value, key):
         yield Problem(key, said.removeprefix(f"{key}: "))
 

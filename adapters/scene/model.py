@@ -9,11 +9,7 @@ from adapters.scene.tables import Scene
 
 ENGINE_TITLES = {"auto": "LIGGGHTS", "liggghts": "LIGGGHTS", "lammps": "LAMMPS", "yade": "YADE"}
 """Engines as their users write them."""
-KEPT = {
-    "auto": "LIGGGHTS keeps the spring",
-    "liggghts": "LIGGGHTS keeps the spring",
-    "yade": "YADE keeps the force",
-}
+KEPT = {"auto": "spring", "liggghts": "spring", "yade": "force"}
 """What engines without the paper's rule keep when the normal force decreases."""
 
 
@@ -56,7 +52,8 @@ def _list_contacts(scene: Scene) -> Iterator[str]:
     if grain.friction and scene.engine.name in KEPT:
         yield (
             "The paper's rule that rescales the tangential force when the normal one decreases "
-            f"(Elata and Berryman): {KEPT[scene.engine.name]} and cuts it at Coulomb's limit."
+            f"(Elata and Berryman): {ENGINE_TITLES[scene.engine.name]} keeps the "
+            f"{KEPT[scene.engine.name]} and cuts it at Coulomb's limit."
         )
     elif not grain.friction:
         yield "Friction between grains: its coefficient is 0, so the bed has no tangential forces."

@@ -61,11 +61,6 @@ def schedule_jumps(jumps: int, last: int, k_i: int, window: int, healing: int) -
     return [int(h) for h in lengths]
 
 
-def plan_paper(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Keys of ``paper``."""
-    return {"k": NUMBERS.paper_window, "h": NUMBERS.paper_jump, "law": "log", "move": "per-grain"}
-
-
 def plan_growing(given: Mapping[str, Any]) -> dict[str, Any]:
     """Keys of ``growing``: the fewest jumps within `NamedNumbers.ratio`, fewer without room.
 
@@ -85,14 +80,14 @@ def plan_growing(given: Mapping[str, Any]) -> dict[str, Any]:
     return {"k": k, "h": h, "settlement": "history", "move": "smoothed", "seating": "waits"}
 
 
-def plan_tolerance(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Keys of ``tolerance``."""
-    return {"tolerance": NUMBERS.tolerance, "seating": "waits"}
-
-
 PROCEDURES: Mapping[str, Callable[[Mapping[str, Any]], dict[str, Any]]] = {
-    "paper": plan_paper, "growing": plan_growing, "tolerance": plan_tolerance,
+    "paper": lambda _: {
+        "k": NUMBERS.paper_window, "h": NUMBERS.paper_jump, "law": "log", "move": "per-grain",
+    },
+    "growing": plan_growing,
+    "tolerance": lambda _: {"tolerance": NUMBERS.tolerance, "seating": "waits"},
 }  # fmt: skip
+"""Keys of each name, for the keys that are given, k_i and total_cycles among them."""
 
 
 def fill_procedure(procedure: Mapping[str, Any]) -> dict[str, Any]:

@@ -28,7 +28,7 @@ class Values:
             raise NotValid
         return self._values.get(key)
 
-    def need(self, key: str) -> Any:
+    def __getitem__(self, key: str) -> Any:
         """A value that must be there: without it the check is skipped."""
         value = self.get(key)
         if value is None:
@@ -75,15 +75,15 @@ def find_radii(scene: Values) -> Radii:
     """The radii of the grains, whether they make sense or not."""
     if scene.has("sample.state"):
         try:
-            return find_stored_radii(scene.need("sample.state"))
+            return find_stored_radii(scene["sample.state"])
         except (OSError, UsageError, DumpError) as error:
             raise NotValid from error
     if scene.has("sample.grading"):
-        return make_radii(scene.need("sample.grading"), scene.get("sample.grading_scale"))
+        return make_radii(scene["sample.grading"], scene.get("sample.grading_scale"))
     table = "sample.grain_radius."
     return RadiusDistribution(
-        scene.need(table + "distribution"),
-        scene.need(table + "mean"),
+        scene[table + "distribution"],
+        scene[table + "mean"],
         scene.get(table + "standard_deviation") or 0.0,
         scene.get(table + "truncation") or 2.0,
     )
@@ -99,10 +99,10 @@ def find_named_form(scene: Values) -> Form:
 
 def find_geometry(scene: Values) -> Container:
     """The container; of a valid shape, without mirror planes given twice."""
-    shape = scene.need("sample.container")
+    shape = scene["sample.container"]
     planes = scene.get("sample.symmetry") or ()
     if shape == "box":
-        sizes = {key: scene.need(f"sample.{key}") for key in ("size_x", "size_y")}
+        sizes = {key: scene[f"sample.{key}"] for key in ("size_x", "size_y")}
     else:
-        sizes = {"radius": scene.need("sample.radius")}
+        sizes = {"radius": scene["sample.radius"]}
     return Container(shape, tuple(dict.fromkeys(planes)), **sizes)

@@ -27,13 +27,15 @@ from trackbed.scene_files.types import NAME_PATTERN, find_model
 from trackbed.scene_files.units import convert_table
 from trackbed.scenes import find_scene_verb
 
-BOUNDS = {
-    "greater_than": ("gt", "above"),
-    "greater_than_equal": ("ge", "at least"),
-    "less_than": ("lt", "below"),
-    "less_than_equal": ("le", "at most"),
-}
-"""Types of pydantic's errors: name of the bound in their context, and its words."""
+SAID = {
+    "missing": "missing", "string_too_short": "must not be empty",
+    "string_type": "must be a text{value}", "model_type": "must be a table{value}",
+    "model_attributes_type": "must be a table{value}",
+    "greater_than": "must be above {gt:.6g}{value}", "less_than": "must be below {lt:.6g}{value}",
+    "greater_than_equal": "must be at least {ge:.6g}{value}",
+    "less_than_equal": "must be at most {le:.6g}{value}",
+}  # fmt: skip
+"""What to say of types of pydantic's errors, with the value and the names in their context."""
 HARDLY = 1e-12
 """A least value up to this stands for "above zero"."""
 LONGEST = 1 << 24
@@ -212,14 +214,10 @@ def _explain(model: type[BaseModel], error: ErrorDetails) -> Problem:
     value = f", not {_show(error['input'])}"
     if kind == "extra_forbidden":
         what = "unknown key" + suggest_word(names[-1], _list_keys(model, names[:-1]))
-    elif kind == "missing":
-        what = "missing"
     elif kind == "literal_error":
         known = re.findall(r"'([^']*)'", str(context["expected"]))
         near = suggest_word(error["input"], known) if isinstance(error["input"], str) else ""
         what = f"must be {context['expected']}{value}{near}"
-    elif kind in ("model_type", "model_attributes_type"):
-        what = f"must be a table{value}"
     elif kind == "greater_than_equal" and 0 < context["ge"] <= HARDLY:
         what = f"must be above 0 (and at least {context['ge']:g}){value}"
     elif kind in ("tuple_type", "list_type", "too_short"):
@@ -230,16 +228,11 @@ def _explain(model: type[BaseModel], error: ErrorDetails) -> Problem:
     elif kind == "too_long":
         most = "" if context["field_type"] == "Tuple" else "at most "
         what = f"must have {most}{context['max_length']} entries{value}"
-    elif kind == "string_too_short":
-        what = "must not be empty"
-    elif kind == "string_type":
-        what = f"must be a text{value}"
     elif kind == "string_pattern_mismatch" and context["pattern"] == NAME_PATTERN:
         key = key.removesuffix(".[key]")
         what = f"a name has 1 to 60 letters, digits and _ . + -{value}"
-    elif kind in BOUNDS:
-        name, words = BOUNDS[kind]
-        what = f"must be {words} {context[name]:.6g}{value}"
+    elif kind in SAID:
+        what = SAID[kind].format(value=value, **context)
     elif kind == "value_error":
         what = error["msg"].removeprefix("Value error, ")
     else:
