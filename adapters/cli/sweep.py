@@ -46,38 +46,28 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
 
 def run_sweep_command(arguments: argparse.Namespace) -> int:
     """Run a sweep; `SweepIncomplete` when a member failed, after all others are finished."""
-    from adapters.procedure import Progress
-    from adapters.procedure.sweep import (
-        Cluster,
-        check_folder,
-        check_libraries,
-        list_dry_run,
-        make_sweep_record,
-        plan_sweep,
-        run_sweep,
-        write_results,
-    )
+    from adapters.procedure import Progress, sweep
 
     if arguments.workers is not None and arguments.workers < 1:
         raise UsageError("there must be a worker at least", where="--workers")
     if arguments.cluster_config is not None and arguments.scheduler != "slurm":
         raise UsageError("it is read for --scheduler slurm only", where="--cluster-config")
-    sweep = plan_sweep(
+    plan = sweep.plan_sweep(
         arguments.scene, arguments.into, arguments.assignments, arguments.seeds,
         list_overrides(arguments),
     )  # fmt: skip
     if arguments.dry_run:
-        check_folder(sweep)
-        print("\n".join(list_dry_run(sweep)))
+        sweep.check_folder(plan)
+        print("\n".join(sweep.list_dry_run(plan)))
         return 0
-    check_libraries(arguments.scheduler)
-    cluster = Cluster(arguments.scheduler, arguments.cluster_config, arguments.workers)
+    sweep.check_libraries(arguments.scheduler)
+    cluster = sweep.Cluster(arguments.scheduler, arguments.cluster_config, arguments.workers)
     progress = Progress()
-    warnings = (text for one in sweep.members for text in getattr(one.scene, "warnings", ()))
+    warnings = (text for one in plan.members for text in getattr(one.scene, "warnings", ()))
     for warning in dict.fromkeys(warnings):
         progress.print_line(f"warning: {warning}")
-    results = run_sweep(sweep, cluster, progress)
-    bands, paths = write_results(sweep, results)
+    results = sweep.run_sweep(plan, cluster, progress)
+    bands, paths = sweep.write_results(plan, results)
     bands = [band for band in bands if len(band.cycle)]
     if arguments.json:
         last = [
@@ -88,7 +78,7 @@ def run_sweep_command(arguments: argparse.Namespace) -> int:
             for band in bands
         ]  # fmt: skip
         print_json(
-            make_sweep_record(sweep, cluster, results) | {"settlements": last, "files": paths}
+            sweep.make_sweep_record(plan, cluster, results) | {"settlements": last, "files": paths}
         )
     else:
         for band in bands:

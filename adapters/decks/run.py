@@ -267,15 +267,12 @@ def finish(
     cost = {"engine": engine_s, "other": time.process_time() - started}
     stage, last = folder.name.partition("_")[0], place.cycle + len(rows)
     run.folder.finish(folder, Outcome(stage, place.cycle, last, rows, cost))
-    said = describe_row(rows[-1]) if rows else "the bed before its first cycle"
+    said = "the bed before its first cycle"
+    for row in rows[-1:]:
+        mean, body = 1e6 * row["settlement"], row["loaded_body"]
+        said = f"cycle {row['cycle']}, settlement of the mean grain {mean:.2f} um"
+        said += "" if body is None else f", of the loaded body {1e6 * body:.2f} um"
     run.progress.print_line(f"{folder.name}: {said}")
-
-
-def describe_row(row: dict[str, Any]) -> str:
-    """The settlements of a row, for a sentence."""
-    body = row["loaded_body"]
-    said = f"cycle {row['cycle']}, settlement of the mean grain {1e6 * row['settlement']:.2f} um"
-    return said + ("" if body is None else f", of the loaded body {1e6 * body:.2f} um")
 
 
 def resume_deck(path: Path) -> None:

@@ -75,8 +75,8 @@ def tap_bed(
     fall = PLAN.tap_fall * 2 * float(state.radius.mean())
     rows = [f"0 0 {porosity:.6g}"]
     while porosity > asked and len(rows) <= PLAN.taps_most:
-        lifted, top = lift_bed(state, fall)
-        one = settle(lifted, state.radius, top)
+        lifted = state.position + np.array([0.0, 0.0, fall])
+        one = settle(lifted, state.radius, 2 * float((lifted[:, 2] + state.radius).max()))
         done = replace(
             one, cpu_s=done.cpu_s + one.cpu_s, wall_s=done.wall_s + one.wall_s,
             start_up_s=done.start_up_s + one.start_up_s,
@@ -108,9 +108,3 @@ def read_bed(scene: Scene, folder: Path, walls: tuple[str, ...]) -> tuple[State,
             where="sample.porosity", remedy="more grains (sample.fill_height), or leave it out",
         )  # fmt: skip
     return state, porosity
-
-
-def lift_bed(state: State, fall: float) -> tuple[FloatArray, float]:
-    """Centres (n, 3) of a bed lifted by ``fall`` [m], and twice the height of its top [m]."""
-    lifted = state.position + np.array([0.0, 0.0, fall])
-    return lifted, 2 * float((lifted[:, 2] + state.radius).max())

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from adapters.files import EVENTS
 from adapters.procedure.members import Settled, judge_members, sum_members_cost
-from adapters.procedure.record import Record, Track, make_plain, read_run_record
+from adapters.procedure.record import Record, make_plain, read_run_record
 from trackbed.run_files import is_written
 
 
@@ -53,7 +53,7 @@ def read_status(run_folder: Path) -> Status:
 def judge_progress(record: Record) -> Status:
     """How far a run is."""
     run_folder, history = record.path, record.run.history
-    cycle = int(history.cycle[-1]) if len(history.cycle) else 0
+    cycle = int(history.cycle.max(initial=0))
     computed = history.count_computed(cycle)
     state = "running" if is_written(run_folder, "lock") else "stopped"
     events_alone = all(EVENTS in name for name in record.damaged)
@@ -81,15 +81,11 @@ def judge_progress(record: Record) -> Status:
         speed_up_so_far=make_plain(result.speed_up) if result else None,
         cpu_s=sum_members_cost(record),
         band_m=result.mean_grain.band if result else None,
-        control_cycle=_find_last_cycle(record.control) if record.control is not None else None,
+        control_cycle=None if record.control is None else int(record.control.history.cycle[-1]),
         damaged=", ".join(record.damaged),
         next=f"trackbed {verb} {shlex.quote(str(run_folder))}",
         result=result,
     )
-
-
-def _find_last_cycle(track: Track) -> int:
-    return int(track.history.cycle[-1])
 
 
 def _is_finished(record: Record) -> bool:
@@ -100,6 +96,6 @@ def _is_finished(record: Record) -> bool:
     full = [one.control for one in members] if record.manifest.get("control") else []
     total = record.scene.procedure.total_cycles
     return len(members) == record.asked and all(
-        track is not None and len(track.history.cycle) > 0 and _find_last_cycle(track) >= total
+        track is not None and track.history.cycle.max(initial=0) >= total
         for track in (*(one.run for one in members), *full)
     )

@@ -9,14 +9,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from adapters.scene.checks import (
-    ALTERNATIVES,
-    JUMP_KEYS,
-    STATE_HAS,
-    STATE_KEY,
-    TOLERANCE_KEY,
-    find_problems,
-)
+from adapters.scene import checks
 from adapters.scene.mechanics import DOUBTFUL
 from adapters.scene.procedures import fill_procedure, schedule_jumps
 from adapters.scene.tables import Procedure, Scene
@@ -59,7 +52,7 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
     if text.problems:
         problems += [problem for problem in text.problems if problem.key]
         invalid = [re.sub(r"\.\d+(?=\.|$)", "", problem.key) for problem in problems]
-        problems += find_problems(_list_defaults(Scene, data) | flatten_keys(data), invalid)
+        problems += checks.find_problems(_list_defaults(Scene, data) | flatten_keys(data), invalid)
     text.refuse(problems)
     return Scene.model_validate(data)
 
@@ -69,10 +62,11 @@ def _drop_alternatives(data: dict[str, Any], key: str) -> None:
     if key == "procedure.name":
         kept = ("name", "total_cycles", "members")
         data["procedure"] = {k: v for k, v in data["procedure"].items() if k in kept}
-    if key == TOLERANCE_KEY and "name" in data["procedure"]:
+    if key == checks.TOLERANCE_KEY and "name" in data["procedure"]:
         data["procedure"] = {**data["procedure"], "name": "tolerance"}
-    others = [other for pair in ALTERNATIVES if key in pair for other in pair if other != key]
-    others += {TOLERANCE_KEY: JUMP_KEYS, STATE_KEY: STATE_HAS}.get(key, ())
+    pairs = [pair for pair in checks.ALTERNATIVES if key in pair]
+    whole = {checks.TOLERANCE_KEY: checks.JUMP_KEYS, checks.STATE_KEY: checks.STATE_HAS}
+    others = [other for pair in (*pairs, whole.get(key, ())) for other in pair if other != key]
     for other in others:
         *tables, name = other.split(".")
         table = data

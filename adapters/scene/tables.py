@@ -20,17 +20,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from adapters.bed import (
-    WHOLE,
-    Container,
-    FloatArray,
-    Radii,
-    RadiusDistribution,
-    Walls,
-    contact_law,
-    count_sides,
-    expect_grains,
-)
+from adapters import bed
 from adapters.bed.stones import SPHERE, Form, find_form
 from adapters.files import LoadSeries, read_load_series
 from adapters.laws.fit import FIRST_WINDOW
@@ -64,9 +54,9 @@ class GrainRadius(Table):
     """Standard deviations of a normal distribution kept on either side of the mean [-]."""
 
     @property
-    def law(self) -> RadiusDistribution:
+    def law(self) -> bed.RadiusDistribution:
         """The distribution itself, with bounds and moments."""
-        return RadiusDistribution(
+        return bed.RadiusDistribution(
             self.distribution, self.mean, self.standard_deviation, self.truncation
         )
 
@@ -102,7 +92,7 @@ class Sample(Table):
     its places and radii, at rest; a relative path counts from the scene file's folder."""
 
     @property
-    def radii(self) -> Radii:
+    def radii(self) -> bed.Radii:
         """Radii of the grains, with their bounds and moments."""
         if self.state is not None:
             return find_stored_radii(self.state)
@@ -142,7 +132,7 @@ class Loading(Table):
         assert self.frequency is not None
         return 1 / self.frequency
 
-    def stress_at(self, phase: float | FloatArray) -> FloatArray:
+    def stress_at(self, phase: float | bed.FloatArray) -> bed.FloatArray:
         """Stress [Pa] on the loaded area at a ``phase`` in cycles (any real number).
 
         A sine is mean - amplitude/2 cos(2 pi phase): its troughs are at whole cycles.
@@ -265,15 +255,15 @@ class Scene(Table):
         return self.form is not SPHERE
 
     @property
-    def container(self) -> Container:
+    def container(self) -> bed.Container:
         """The container's geometry, as the scene's engine has it."""
         sample = self.sample
         sides = 0
         if sample.radius is not None and self.engine.name in FLAT_WALLED:
-            sides = count_sides(sample.radius, sample.radii.mean)
+            sides = bed.count_sides(sample.radius, sample.radii.mean)
         given = (sample.radius, sample.size_x, sample.size_y)
         radius, size_x, size_y = (nan if size is None else size for size in given)
-        return Container(sample.container, sample.symmetry, radius, size_x, size_y, sides)
+        return bed.Container(sample.container, sample.symmetry, radius, size_x, size_y, sides)
 
     @property
     def loaded_area(self) -> float:
@@ -286,10 +276,10 @@ class Scene(Table):
     def piston_edges(self) -> tuple[float, float, float, float]:
         """Ends along x, then along y, of a rectangular piston [m]; infinite where it has none."""
         if self.loading is None or self.loading.footprint is None:
-            return WHOLE
+            return bed.WHOLE
         return self.container.place_footprint(self.loading.footprint)
 
-    def walls(self, piston_height: float) -> Walls:
+    def walls(self, piston_height: float) -> bed.Walls:
         """All walls of the bed, the piston at a height [m] among them."""
         return self.container.walls(piston_height, self.piston_reach, self.piston_edges)
 
@@ -307,13 +297,13 @@ class Scene(Table):
         if grain.restitution is not None:
             return grain.restitution
         assert grain.viscous_alpha is not None
-        return contact_law.find_restitution(grain.viscous_alpha)
+        return bed.contact_law.find_restitution(grain.viscous_alpha)
 
     @property
-    def stiffness(self) -> contact_law.HertzStiffness:
+    def stiffness(self) -> bed.contact_law.HertzStiffness:
         """Equivalent moduli of grains, walls and mirror planes."""
         grain, wall = self.material.grain, self.material.wall
-        return contact_law.make_hertz_stiffness(
+        return bed.contact_law.make_hertz_stiffness(
             grain.young, grain.poisson, wall.young, wall.poisson
         )
 
@@ -321,7 +311,7 @@ class Scene(Table):
     def rayleigh_time(self) -> float:
         """Rayleigh time [s] of the smallest sphere that the radius distribution allows."""
         grain = self.material.grain
-        return contact_law.find_rayleigh_time(
+        return bed.contact_law.find_rayleigh_time(
             self.form.least * self.sample.radii.smallest, grain.density, grain.young, grain.poisson
         )
 
@@ -365,9 +355,9 @@ class Scene(Table):
         if self.sample.count is not None:
             return self.sample.count
         assert self.sample.fill_height is not None
-        return expect_grains(self.sample.radii, self.container, self.sample.fill_height)
+        return bed.expect_grains(self.sample.radii, self.container, self.sample.fill_height)
 
-    def stress_at(self, phase: float | FloatArray) -> FloatArray:
+    def stress_at(self, phase: float | bed.FloatArray) -> bed.FloatArray:
         """Stress [Pa] on the loaded area at a ``phase`` in cycles; 0 without loading."""
         if self.loading is None:
             return np.zeros_like(np.asarray(phase, float))

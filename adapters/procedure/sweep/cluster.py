@@ -6,6 +6,7 @@ import os
 import tomllib
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -30,39 +31,45 @@ def check_libraries(scheduler: str) -> None:
         raise EngineMissing(f"a sweep needs {', '.join(missing)}", remedy=EXTRA)
 
 
+@dataclass(frozen=True)
+class Cluster:
+    """Where a sweep runs."""
+
+    scheduler: str = LOCAL  # `LOCAL`, `SLURM` or the address of a Dask scheduler
+    config: Path | None = None  # TOML file with the keywords of `dask_jobqueue.SLURMCluster`
+    workers: int | None = None
+    """Members at a time here, or SLURM jobs; None: as many as processors, or as members."""
+
+
 @contextmanager
-def open_client(
-    scheduler: str, config: Path | None, workers: int | None, members: int
-) -> Iterator[Any]:
+def open_client(cluster: Cluster, members: int) -> Iterator[Any]:
     """A `distributed.Client`, closed at the end, and with it what was started for it.
 
-    ``workers``: members at a time on this machine, or SLURM jobs; default: as many as processors,
-    or as ``members``.  Raises `UsageError` where the scheduler does not answer or the configuration
-    is wrong.
+    Raises `UsageError` where the scheduler does not answer or the configuration is wrong.
     """
     import distributed
 
     with ExitStack() as stack:
-        if scheduler == LOCAL:
-            cores = len(os.sched_getaffinity(0))
+        if cluster.scheduler == LOCAL:
+            most = cluster.workers or len(os.sched_getaffinity(0))
             place: Any = distributed.LocalCluster(
-                n_workers=1, threads_per_worker=min(workers or cores, members), processes=False,
+                n_workers=1, threads_per_worker=min(most, members), processes=False,
                 dashboard_address=None, scheduler_kwargs={"dashboard_address": ANY_PORT},
                 memory_limit=None,
             )  # fmt: skip
             stack.enter_context(place)
-        elif scheduler == SLURM:
-            place = stack.enter_context(_open_slurm(config))
-            jobs = workers or members
+        elif cluster.scheduler == SLURM:
+            place = stack.enter_context(_open_slurm(cluster.config))
+            jobs = cluster.workers or members
             place.adapt(minimum_jobs=jobs, maximum_jobs=jobs)  # a job that is lost is replaced
         else:
-            place = scheduler
+            place = cluster.scheduler
         try:
             client = stack.enter_context(distributed.Client(place, timeout=CONNECT_S))
         except (OSError, ValueError) as error:
             raise UsageError(
                 f"no Dask scheduler answers ({error})",
-                where=f"--scheduler {scheduler}",
+                where=f"--scheduler {cluster.scheduler}",
                 remedy="give local, slurm, or the address that dask-scheduler printed, such as "
                 "tcp://node1:8786",
             ) from error

@@ -32,13 +32,8 @@ class SweepStopped(Exception):
 class Ended:
     """How a member's command ended."""
 
-    exit_code: int  # that of its verb; minus the signal when one ended it
+    exit_code: int  # that of its verb, 0 at its end; minus the signal when one ended it
     sentence: str  # what it said of its error; empty when it had none
-
-    @property
-    def finished(self) -> bool:
-        """Whether the run came to its end."""
-        return self.exit_code == 0
 
 
 STOPPED = Ended(130, "stopped with the sweep; every finished window is saved")

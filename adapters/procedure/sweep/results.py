@@ -63,13 +63,6 @@ def convert_settings(member: Member) -> dict[str, Any]:
     return {k: json.dumps(v) if isinstance(v, list) else v for k, v in typed.items()}
 
 
-def read_settlement_rows(sweep: Sweep, member: Member) -> list[dict[str, Any]]:
-    """Rows of ``settlement.csv`` of a member, by the names of its columns."""
-    outcomes = RunFolder(sweep.run_folder(member)).outcomes()
-    rows = (row for outcome in outcomes for row in outcome.rows)
-    return [{name: row.get(key) for name, key in COLUMNS.items()} for row in rows]
-
-
 def estimate_bands(sweep: Sweep, finished: set[str]) -> list[Band]:
     """The band of every setting of which a member is ``finished``."""
     bands = []
@@ -95,17 +88,18 @@ def write_results(sweep: Sweep, results: Sequence[Result]) -> tuple[list[Band], 
     """Write the tables and the picture; the bands, and the path of every file."""
     if not sweep.settles:
         return [], join_summaries(sweep, results)
-    by_name = {result.member: result for result in results}
     bands = estimate_bands(sweep, {one.member for one in results if one.state == "finished"})
     member_rows, curve_rows = [], []
-    for member in sweep.members:
+    for member, result in zip(sweep.members, results, strict=True):
         key = {"member": member.name, **convert_settings(member), sweep.kind.seed: member.seed}
-        rows = read_settlement_rows(sweep, member)
-        curve_rows += [key | row for row in rows]
-        figures = {name: rows[-1].get(name) if rows else None for name in SAMPLE_FIGURES}
-        result = vars(by_name[member.name]).items()
-        result_row = {name: value for name, value in result if name not in ("member", "seed")}
-        member_rows.append(key | result_row | figures)
+        outcomes = RunFolder(sweep.run_folder(member)).outcomes()
+        found = [row for outcome in outcomes for row in outcome.rows]
+        curve_rows += [key | {name: one.get(k) for name, k in COLUMNS.items()} for one in found]
+        figures = {name: found[-1].get(name) if found else None for name in SAMPLE_FIGURES}
+        own = {
+            name: value for name, value in vars(result).items() if name not in ("member", "seed")
+        }
+        member_rows.append(key | own | figures)
     band_rows = [
         {
             **band.settings, "cycle": int(cycle), "seeds": band.seeds, "loaded_body_m": float(mean),

@@ -6,14 +6,13 @@ import json
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
 from adapters.engines import allow_interrupts
 from adapters.errors import Interrupted, UsageError
 from adapters.files import RunFolder, explain_full_disk
 from adapters.procedure import Progress, read_status
-from adapters.procedure.sweep.cluster import open_client
+from adapters.procedure.sweep.cluster import Cluster, open_client
 from adapters.procedure.sweep.member import (
     STOPPED,
     Ended,
@@ -47,15 +46,6 @@ class Result:
     run_folder: str
 
 
-@dataclass(frozen=True)
-class Cluster:
-    """Where a sweep runs."""
-
-    scheduler: str = "local"  # ``local``, ``slurm`` or the address of a Dask scheduler
-    config: Path | None = None  # TOML file with the keywords of `dask_jobqueue.SLURMCluster`
-    workers: int | None = None  # members at a time here, or SLURM jobs
-
-
 def find_result(sweep: Sweep, member: Member, ended: Ended | None) -> Result:
     """How far a member is, from its run folder and how its command ended, if it ran."""
     folder = sweep.run_folder(member)
@@ -68,10 +58,10 @@ def find_result(sweep: Sweep, member: Member, ended: Ended | None) -> Result:
     state, exit_code, sentence = "waiting", None, ""
     if ended is not None:
         exit_code, sentence = ended.exit_code, ended.sentence
-        if ended.finished and not done:
+        if exit_code == 0 and not done:
             sentence = f"its files show no finished run: remove {folder}"
         state = "stopped" if ended == STOPPED else "failed"
-    if done and (ended is None or ended.finished):
+    if done and not exit_code:
         state, exit_code, sentence = "finished", 0, str(summary.get("sentence", ""))
     return Result(
         member=member.name, seed=member.seed, state=state, exit_code=exit_code, sentence=sentence,
@@ -121,7 +111,7 @@ def _run(
     progress: Progress,
 ) -> None:  # fmt: skip
     """Hand the members to the cluster, and take the results in as they come."""
-    with open_client(cluster.scheduler, cluster.config, cluster.workers, len(pending)) as client:
+    with open_client(cluster, len(pending)) as client:
         from distributed import as_completed, wait
 
         engine = choose_engine(sweep, pending, client, progress)

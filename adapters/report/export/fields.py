@@ -46,7 +46,7 @@ def gather_contacts(run: ExportedRun, instant: Instant) -> dict[str, Array]:
     apart = instant.state.position[pair[:, 0]] - instant.state.position[pair[:, 1]]
     push = np.einsum("ma,ma->m", contacts.normal_force, apart)
     fields: dict[str, Array] = {"normal_force": push / np.linalg.norm(apart, axis=1)}
-    if run.frictional:
+    if run.own and run.scene.material.grain.friction > 0:
         fields["tangential_force"] = contacts.tangential_force
     return fields
 

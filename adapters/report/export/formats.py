@@ -16,15 +16,8 @@ from adapters.engines import bound_section
 from adapters.errors import UsageError
 from adapters.files import Frame, Kind, explain_full_disk, write_dump
 from adapters.files.ondem import write_bodies
-from adapters.report.export.fields import (
-    Array,
-    gather_contacts,
-    gather_grains,
-    gather_named_contacts,
-    gather_placed_grains,
-    list_contacts,
-    split_columns,
-)
+from adapters.report.export import fields
+from adapters.report.export.fields import Array
 from adapters.report.export.instants import ExportedRun, Instant
 from adapters.scene import list_stages
 from trackbed.run_files import refuse_writing, replace_file, write_pvd
@@ -45,11 +38,11 @@ def export_vtu(run: ExportedRun, into: Path, every: int) -> list[Path]:
         grains.append((instant.cycle, f"vtu/grains_{instant.cycle:06d}.vtu"))
         centres = instant.state.position
         points = np.arange(len(centres))[:, None]
-        of_grains = gather_grains(run, instant)
+        of_grains = fields.gather_grains(run, instant)
         write_mesh(into / grains[-1][1], centres, "vertex", points, point_data=of_grains)
         if run.own:
             contacts.append((instant.cycle, f"vtu/contacts_{instant.cycle:06d}.vtu"))
-            of_contacts, lines = gather_contacts(run, instant), list_contacts(instant)
+            of_contacts, lines = fields.gather_contacts(run, instant), fields.list_contacts(instant)
             write_mesh(into / contacts[-1][1], centres, "line", lines, cell_data=of_contacts)
     series = {"grains": grains} | ({"contacts": contacts} if run.own else {})
     for name, files in series.items():
@@ -82,18 +75,18 @@ def export_ovito(run: ExportedRun, into: Path, every: int) -> list[Path]:
 
     def make_frames(gather: Gather, kind: Kind) -> Iterator[Frame]:
         for instant in run.instants(every):
-            fields = gather(run, instant)
-            if "tangential_force" in fields:
-                fields["tangential_force"] = np.linalg.norm(fields["tangential_force"], axis=1)
-            named = {ENGINE_NAME.get(name, name): values for name, values in fields.items()}
-            columns = dict(split_columns(named, ""))
+            found = gather(run, instant)
+            if "tangential_force" in found:
+                found["tangential_force"] = np.linalg.norm(found["tangential_force"], axis=1)
+            named = {ENGINE_NAME.get(name, name): values for name, values in found.items()}
+            columns = dict(fields.split_columns(named, ""))
             values = np.column_stack([*columns.values()]).astype(float)
             yield Frame(instant.cycle, tuple(columns), values, box, kind)
 
-    write_dump(into / "grains.dump", make_frames(gather_placed_grains, "atoms"))
+    write_dump(into / "grains.dump", make_frames(fields.gather_placed_grains, "atoms"))
     if not run.own:
         return [into / "grains.dump"]
-    write_dump(into / "contacts.dump", make_frames(gather_named_contacts, "entries"))
+    write_dump(into / "contacts.dump", make_frames(fields.gather_named_contacts, "entries"))
     return [into / "grains.dump", into / "contacts.dump"]
 
 
@@ -119,13 +112,13 @@ def export_csv(run: ExportedRun, into: Path, every: int) -> list[Path]:
 
     def list_columns(gather: Gather) -> Iterator[dict[str, Array]]:
         for instant in run.instants(every):
-            columns = dict(split_columns(gather(run, instant), "_"))
+            columns = dict(fields.split_columns(gather(run, instant), "_"))
             length = len(next(iter(columns.values())))
             yield {"cycle": np.full(length, instant.cycle), **columns}
 
-    tables = {"grains": list_columns(gather_placed_grains)}
+    tables = {"grains": list_columns(fields.gather_placed_grains)}
     if run.own:
-        tables["contacts"] = list_columns(gather_named_contacts)
+        tables["contacts"] = list_columns(fields.gather_named_contacts)
     if run.own and run.loaded:
         tables["piston"] = run.piston_samples()
     for name, parts in tables.items():
@@ -167,12 +160,12 @@ def _find_time(run: ExportedRun, instant: Instant) -> dict[str, float]:
 
 def _gather_signed_contacts(run: ExportedRun, instant: Instant) -> dict[str, Array]:
     """Contacts as ON-DEM has them: traction is positive, a tangential force acts on grain 2."""
-    touching, (first, second) = instant.state.contacts, list_contacts(instant).T
+    touching, (first, second) = instant.state.contacts, fields.list_contacts(instant).T
     apart = instant.state.position[second] - instant.state.position[first]
     return {
         "id1": touching.pair[:, 0], "id2": touching.pair[:, 1], "overlap": touching.overlap,
         "normal": apart / np.linalg.norm(apart, axis=1)[:, None],
-        "normal_force": -gather_contacts(run, instant)["normal_force"],
+        "normal_force": -fields.gather_contacts(run, instant)["normal_force"],
         "shear_force": -touching.tangential_force,
     }  # fmt: skip
 

@@ -48,14 +48,9 @@ class ExportedRun:
         """Whether load cycles were computed: without them nothing moves and there is no piston."""
         return bool(self.track.windows)
 
-    @property
-    def frictional(self) -> bool:
-        """Whether contacts between grains have a tangential force."""
-        return self.own and self.scene.material.grain.friction > 0
-
     def _states(self, every: int) -> Iterator[State]:
         yield self.track.start()
-        done, last = 0, self.last_cycle
+        done, last = 0, max((one.last_cycle for _, one in self.track.windows), default=0)
         for name, _ in self.track.windows:
             window = self.track.window(name)
             for index, cycle in enumerate(window.cycle.tolist()):
@@ -86,11 +81,6 @@ class ExportedRun:
             since = state.position - start.position[row]
             since[start.identifier[row] != state.identifier] = np.nan
             yield Instant(state, since, rotation, coordination)
-
-    @property
-    def last_cycle(self) -> int:
-        """Last cycle end computed; 0 before loading."""
-        return max((outcome.last_cycle for _, outcome in self.track.windows), default=0)
 
     def piston_samples(self) -> Iterator[dict[str, FloatArray | IntArray]]:
         """All samples of the piston, window by window: cycles done, forces [N], height [m]."""
