@@ -58,9 +58,5 @@ def find_choice(
 
 def explain_retired(name: str, retired: Mapping[str, str]) -> str:
     """Which version has a choice that left trackbed, and what to use; empty for other names."""
-    if name not in retired:
-        return ""
-    use = retired[name]
-    return (
-        f": only studies used it, and trackbed {RETIRED_AFTER} is the last to have it; use '{use}'"
-    )
+    said = f": only studies used it, and trackbed {RETIRED_AFTER} is the last to have it; use "
+    return f"{said}'{retired[name]}'" if name in retired else ""

@@ -138,6 +138,11 @@ def read_surface(path: str | os.PathLike[str], unit: str) -> Surface:
     Raises as `read_mesh_file`, and `MeshError` for a surface that does not bound one solid: open,
     in pieces, flat, with triangles that do not face alike, or one that crosses itself.
     """
+
+    def refuse(what: str, place: Floats | None = None, remedy: str = MEND) -> MeshError:
+        at = "" if place is None else ", as at ({:.5g}, {:.5g}, {:.5g}) ".format(*place) + unit
+        return MeshError(what + at, where=str(path), remedy=remedy)
+
     mesh = read_mesh_file(path, str(path))
     fans = [
         np.stack([block.data[:, 0], block.data[:, k], block.data[:, k + 1]], axis=1)
@@ -147,18 +152,12 @@ def read_surface(path: str | os.PathLike[str], unit: str) -> Surface:
     corner = np.asarray(mesh.points, float)[np.concatenate(fans)] if fans else np.zeros((0, 3, 3))
     extent = float(np.ptp(corner.reshape(-1, 3), axis=0).max()) if corner.size else 0.0
     if any(block.dim == 3 for block in mesh.cells) or not (np.isfinite(extent) and extent > 0):
-        raise MeshError(
-            "it is no surface of triangles with a finite extent", where=str(path),
-            remedy="give the surface of one stone, such as a scan: STL, OBJ or PLY",
-        )  # fmt: skip
+        what = "it is no surface of triangles with a finite extent"
+        raise refuse(what, remedy="give the surface of one stone, such as a scan: STL, OBJ or PLY")
     scaled = np.round((corner - corner[0, 0]).reshape(-1, 3) / extent, 9)
     _, kept, same = np.unique(scaled, axis=0, return_index=True, return_inverse=True)
     points, triangles = corner.reshape(-1, 3)[kept], same.reshape(-1, 3)
     triangles = triangles[(triangles != np.roll(triangles, 1, axis=1)).all(axis=1)]
-
-    def refuse(what: str, place: Floats | None = None, remedy: str = MEND) -> MeshError:
-        at = "" if place is None else ", as at ({:.5g}, {:.5g}, {:.5g}) ".format(*place) + unit
-        return MeshError(what + at, where=str(path), remedy=remedy)
 
     ways = np.concatenate([triangles[:, [k, (k + 1) % 3]] for k in range(3)])
     edges, which, count = np.unique(

@@ -34,14 +34,8 @@ def read_parameters():
 
 def add_materials(parameters):
     """Materials by name: grain, wall, and mirror where the scene has one."""
-    return {
-        name: O.materials.append(
-            wrapper.FrictMat(
-                young=m["young"], poisson=m["poisson"], density=m["density"], label=name
-            )
-        )
-        for name, m in parameters["materials"].items()
-    }
+    for name, properties in parameters["materials"].items():
+        O.materials.append(wrapper.FrictMat(label=name, **properties))
 
 
 def add_grains(parameters):
@@ -54,14 +48,11 @@ def add_grains(parameters):
 def add_walls(parameters):
     """Planes along the axes, and one triangle for each side of a cylinder."""
     for w in parameters["walls"]:
+        kind = {"material": w["material"], "mask": WALL_MASK}
         if "vertices" in w:
-            body = facet(
-                [Vector3(*v) for v in w["vertices"]], material=w["material"], mask=WALL_MASK
-            )
+            body = facet([Vector3(*v) for v in w["vertices"]], **kind)
         else:
-            body = wall(
-                w["position"], w["axis"], w["sense"], material=w["material"], mask=WALL_MASK
-            )
+            body = wall(w["position"], w["axis"], w["sense"], **kind)
         O.bodies.append(body)
 
 
@@ -97,18 +88,14 @@ class Piston:
         self.grains_share()
 
     def _make(self, piston):
-        z, parted = piston["height"], self.parted
+        z, of_walls = piston["height"], WALL_MASK & ~GRAIN_MASK
+        mask = RIM | of_walls if self.parted else WALL_MASK
         members = [
-            facet(
-                [Vector3(x, y, z) for x, y in triangle],
-                material="wall",
-                mask=RIM | WALL_MASK & ~GRAIN_MASK if parted else WALL_MASK,
-            )
+            facet([Vector3(x, y, z) for x, y in triangle], material="wall", mask=mask)
             for triangle in piston["triangles"]
         ]
-        if parted:
-            mask = PLANE | WALL_MASK & ~GRAIN_MASK
-            members.append(wall((0, 0, z), 2, -1, material="wall", mask=mask))
+        if self.parted:
+            members.append(wall((0, 0, z), 2, -1, material="wall", mask=PLANE | of_walls))
         members.append(sphere((0, 0, z), 1e-3, material="wall", mask=BALLAST_MASK))
         made = O.bodies.appendClumped(members)
         assert made == (self.clump, [*self.faces, self.ballast]), made

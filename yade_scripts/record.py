@@ -116,8 +116,7 @@ class Dumps:
 
 def write_frame(stream, kind, columns, values, integers, bounds, number="%.17g"):
     """Append a frame to a text dump; the first ``integers`` columns are whole numbers."""
-    counted = "ATOMS" if kind == "ATOMS" else "ENTRIES"
-    stream.write(f"ITEM: TIMESTEP\n{O.iter}\nITEM: NUMBER OF {counted}\n{len(values)}\n")
+    stream.write(f"ITEM: TIMESTEP\n{O.iter}\nITEM: NUMBER OF {kind}\n{len(values)}\n")
     stream.write("ITEM: BOX BOUNDS ff ff ff\n")
     stream.writelines(f"{low:.17g} {high:.17g}\n" for low, high in bounds)
     stream.write(f"ITEM: {kind} {columns}\n")

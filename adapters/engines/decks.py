@@ -263,7 +263,8 @@ def gather_cycle_parameters(
             name if "release" in name else f"seat_{name}": value for name, value in seat.items()
         }
     if loading.samples is not None:
-        return parameters | {"steps_per_sample": _write_series(scene, cycles, folder)}
+        force = loading.samples.stress * scene.loaded_area
+        return parameters | {"steps_per_sample": _write_series(scene, force, cycles, folder)}
     assert loading.mean is not None
     assert loading.amplitude is not None
     return parameters | {
@@ -272,11 +273,9 @@ def gather_cycle_parameters(
     }
 
 
-def _write_series(scene: Scene, cycles: int, folder: Path) -> int:
-    """Load samples of the window, one a line, and their slopes a step; steps between samples."""
-    assert scene.loading is not None
-    assert scene.loading.samples is not None
-    force = scene.loading.samples.stress * scene.loaded_area
+def _write_series(scene: Scene, force: FloatArray, cycles: int, folder: Path) -> int:
+    """Samples of a window's ``force`` [N], one a line, and their slopes a step; steps between
+    samples."""
     steps = scene.steps_per_cycle // (len(force) - 1)
     # One sample more than segments: the next one is drawn after the last segment too.
     samples = np.append(np.tile(force[:-1], cycles), force[0])

@@ -88,12 +88,10 @@ def format_scene(scene: Scene) -> str:
             f"fix {name} grains wall/gran granular {law} {'xyz'[axis]}plane {sides} contacts"
         )
     if np.isfinite(walls.cylinder_radius):
-        lines.append(
-            f"region cylinder cylinder z 0.0 0.0 {walls.cylinder_radius:.17g} INF INF units box"
-        )
-        lines.append(
-            f"fix cylinder grains wall/gran/region granular {wall} region cylinder contacts"
-        )
+        lines += [
+            f"region cylinder cylinder z 0.0 0.0 {walls.cylinder_radius:.17g} INF INF units box",
+            f"fix cylinder grains wall/gran/region granular {wall} region cylinder contacts",
+        ]
     return "\n".join(lines) + "\n"
 
 

@@ -228,8 +228,7 @@ def cover_side(container: Container, angle: float, height: float) -> FloatArray:
     ``angle`` [rad] of the outward normal, ``height`` [m] up to which the side is covered.
     """
     width = 2 * container.radius * np.tan(np.pi / container.sides)
-    margin = width
-    corners = np.array([[-width, -margin], [width, -margin], [0.0, 2 * height + 2 * margin]])
+    corners = np.array([[-width, -width], [width, -width], [0.0, 2 * height + 2 * width]])
     outward = np.array([np.cos(angle), np.sin(angle)])
     along = np.array([-outward[1], outward[0]])
     plane = container.radius * outward + corners[:, :1] * along

@@ -17,7 +17,7 @@ from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime
-from itertools import takewhile
+from itertools import count, takewhile
 from pathlib import Path
 from typing import Any
 
@@ -280,14 +280,13 @@ class RunFolder:
             return
         home = self.path / "discarded"
         home.mkdir(exist_ok=True)
-        number = 1
-        while (home / f"{folder.name}.{number}").exists():
-            number += 1
-        folder.rename(home / f"{folder.name}.{number}")
+        names = (f"{folder.name}.{number}" for number in count(1))
+        name = next(one for one in names if not (home / one).exists())
+        folder.rename(home / name)
         if self._listing is not None and folder.parent == self.path:
             self._listing.names.remove(folder.name)
             self._listing.finished.pop(folder.name, None)
-        self.add_event("discarded", stage=folder.name, to=f"discarded/{folder.name}.{number}")
+        self.add_event("discarded", stage=folder.name, to=f"discarded/{name}")
 
     def write_settlement(self) -> None:
         """Write ``settlement.csv`` from the outcomes of all finished stages."""

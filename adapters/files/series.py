@@ -71,20 +71,7 @@ def read_series(
         whose = "a run's settlement is" if tables else "dumps are"
         raise UsageError(f"{whose} in m, not in {unit}", where=str(path), remedy="leave --unit out")
     if tables:
-        table = path / "settlement.csv" if path.is_dir() else path
-        if path.is_dir() and (kind := find_kind(path)) and kind.verb != "run":
-            raise UsageError(
-                f"this is a {kind.verb} run, which has no settlement under load cycles",
-                where=str(path), remedy=f"its files are open: {kind.files}",
-            )  # fmt: skip
-        if path.is_dir():
-            _refuse_changed(path)
-        if path.is_dir() and not table.exists():
-            raise UsageError(
-                "can not read the series (No such file or directory)", where=str(table),
-                remedy="this folder is no run, or no cycle of it is computed; of other folders "
-                "give the files: a table, or dumps",
-            )  # fmt: skip
+        table = _find_run_table(path) if path.is_dir() else path
         return replace(read_table_series(table, columns, unit), where=str(table))
     if columns:
         raise UsageError(
@@ -147,8 +134,14 @@ def read_dump_series(paths: Sequence[Path], steps_per_cycle: float | None = None
     return Series(cycle, heights[0] - np.array(heights), doubts=tuple(filter(None, doubts)))
 
 
-def _refuse_changed(run: Path) -> None:
-    """Refuse a run whose table may not be what it computed: a changed one, or links out of it."""
+def _find_run_table(run: Path) -> Path:
+    """The table of a run; refuses one that may not be what it computed: a changed one, or links
+    out of it."""
+    if (kind := find_kind(run)) and kind.verb != "run":
+        raise UsageError(
+            f"this is a {kind.verb} run, which has no settlement under load cycles",
+            where=str(run), remedy=f"its files are open: {kind.files}",
+        )  # fmt: skip
     refuse_links(run)
     if (run / MANIFEST).exists():
         RunFolder(run).manifest()  # raises where there is none in it
@@ -157,6 +150,14 @@ def _refuse_changed(run: Path) -> None:
             f"not as the run left it: {', '.join(damaged)}", where=str(run),
             remedy=f"trackbed resume {shlex.quote(str(run))}, or give the table that you trust",
         )  # fmt: skip
+    table = run / "settlement.csv"
+    if not table.exists():
+        raise UsageError(
+            "can not read the series (No such file or directory)", where=str(table),
+            remedy="this folder is no run, or no cycle of it is computed; of other folders "
+            "give the files: a table, or dumps",
+        )  # fmt: skip
+    return table
 
 
 def describe_thrown(grains: FloatArray, sunk: FloatArray) -> str | None:

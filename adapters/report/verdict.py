@@ -61,27 +61,18 @@ def list_failures(
     if not len(record.run.history.cycle):
         return
     yield from _list_cheaper_ways({row.name: row for row in rows})
+    apart = [row.coordination_number_error for row in rows if row.name == PROCEDURE]
+    changed = [jump.coordination_change for jump in jumps]
+    height = [jump.height_change for jump in jumps]
     force = [
         row["force_error"]
         for _, window in record.run.windows
         for row in window.rows[BOUNDS.force_start_cycles :]
     ]
     for name, values, bar in (
-        (
-            "coordination number against the control",
-            [row.coordination_number_error for row in rows if row.name == PROCEDURE],
-            COORDINATION_BAR,
-        ),
-        (
-            "coordination number changed by a jump and its relaxation",
-            [jump.coordination_change for jump in jumps],
-            COORDINATION_BAR,
-        ),
-        (
-            "mean height changed by relaxation, over the jump's own settlement",
-            [jump.height_change for jump in jumps],
-            HEIGHT_BAR,
-        ),
+        ("coordination number against the control", apart, COORDINATION_BAR),
+        ("coordination number changed by a jump and its relaxation", changed, COORDINATION_BAR),
+        ("mean height changed by relaxation, over the jump's own settlement", height, HEIGHT_BAR),
         ("piston's rms force error in its worst cycle after three", force, BOUNDS.force_error_goal),
     ):
         worst = np.nanmax(np.abs([0.0, *values]))

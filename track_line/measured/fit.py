@@ -92,7 +92,7 @@ def fit_beds(ensemble: Ensemble) -> BedFit:
             remedy="give the readings between one tamping and the next alone",
         )
     seated, a, b = fit_power(cycle[read], settled[here][:, read].mean(axis=0))
-    interval = bound_exponent(cycle[read], settled[here][:, read])
+    interval = bound_exponent(cycle[read], settled[here][:, read], b)
     if b < SLOWEST:
         seated, a, b, interval = np.nan, np.nan, np.nan, (np.nan, np.nan)
     elif b > FASTEST:
@@ -166,11 +166,10 @@ def fit_power(cycle: Floats, settled: Floats) -> tuple[float, float, float]:
     return float(settled.mean() - a * (cycle**b).mean()), a, b
 
 
-def bound_exponent(cycle: Floats, settled: Floats) -> tuple[float, float]:
-    """Interval of b, by leaving out each of the beds (n, k) in turn (jackknife)."""
+def bound_exponent(cycle: Floats, settled: Floats, b: float) -> tuple[float, float]:
+    """Interval of ``b``, by leaving out each of the beds (n, k) in turn (jackknife)."""
     n = len(settled)
     left = np.array([fit_power(cycle, np.delete(settled, i, 0).mean(axis=0))[2] for i in range(n)])
-    b = fit_power(cycle, settled.mean(axis=0))[2]
     half = t.ppf((1 + LEVEL) / 2, n - 1) * np.sqrt((n - 1) * left.var())
     return b - half, b + half
 
