@@ -17,8 +17,8 @@ from adapters.files import explain_full_disk
 from adapters.jumps import Control, Decision, Landing, Settings, Stretch
 from adapters.laws.fit import Regime
 from adapters.procedure import forecast, stages
-from adapters.procedure.history import sum_cost
-from adapters.procedure.record import CHECK, DECISION, make_plain
+from adapters.procedure.history import make_plain, sum_cost
+from adapters.procedure.record import CHECK, DECISION
 from adapters.procedure.seating import seat_piston, warn_if_hung
 from adapters.procedure.stages import Bed, Gains, Run
 

@@ -74,6 +74,17 @@ class History:
         return float(values.mean()) if len(values) else nan
 
 
+def make_plain(value: Any) -> Any:
+    """The same in types that JSON has; None for numbers that are not finite."""
+    if isinstance(value, dict):
+        return {key: make_plain(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [make_plain(inner) for inner in value]
+    if isinstance(value, np.generic):
+        return make_plain(value.item())
+    return None if isinstance(value, float) and not isfinite(value) else value
+
+
 def sum_cost(cost: Mapping[str, float]) -> float:
     """CPU time of a stage [s]; ``start_up`` is a part of ``engine``."""
     return sum(seconds for purpose, seconds in cost.items() if purpose != "start_up")
@@ -121,11 +132,6 @@ def make_history(
 
 def _read_number(value: object) -> float:
     return float(value) if isinstance(value, int | float) else nan
-
-
-def list_jumped_spans(outcomes: Sequence[Outcome]) -> list[tuple[int, int]]:
-    """Cycles before and after each jump."""
-    return [(o.first_cycle, o.last_cycle) for o in outcomes if o.stage == "jump" and o.rows]
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,8 @@ import numpy as np
 
 from adapters.bed import FloatArray
 from adapters.jumps import BAND_PROBABILITY
-from adapters.procedure.history import History, find_speed_up, list_jumped_spans, sum_cost
-from adapters.procedure.record import Record, estimate_band_of_run, find_comparable_cycle
+from adapters.procedure.history import History, find_speed_up, sum_cost
+from adapters.procedure.record import Record
 
 
 @dataclass(frozen=True)
@@ -80,19 +80,19 @@ def judge_members(record: Record) -> Settled | None:
     """The result of a run as far as it has come; None before its first cycle is done."""
     if not len(record.run.history.cycle):
         return None
-    cycle, at = int(record.run.history.cycle[-1]), find_comparable_cycle(record)
+    cycle, at = int(record.run.history.cycle[-1]), record.comparable_cycle
     runs = [one for one in (record, *record.members) if cycle in one.run.history.cycle]
     pairs = [
         (one.run.history, one.control.history)
         for one in runs
-        if one.control is not None and at and find_comparable_cycle(one) == at
+        if one.control is not None and at and one.comparable_cycle == at
     ]
-    jumps = [span[0] for one in runs for span in list_jumped_spans(one.run.outcomes)]
+    jumps = [span[0] for one in runs for span in one.run.spans]
     sunk, seated, grain = (
         average_members([one.run.history.gain(0, last, of) for one in runs])
         for last, of in ((cycle, "loaded_body"), (1, "loaded_body"), (cycle, "settlement"))
     )
-    band = estimate_band_of_run(record.run)
+    band = record.run.estimate_band()
     if len(runs) == 1 and band is not None:
         grain = replace(grain, band=(band.low, band.high))
     error, grain_error = (

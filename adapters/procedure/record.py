@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
-from math import isfinite, nan
+from math import nan
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +15,7 @@ from adapters.bed import FloatArray, State, load_state
 from adapters.errors import EngineFailed, SceneError, UsageError
 from adapters.files import Outcome, RunFolder, Window, load_window
 from adapters.jumps import Band, estimate_band
-from adapters.procedure.history import (
-    FailedJump,
-    History,
-    list_failed_jumps,
-    list_jumped_spans,
-    make_history,
-)
+from adapters.procedure.history import FailedJump, History, list_failed_jumps, make_history
 from adapters.scene import MEMBERS_MOST, Scene, load_scene
 from trackbed.run_files import list_differences
 
@@ -32,6 +25,9 @@ MEMBERS = "members"
 """Folder inside a run that holds the members beside it, number 0: ``members/1``, and so on."""
 LENGTHS = ("scene.procedure.total_cycles", "scene.procedure.h")
 """What may differ between a run that was extended and its members, until they go on."""
+DECISION, CHECK = "decision", "jump checked"
+"""Events of a controlled run: what was decided and why; a jump beside what was computed behind."""
+Event = dict[str, Any]
 AWAY = "move this folder away: trackbed resume computes the member again"
 
 
@@ -45,7 +41,7 @@ class Track:
     failed_jumps: tuple[FailedJump, ...]
     discarded: tuple[str, ...]
     """Stages whose unfinished or superseded work was moved away; empty folders left out."""
-    events: tuple[dict[str, Any], ...]
+    events: tuple[Event, ...]
     exchanged: str = ""  # grains that came, went and wore in a user's deck, for a sentence
 
     @cached_property
@@ -77,6 +73,30 @@ class Track:
     def windows(self) -> list[tuple[str, Outcome]]:
         """Folder and outcome of every window."""
         return self.stages("window")
+
+    @property
+    def spans(self) -> list[tuple[int, int]]:
+        """Cycles before and after each jump."""
+        return [(jump.first_cycle, jump.last_cycle) for _, jump in self.jumps if jump.rows]
+
+    @property
+    def decisions(self) -> list[Event]:
+        """Decisions in the order of the run, each once; fields of `adapters.jumps.Decision`."""
+        made = (one for one in self.events if one["event"] == DECISION)
+        return list({(e["cycle"], e["attempt"], e["action"]): e for e in made}.values())
+
+    @property
+    def checks(self) -> dict[tuple[int, int], Event]:
+        """Checks by first cycle and attempt of a jump; fields of `adapters.jumps.check.Check`."""
+        return {(e["cycle"], e["attempt"]): e for e in self.events if e["event"] == CHECK}
+
+    def estimate_band(self) -> Band | None:
+        """Settlement where the run is, with its band; None for a run without a tolerance."""
+        if not self.decisions or not len(self.history.cycle):
+            return None
+        kept = [check for check in self.checks.values() if check["accepted"]]
+        last = int(self.history.cycle[-1]), float(self.history.settlement[-1])
+        return estimate_band(*last, kept)
 
     def start(self) -> State:
         """The bed before the first load cycle."""
@@ -123,6 +143,19 @@ class Record:
     control: Track | None  # none when there is none, or it has not yet a cycle of its own
     members: tuple[Record, ...]  # beside this one, as far as they have begun
     asked: int  # members in all, this one counted
+
+    @property
+    def comparable_cycle(self) -> int:
+        """The last cycle that run and control both have; 0 when the control is not past the first
+        jump.
+
+        Before the first jump they share their stages, so there is nothing to compare.
+        """
+        if self.control is None:
+            return 0
+        common = np.intersect1d(self.run.history.cycle, self.control.history.cycle)
+        cycle, spans = int(common.max(initial=0)), self.run.spans
+        return 0 if spans and cycle <= spans[0][0] else cycle
 
     @cached_property
     def damaged(self) -> tuple[str, ...]:
@@ -201,52 +234,3 @@ def read_track(folder: RunFolder) -> Track:
         names=tuple(stage for stage, _ in stages), failed_jumps=list_failed_jumps(folder),
         discarded=tuple(discarded), events=tuple(folder.events()),
     )  # fmt: skip
-
-
-def find_comparable_cycle(record: Record) -> int:
-    """The last cycle that run and control both have; 0 when the control is not past the first jump.
-
-    Before the first jump they share their stages, so there is nothing to compare.
-    """
-    if record.control is None:
-        return 0
-    common = np.intersect1d(record.run.history.cycle, record.control.history.cycle)
-    cycle = int(common.max(initial=0))
-    spans = list_jumped_spans(record.run.outcomes)
-    return 0 if spans and cycle <= spans[0][0] else cycle
-
-
-def make_plain(value: Any) -> Any:
-    """The same in types that JSON has; None for numbers that are not finite."""
-    if isinstance(value, dict):
-        return {key: make_plain(inner) for key, inner in value.items()}
-    if isinstance(value, list | tuple):
-        return [make_plain(inner) for inner in value]
-    if isinstance(value, np.generic):
-        return make_plain(value.item())
-    return None if isinstance(value, float) and not isfinite(value) else value
-
-
-Event = dict[str, Any]
-
-DECISION, CHECK = "decision", "jump checked"
-"""Events of a controlled run: what was decided and why; a jump beside what was computed behind."""
-
-
-def list_decisions(events: Sequence[Event]) -> list[Event]:
-    """Decisions in the order of the run, each once; fields of `adapters.jumps.Decision`."""
-    found = {(e["cycle"], e["attempt"], e["action"]): e for e in events if e["event"] == DECISION}
-    return list(found.values())
-
-
-def list_checks(events: Sequence[Event]) -> dict[tuple[int, int], Event]:
-    """Checks by the cycle a jump started from and its attempt; fields of `jumps.check.Check`."""
-    return {(e["cycle"], e["attempt"]): e for e in events if e["event"] == CHECK}
-
-
-def estimate_band_of_run(track: Track) -> Band | None:
-    """Settlement where the run is, with its band; None for a run without a tolerance."""
-    if not list_decisions(track.events) or not len(track.history.cycle):
-        return None
-    kept = [check for check in list_checks(track.events).values() if check["accepted"]]
-    return estimate_band(int(track.history.cycle[-1]), float(track.history.settlement[-1]), kept)

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from adapters.files import EVENTS
+from adapters.procedure.history import make_plain
 from adapters.procedure.members import Settled, judge_members, sum_members_cost
-from adapters.procedure.record import Record, make_plain, read_run_record
+from adapters.procedure.record import Record, read_run_record
 from trackbed.run_files import is_written
 
 

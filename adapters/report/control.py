@@ -5,7 +5,7 @@ from __future__ import annotations
 from html import escape
 
 from adapters.jumps import BAND_PROBABILITY
-from adapters.procedure import Record, estimate_band_of_run, list_checks, list_decisions
+from adapters.procedure import Record
 from trackbed.report import (
     format_number,
     format_share,
@@ -25,12 +25,12 @@ HEADER = (
 def describe_control(record: Record) -> str:
     """Decisions and checks of a controlled run; empty for another."""
     procedure, track = record.scene.procedure, record.run
-    band = estimate_band_of_run(track)
+    band = track.estimate_band()
     if procedure is None or procedure.tolerance is None or band is None:
         return ""
-    checks = list_checks(track.events)
+    checks = track.checks
     rows = []
-    for decision in list_decisions(track.events):
+    for decision in track.decisions:
         lengths = [""] * 4
         if decision["jump"]:
             moved = "moved" if "moved" in decision else "gain"  # older runs have one for both

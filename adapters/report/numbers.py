@@ -14,16 +14,7 @@ import numpy as np
 from adapters.errors import UsageError
 from adapters.jumps import Band
 from adapters.laws import get_law
-from adapters.procedure import (
-    Record,
-    Settled,
-    estimate_band_of_run,
-    find_comparable_cycle,
-    judge_members,
-    list_jumped_spans,
-    make_plain,
-    sum_cost,
-)
+from adapters.procedure import Record, Settled, judge_members, make_plain, sum_cost
 from adapters.report.error import (
     Comparison,
     JumpFigures,
@@ -88,7 +79,7 @@ def gather_numbers(record: Record) -> Numbers:
     procedure = scene.procedure if scene.loading is not None else None
     total = procedure.total_cycles if procedure is not None else 0
     computed = history.count_computed(cycle)
-    compared_at = find_comparable_cycle(record)
+    compared_at = record.comparable_cycle
     rows = tabulate_errors(record, compared_at)
     jumps = tuple(
         measure_jump(name, jump, history, None if control is None else control.history)
@@ -108,7 +99,7 @@ def gather_numbers(record: Record) -> Numbers:
         elastic_deflection=history.late_mean("elastic_deflection", cycle),
         stiffness=history.late_mean("stiffness", cycle),
         mean_grain=float(history.settlement[-1]) if cycle else nan,
-        band=estimate_band_of_run(run),
+        band=run.estimate_band(),
         settled=judge_members(record),
         speed_up_most=cycle / computed if computed else nan,
         compared_at=compared_at,
@@ -152,7 +143,7 @@ def tabulate_errors(record: Record, cycle: int) -> tuple[Comparison, ...]:
     if control is None or procedure is None or not cycle:
         return ()
     full = control.history
-    spans = [span for span in list_jumped_spans(run.outcomes) if span[1] <= cycle]
+    spans = [span for span in run.spans if span[1] <= cycle]
     preparation_s = 0.0 if run.preparation is None else sum_cost(run.preparation.cost)
     truth = control.position(cycle)
     before = spans[0][0] if spans else cycle

@@ -76,7 +76,7 @@ def write_figure(record: procedure.Record, found: procedure.Settled | None) -> P
     with refuse_writing(folder):
         folder.mkdir(exist_ok=True)
     full = None if record.control is None else record.control.history
-    spans = procedure.list_jumped_spans(record.run.outcomes)
+    spans = record.run.spans
     title = ""
     if found is not None and found.pairs:
         title = f"error {100 * found.error.value:+.1f} % at a speed-up of {found.speed_up:.2f}"

@@ -17,9 +17,9 @@ import numpy as np
 import pytest
 
 from adapters.files.run_folder import RunFolder
-from adapters.procedure.history import list_jumped_spans
+from adapters.procedure.history import make_plain
 from adapters.procedure.progress import Progress
-from adapters.procedure.record import make_plain, read_run_record
+from adapters.procedure.record import read_run_record
 from adapters.procedure.run import run_scene
 from adapters.procedure.status import read_status
 from adapters.report.figure import draw_settlement
@@ -195,7 +195,7 @@ def test_figure_shows_every_cycle(finished: Path) -> None:
     """Both axes of cycles reach the last one, and settlement grows downwards from the first."""
     record = read_run_record(finished)
     assert record.control is not None
-    spans = list_jumped_spans(record.run.outcomes)
+    spans = record.run.spans
     figure = draw_settlement(record.run.history, record.control.history, spans, "title")
     for panel in figure.axes:
         (left, right), (bottom, top) = panel.get_xlim(), panel.get_ylim()

@@ -22,7 +22,7 @@ from adapters.procedure import run as procedure
 from adapters.procedure import stages
 from adapters.procedure.controlled import find_sinking_regime
 from adapters.procedure.progress import Progress
-from adapters.procedure.record import list_checks, list_decisions, read_run_record
+from adapters.procedure.record import read_run_record, read_track
 from adapters.procedure.status import read_status
 from adapters.report.control import describe_control
 from adapters.report.page import write_report
@@ -71,14 +71,14 @@ def test_to_the_end_with_its_control(tmp_path: Path) -> None:
     write_report(tmp_path / "run")
     page = (tmp_path / "run" / "report.html").read_text()
     assert "Jump control" in page
-    decisions = list_decisions(RunFolder(tmp_path / "run").events())
+    decisions = read_track(RunFolder(tmp_path / "run")).decisions
     assert page.count("<td>jump</td>") == sum(one["action"] == "jump" for one in decisions)
     assert "because it was moved (in the" in page
     written = json.loads((tmp_path / "run" / "report.json").read_text())
     assert written["band"]["low"] == pytest.approx(low)
     events = len(RunFolder(tmp_path / "run").events())
     procedure.resume(tmp_path / "run", progress=QUIET)  # finished: the same decisions, none printed
-    assert list_decisions(RunFolder(tmp_path / "run").events()) == decisions
+    assert read_track(RunFolder(tmp_path / "run")).decisions == decisions
     assert len(RunFolder(tmp_path / "run").events()) == events + 3  # resumed, two engines
     newer = {"moved", "correction", "kappa", "reseated", "seal"}
     older = [
@@ -117,8 +117,8 @@ def test_the_mean_grain_moves_by_what_was_decided(tmp_path: Path) -> None:
     """Before relaxation the mean drop of each jump is what the decision says, to round-off."""
     run(tmp_path, 120)
     folder = RunFolder(tmp_path / "run")
-    held = list_checks(folder.events())
-    for decision in list_decisions(folder.events()):
+    held = read_track(folder).checks
+    for decision in read_track(folder).decisions:
         if (decision["cycle"], 1) in held and decision["action"] == "jump":
             jump = folder.path / f"jump_{decision['cycle']:06d}_1"
             moved = np.load(jump / "estimated.npz")["position"][:, 2].mean()
@@ -294,7 +294,7 @@ def test_killed_at_file_operations(commands: Commands, tmp_path: Path) -> None:
     assert names[0] == names[1]
 
     def said(path: Path) -> list[dict[str, object]]:
-        return [{**e, "time": ""} for e in list_decisions(RunFolder(path).events())]
+        return [{**e, "time": ""} for e in read_track(RunFolder(path)).decisions]
 
     assert said(run_folder) == said(whole)
 

@@ -17,16 +17,9 @@ from hypothesis import strategies as st
 from adapters.errors import UsageError
 from adapters.files.run_folder import Outcome, RunFolder
 from adapters.laws import get_law
-from adapters.procedure.history import (
-    AVERAGED,
-    History,
-    list_failed_jumps,
-    list_jumped_spans,
-    make_history,
-    sum_cost,
-)
+from adapters.procedure.history import AVERAGED, History, list_failed_jumps, make_history, sum_cost
 from adapters.procedure.members import compare_pairs
-from adapters.procedure.record import find_comparable_cycle
+from adapters.procedure.record import Record, Track
 from adapters.report.error import (
     COORDINATION_BAR,
     HEIGHT_BAR,
@@ -97,6 +90,11 @@ def full_run(cycles: int = 100) -> History:
     return make_history([window(first, first + 25) for first in range(0, cycles, 25)])
 
 
+def follow(outcomes: tuple[Outcome, ...]) -> Track:
+    """A run of these stages, whose folder nobody looks into."""
+    return Track(RunFolder(Path()), outcomes, ("",) * len(outcomes), (), (), ())
+
+
 PROCEDURE = (
     Outcome("preparation", 0, 0, [], {"engine": 1000.0}),
     window(0, 25),
@@ -126,7 +124,7 @@ def test_history_spreads_a_windows_cost_over_its_cycles() -> None:
     assert history.cpu_s[history.row(70)] == pytest.approx(50 * CYCLE_S + 3.0)
     assert history.cpu_s[-1] == pytest.approx(80 * CYCLE_S + 3.0)
     assert history.count_computed(100) == 80
-    assert list_jumped_spans(PROCEDURE) == [(50, 70)]
+    assert follow(PROCEDURE).spans == [(50, 70)]
     with pytest.raises(UsageError, match="60"):
         history.row(60)
 
@@ -322,9 +320,9 @@ def test_common_cycle() -> None:
     """Run and control are compared at the last cycle both have, behind the first jump."""
     cases = ((PROCEDURE, 75, 75), (PROCEDURE[:4], 75, 70), (PROCEDURE, 50, 0))
     for outcomes, last, expected in cases:
-        run = SimpleNamespace(outcomes=outcomes, history=make_history(outcomes))
-        record = SimpleNamespace(run=run, control=SimpleNamespace(history=full_run(last)))
-        assert find_comparable_cycle(record) == expected  # type: ignore[arg-type]
+        control: Any = SimpleNamespace(history=full_run(last))
+        record = Record(Path(), {}, control, follow(outcomes), control, (), 1)
+        assert record.comparable_cycle == expected
 
 
 def folder_of(path: Path, outcomes: tuple[Outcome, ...]) -> RunFolder:
