@@ -21,8 +21,6 @@ from typing import Any
 from trackbed import run_files
 from trackbed.errors import UsageError
 
-RUN_VERBS = ("status", "report", "export", "resume")
-
 
 @dataclass(frozen=True)
 class Kind:
@@ -81,7 +79,7 @@ def refuse_scene(path: Path, what: str, then: str = "") -> None:
 def choose_command(arguments: argparse.Namespace) -> Callable[[argparse.Namespace], int]:
     """What does the verb that was asked for: that of the run's kind, where it is about a run."""
     command: Callable[[argparse.Namespace], int] = arguments.command
-    if arguments.verb not in RUN_VERBS:
+    if arguments.verb not in DOES:
         return command
     refuse_no_run(arguments.run_folder)
     run_files.refuse_links(arguments.run_folder)
@@ -200,3 +198,4 @@ DOES = {
     "export": _refuse_export,
     "resume": _refuse_resume,
 }
+"""Verbs about a run, and what they do with one whose story has them not itself."""

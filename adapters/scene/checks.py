@@ -24,14 +24,7 @@ from adapters.files import read_load_series
 from adapters.scene import mechanics
 from adapters.scene.ballast import read_stored_bed
 from adapters.scene.porosity import find_middle
-from adapters.scene.values import (
-    Check,
-    NotValid,
-    Values,
-    find_geometry,
-    find_named_form,
-    find_radii,
-)
+from adapters.scene.values import Check, NotValid, Values
 from trackbed.choices import explain_retired, find_choices
 from trackbed.scene_files import Problem, describe_error, suggest_word
 
@@ -72,6 +65,8 @@ CHOICES: tuple[tuple[str, str, Callable[[], Iterable[str]], Mapping[str, str]], 
 )
 """Keys whose word is a name, what that names, the names that there are, and those that left."""
 
+ROLLING = ("material.grain.rolling_friction", "material.wall.rolling_friction")
+"""Keys of resistance to rolling."""
 STONE_ENGINES = ("liggghts",)
 """Engines whose grains may be stones of several spheres."""
 MPI_STARTERS = {"mpirun", "mpiexec", "mpiexec.hydra", "orterun", "srun"}
@@ -85,12 +80,21 @@ DEMANDS: tuple[tuple[str, Callable[[Values], Any], str], ...] = (
      "there is no sample.grading to scale"),
     ("sample.rain_friction", lambda of: of["sample.rain_friction"] > of["material.grain.friction"],
      "must be at most the grains' friction, {0[material.grain.friction]:g}"),
-    *((f"material.{one}.rolling_friction", lambda of: not of["material.grain.friction"],
-       "grains without friction slip in place of rolling: give them friction")
-      for one in ("grain", "wall")),
+    *((key, lambda of: not of["material.grain.friction"],
+       "grains without friction slip in place of rolling: give them friction") for key in ROLLING),
+    *((key, lambda of: of.form is not SPHERE,
+       "it stands for the form of stones, which these have: leave it out") for key in ROLLING),
+    ("sample.porosity", lambda of: of.form is not SPHERE,
+     "is reached by taps of spheres alone so far: leave it out"),
+    ("engine.name",
+     lambda of: of["engine.name"] not in ("auto", *STONE_ENGINES) and of.form is not SPHERE,
+     f"{{0[engine.name]}} carries no stones yet: {STONE_ENGINES[0]} does"),
+    ("procedure.relaxation",
+     lambda of: of["procedure.relaxation"] == "karrech2007" and of.form is not SPHERE,
+     'eq. 29 is for spheres: leave it out, or "none"'),
     ("loading.crib", lambda of: not of.has("loading.footprint"),
      "is the height of ballast beside a block: give loading.footprint"),
-    ("loading.crib", lambda of: find_named_form(of) is not SPHERE,
+    ("loading.crib", lambda of: of.form is not SPHERE,
      "lies on spheres alone so far: leave it out"),
     ("loading.crib", lambda of: of["procedure.relaxation"] == "karrech2007",
      "eq. 29 knows no weight of it: another procedure.relaxation"),
@@ -152,7 +156,7 @@ def _check_owned_keys(
 
 
 def _check_grain_radius(scene: Values) -> Iterator[Problem]:
-    radii = find_radii(scene)
+    radii = scene.radii
     if not isinstance(radii, RadiusDistribution) or scene.has(STATE_KEY):
         return
     key = "sample.grain_radius.standard_deviation"
@@ -186,10 +190,8 @@ def _check_porosity(scene: Values) -> Iterator[Problem]:
     key = "sample.porosity"
     if not scene.has(key):
         return
-    grain, height = 2 * find_radii(scene).mean, scene.get("sample.fill_height") or inf
-    if find_named_form(scene) is not SPHERE:
-        yield Problem(key, "is reached by taps of spheres alone so far: leave it out")
-    elif find_middle(find_geometry(scene), grain, height) is None:
+    grain, height = 2 * scene.radii.mean, scene.get("sample.fill_height") or inf
+    if find_middle(scene.container, grain, height) is None:
         yield Problem(
             key, "is measured a mean grain inside all sides, where this bed is less than two wide: "
             f"give a larger one (a mean grain is {grain:.3g} m)"
@@ -221,7 +223,7 @@ def _check_crib(scene: Values) -> Iterator[Problem]:
         return
     lengths = scene.get("loading.footprint")
     sizes = [scene.get(f"sample.size_{axis}") or 0.0 for axis in "xy"]
-    if lengths and np.subtract(sizes, lengths).max() < 2 * find_radii(scene).mean:
+    if lengths and np.subtract(sizes, lengths).max() < 2 * scene.radii.mean:
         yield Problem(key, "no grain has room beside this block: leave it out")
 
 
@@ -238,34 +240,19 @@ def _check_stages(scene: Values) -> Iterator[Problem]:
 
 def _check_jumps(scene: Values) -> Iterator[Problem]:
     """Either k and h, or a tolerance by which they choose themselves."""
-    if not scene.has_table("procedure"):
-        return
-    given = [key for key in JUMP_KEYS if scene.has(key)]
-    if scene.has(TOLERANCE_KEY):
-        for key in given:
-            name = key.rpartition(".")[2]
+    for key in JUMP_KEYS if scene.has_table("procedure") else ():
+        given, name = scene.has(key), key.rpartition(".")[2]
+        if given and scene.has(TOLERANCE_KEY):
             yield Problem(key, f"with a tolerance {name} chooses itself: give one of the two")
-    else:
-        for key in JUMP_KEYS:
-            if key not in given:
-                yield Problem(key, "missing: give k and h, or a tolerance instead of both")
+        elif not given and not scene.has(TOLERANCE_KEY):
+            yield Problem(key, "missing: give k and h, or a tolerance instead of both")
 
 
 def _check_form(scene: Values) -> Iterator[Problem]:
-    """Stones want an engine that carries them, and what is known to be right for them in a jump."""
     try:
-        if find_form(scene.get("sample.form")) is SPHERE:
-            return
+        find_form(scene.get("sample.form"))
     except SceneError as error:
         yield Problem("sample.form", describe_error(error), error.where)
-    engine = scene["engine.name"]
-    if engine not in ("auto", *STONE_ENGINES):
-        yield Problem("engine.name", f"{engine} carries no stones yet: {STONE_ENGINES[0]} does")
-    for key in ("material.grain.rolling_friction", "material.wall.rolling_friction"):
-        if scene.has(key):
-            yield Problem(key, "it stands for the form of stones, which these have: leave it out")
-    if scene.has_table("procedure") and scene["procedure.relaxation"] == "karrech2007":
-        yield Problem("procedure.relaxation", 'eq. 29 is for spheres: leave it out, or "none"')
 
 
 def _check_choice(

@@ -11,15 +11,7 @@ from pathlib import Path
 from adapters import bed
 from adapters.errors import SceneError
 from adapters.files import read_load_series
-from adapters.scene.values import (
-    Check,
-    NotValid,
-    Values,
-    find_geometry,
-    find_named_form,
-    find_radii,
-    name_radii,
-)
+from adapters.scene.values import Check, NotValid, Values
 from trackbed.plausible import Quantity, describe_implausible
 from trackbed.scene_files import Problem
 
@@ -47,11 +39,11 @@ DOUBTFUL = DoubtfulNumbers()
 
 
 def _check_room(scene: Values) -> Iterator[Problem]:
-    largest_grain = find_radii(scene).greatest * find_named_form(scene).reach
-    room = bed.find_radius_that_fits(find_geometry(scene))
+    largest_grain = scene.radii.greatest * scene.form.reach
+    room = bed.find_radius_that_fits(scene.container)
     if largest_grain > room:
         yield Problem(
-            name_radii(scene),
+            scene.radii_key,
             f"radii up to {largest_grain:g} m do not fit: "
             f"the container takes radii up to {room:g} m",
         )
@@ -74,11 +66,11 @@ def _check_tension(scene: Values) -> Iterator[Problem]:
 
 
 def _find_rayleigh_time(scene: Values) -> float:
-    radii = find_radii(scene)
+    radii = scene.radii
     if radii.smallest <= 0:
         raise NotValid
     named = (scene[f"material.grain.{one}"] for one in ("density", "young", "poisson"))
-    return bed.find_rayleigh_time(find_named_form(scene).least * radii.smallest, *named)
+    return bed.find_rayleigh_time(scene.form.least * radii.smallest, *named)
 
 
 def _find_rayleigh_share(scene: Values) -> float:
@@ -99,7 +91,7 @@ def _check_time_step(scene: Values) -> Iterator[Problem]:
 
 def _check_fill_height(scene: Values) -> Iterator[Problem]:
     height = scene["sample.fill_height"]
-    count = bed.expect_grains(find_radii(scene), find_geometry(scene), height)
+    count = bed.expect_grains(scene.radii, scene.container, height)
     if not 1 <= count <= COUNT_GREATEST:
         yield Problem("sample.fill_height", f"{height:g} m would take {count:.3g} grains")
 
@@ -119,12 +111,12 @@ def _find_overlap_share(scene: Values) -> tuple[str, float, float]:
         except SceneError as error:
             raise NotValid from error
         stress = float(series.stress.max())
-    radii, grain = find_radii(scene), "material.grain."
+    radii, grain = scene.radii, "material.grain."
     if radii.smallest <= 0:
         raise NotValid
     young, poisson = scene[grain + "young"], scene[grain + "poisson"]
     modulus = bed.combine_moduli(young, poisson, young, poisson)
-    usual, force = find_named_form(scene).usual, stress * (2 * radii.mean) ** 2
+    usual, force = scene.form.usual, stress * (2 * radii.mean) ** 2
     overlap = bed.find_overlap_under_force(force, modulus, usual * radii.mean / 2)
     return key, stress, float(overlap) / (usual * radii.smallest)
 
@@ -158,13 +150,13 @@ def _warn_of_long_step(scene: Values) -> Iterator[Problem]:
 
 
 def _warn_of_narrow_bed(scene: Values) -> Iterator[Problem]:
-    container = find_geometry(scene)
+    container = scene.container
     is_box = container.shape == "box"
     width = min(container.size_x, container.size_y) if is_box else 2 * container.radius
-    ratio = width / (2 * find_radii(scene).mean)
+    ratio = width / (2 * scene.radii.mean)
     if ratio < DOUBTFUL.width:
         yield Problem(
-            name_radii(scene),
+            scene.radii_key,
             f"the container is {ratio:.2g} mean grain diameters wide: walls rule the result",
         )
 
@@ -183,13 +175,13 @@ def find_wedge_ratio(friction: float) -> float:
 
 
 def _warn_of_size_ratio(scene: Values) -> Iterator[Problem]:
-    radii, friction = find_radii(scene), scene["material.grain.friction"]
+    radii, friction = scene.radii, scene["material.grain.friction"]
     if radii.smallest <= 0:
         raise NotValid
     ratio, limit = radii.greatest / radii.smallest, find_wedge_ratio(friction)
     if ratio > limit:
         yield Problem(
-            name_radii(scene).removesuffix(".mean"),
+            scene.radii_key.removesuffix(".mean"),
             f"radii differ by a factor of {ratio:.3g}; with friction {friction:g} small grains may "
             f"stick between large ones above {limit:.3g}, by an error of the engines' integration "
             "(docs/size-ratio.md): leave the smallest out to see whether it matters",
@@ -238,8 +230,8 @@ SIZES: tuple[tuple[str, Quantity, float], ...] = (
 def _warn_of_implausible_size(
     key: str, quantity: Quantity, factor: float, scene: Values
 ) -> Iterator[Problem]:
-    key = key or name_radii(scene)
-    value = find_radii(scene).mean if quantity == "grain" else scene[key]
+    key = key or scene.radii_key
+    value = scene.radii.mean if quantity == "grain" else scene[key]
     if said := describe_implausible(quantity, factor * value, key):
         yield Problem(key, said.removeprefix(f"{key}: "))
 

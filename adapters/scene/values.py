@@ -48,6 +48,47 @@ class Values:
         self.get(name)
         return any(key.startswith(name + ".") for key in self._values)
 
+    @property
+    def radii_key(self) -> str:
+        """The key that says how large grains are."""
+        if self.has("sample.state"):
+            return "sample.state"
+        return "sample.grading" if self.has("sample.grading") else "sample.grain_radius.mean"
+
+    @property
+    def radii(self) -> Radii:
+        """The radii of the grains, whether they make sense or not."""
+        if self.has("sample.state"):
+            try:
+                return find_stored_radii(self["sample.state"])
+            except (OSError, UsageError, DumpError) as error:
+                raise NotValid from error
+        if self.has("sample.grading"):
+            return make_radii(self["sample.grading"], self.get("sample.grading_scale"))
+        table = "sample.grain_radius."
+        return RadiusDistribution(
+            self[table + "distribution"],
+            self[table + "mean"],
+            self.get(table + "standard_deviation") or 0.0,
+            self.get(table + "truncation") or 2.0,
+        )
+
+    @property
+    def form(self) -> Form:
+        """The form of the grains, of a valid name or file."""
+        try:
+            return find_form(self.get("sample.form"))
+        except SceneError as error:
+            raise NotValid from error
+
+    @property
+    def container(self) -> Container:
+        """The container; of a valid shape, without mirror planes given twice."""
+        shape, planes = self["sample.container"], self.get("sample.symmetry") or ()
+        names = ("size_x", "size_y") if shape == "box" else ("radius",)
+        sizes = {name: self[f"sample.{name}"] for name in names}
+        return Container(shape, tuple(dict.fromkeys(planes)), **sizes)
+
 
 Check = Callable[[Values], Iterator[Problem]]
 """What a check yields of a scene: nothing where all is well."""
@@ -62,47 +103,3 @@ def flatten_keys(table: dict[str, Any], prefix: str = "") -> dict[str, Any]:
         else:
             flat[prefix + key] = value
     return flat
-
-
-def name_radii(scene: Values) -> str:
-    """The key that says how large grains are."""
-    if scene.has("sample.state"):
-        return "sample.state"
-    return "sample.grading" if scene.has("sample.grading") else "sample.grain_radius.mean"
-
-
-def find_radii(scene: Values) -> Radii:
-    """The radii of the grains, whether they make sense or not."""
-    if scene.has("sample.state"):
-        try:
-            return find_stored_radii(scene["sample.state"])
-        except (OSError, UsageError, DumpError) as error:
-            raise NotValid from error
-    if scene.has("sample.grading"):
-        return make_radii(scene["sample.grading"], scene.get("sample.grading_scale"))
-    table = "sample.grain_radius."
-    return RadiusDistribution(
-        scene[table + "distribution"],
-        scene[table + "mean"],
-        scene.get(table + "standard_deviation") or 0.0,
-        scene.get(table + "truncation") or 2.0,
-    )
-
-
-def find_named_form(scene: Values) -> Form:
-    """The form of the grains, of a valid name or file."""
-    try:
-        return find_form(scene.get("sample.form"))
-    except SceneError as error:
-        raise NotValid from error
-
-
-def find_geometry(scene: Values) -> Container:
-    """The container; of a valid shape, without mirror planes given twice."""
-    shape = scene["sample.container"]
-    planes = scene.get("sample.symmetry") or ()
-    if shape == "box":
-        sizes = {key: scene[f"sample.{key}"] for key in ("size_x", "size_y")}
-    else:
-        sizes = {"radius": scene["sample.radius"]}
-    return Container(shape, tuple(dict.fromkeys(planes)), **sizes)

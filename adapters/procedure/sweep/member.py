@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from adapters.engines import find_engine, run_process
+from adapters.engines import run_process
 
 THREADS = (
     "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS",
@@ -82,9 +82,3 @@ def read_sentence(exit_code: int, screen: Path) -> str:
     if exit_code < 0:
         return f"the run was ended by {signal.Signals(-exit_code).name}"
     return f"the run ended with exit code {exit_code}: {' | '.join(lines[-3:])}"
-
-
-def find_worker_engine() -> tuple[str, str]:
-    """Name and version of the engine that a worker has; raises `EngineMissing`."""
-    engine = find_engine()
-    return engine.name, engine.version()

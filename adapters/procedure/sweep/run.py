@@ -8,18 +8,12 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from adapters.engines import allow_interrupts
+from adapters.engines import allow_interrupts, find_engine
 from adapters.errors import Interrupted, UsageError
 from adapters.files import RunFolder, explain_full_disk
 from adapters.procedure import Progress, read_status
 from adapters.procedure.sweep.cluster import Cluster, open_client
-from adapters.procedure.sweep.member import (
-    STOPPED,
-    Ended,
-    find_worker_engine,
-    make_member_command,
-    run_member,
-)
+from adapters.procedure.sweep.member import STOPPED, Ended, make_member_command, run_member
 from adapters.procedure.sweep.plan import Member, Sweep, check_folder, find_pinned_engine
 from trackbed.run_files import MANIFEST, RESULT, hold_signals, read_object, write_whole
 
@@ -166,6 +160,12 @@ def choose_engine(
         name, version = client.submit(find_worker_engine, pure=False).result()
         progress.print_line(f"engine: {name} ({version})")
     return [f'engine.name="{name}"']
+
+
+def find_worker_engine() -> tuple[str, str]:
+    """Name and version of the engine that a worker has; raises `EngineMissing`."""
+    engine = find_engine()
+    return engine.name, engine.version()
 
 
 def _find_end(future: Any) -> Ended:
