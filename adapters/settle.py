@@ -8,7 +8,7 @@ from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from adapters.procedure import Record, Settled, describe_sleeper, judge_members, read_run_record
+from adapters.procedure import Record, Settled, judge_members, read_run_record
 from adapters.procedure import run as procedure
 from adapters.scene import load_scene
 
@@ -31,7 +31,7 @@ class Settlement:
     record: Record = field(repr=False)  # the run as its reports read it
 
     def __str__(self) -> str:
-        return describe_sleeper(self.settled)
+        return str(self.settled)
 
     def plot(self, axes: Axes | None = None) -> Axes:
         """Settlement of the loaded body (µm, downwards) against load cycles, a line for each member

@@ -51,6 +51,22 @@ class Settled:
     mean_grain_error: Mean  # likewise
     speed_up: float  # CPU time of the full runs over that of the members beside them
 
+    def __str__(self) -> str:
+        """How far the loaded body, which stands for a sleeper, settles, and what else is known."""
+        members = f"{self.members} of {self.asked}" if self.members < self.asked else ""
+        body = format_length(self.loaded_body, members or f"{self.members}")
+        said = f"sleeper settles {body} by cycle {self.cycle:,}"
+        if self.cycle > 1 and isfinite(first := self.first_cycle.value) and first:
+            said += f", {format_length(Mean(first))} of it in the first"
+        if isfinite(self.stiffness.value):
+            said += f"; stiffness {1e-6 * self.stiffness.value:.3g} kN/mm"
+        if isfinite(self.speed_up):
+            dearer = self.speed_up < 1
+            ratio = 1 / self.speed_up if dearer else self.speed_up
+            said += f"; {ratio:.1f} times {'dearer' if dearer else 'cheaper'}"
+        at = f" at cycle {self.compared_at:,}" * (self.compared_at != self.cycle)
+        return said + format_error(self.error, at)
+
 
 def estimate_mean(values: FloatArray, probability: float) -> tuple[Any, Any]:
     """Mean over axis 0 and half of Student's interval, t_(n-1) s/sqrt(n); nan for one sample.
@@ -139,25 +155,8 @@ def describe_result(record: Record) -> list[str]:
     how = "all" if computed == settled.cycle else f"{computed:,}"
     said = f"mean grain settles {format_length(settled.mean_grain)}"
     said += f"; {how} of {settled.cycle:,} cycles computed{record.run.exchanged}"
-    sleeper = [describe_sleeper(settled)] if isfinite(settled.loaded_body.value) else []
+    sleeper = [str(settled)] if isfinite(settled.loaded_body.value) else []
     return [said + format_error(settled.mean_grain_error), *sleeper]
-
-
-def describe_sleeper(settled: Settled) -> str:
-    """How far the loaded body, which stands for a sleeper, settles, and what else is known."""
-    members = f"{settled.members} of {settled.asked}" if settled.members < settled.asked else ""
-    body = format_length(settled.loaded_body, members or f"{settled.members}")
-    said = f"sleeper settles {body} by cycle {settled.cycle:,}"
-    if settled.cycle > 1 and isfinite(first := settled.first_cycle.value) and first:
-        said += f", {format_length(Mean(first))} of it in the first"
-    if isfinite(settled.stiffness.value):
-        said += f"; stiffness {1e-6 * settled.stiffness.value:.3g} kN/mm"
-    if isfinite(settled.speed_up):
-        dearer = settled.speed_up < 1
-        ratio = 1 / settled.speed_up if dearer else settled.speed_up
-        said += f"; {ratio:.1f} times {'dearer' if dearer else 'cheaper'}"
-    at = f" at cycle {settled.compared_at:,}" * (settled.compared_at != settled.cycle)
-    return said + format_error(settled.error, at)
 
 
 def format_length(length: Mean, members: str = "") -> str:

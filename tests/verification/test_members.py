@@ -21,7 +21,7 @@ from adapters.engines import fake as engine_fake
 from adapters.engines.contract import EngineRun
 from adapters.engines.fake import FakeBed, FakeEngine
 from adapters.files.window import load_window
-from adapters.procedure.members import Mean, Settled, describe_sleeper
+from adapters.procedure.members import Mean, Settled
 from adapters.procedure.status import read_status
 from tests.small_bed import read_rows, small_bed
 from trackbed.command import main
@@ -146,7 +146,7 @@ def test_what_is_left_is_gone_on_with(finished: Path, copy: Path) -> None:
     status = read_status(copy)
     assert status.state == "stopped"
     assert status.result is not None
-    assert "1 of 3 members" in describe_sleeper(status.result)
+    assert "1 of 3 members" in str(status.result)
     kept = first / "window_000002" / "outcome.json"
     before = kept.stat().st_mtime_ns
     assert main(["resume", str(copy)]) == 0
@@ -229,7 +229,7 @@ def test_the_sentence_says_what_is_known(changes: dict[str, Any], said: str) -> 
         compared_at=10_000,
         error=Mean(0.03, (-0.02, 0.08), 0.15), mean_grain_error=Mean(nan), speed_up=9.6,
     )  # fmt: skip
-    assert describe_sleeper(replace(settled, **changes)) == said
+    assert str(replace(settled, **changes)) == said
 
 
 @pytest.mark.long
@@ -246,7 +246,7 @@ def test_settlement_from_python(copy: Path) -> None:
         status.result.loaded_body.band,
         status.result.error.value,
     )
-    assert (result.cost, str(result)) == (status.cpu_s, describe_sleeper(status.result))
+    assert (result.cost, str(result)) == (status.cpu_s, str(status.result))
     assert len(result.plot().lines) == 6
     keys: dict[str, Any] = {"sample.seed": 2, "total_cycles": 10}
     alone = trackbed.settle(scene, run_folder=copy.parent / "alone", **keys)

@@ -39,19 +39,8 @@ class Ended:
 STOPPED = Ended(130, "stopped with the sweep; every finished window is saved")
 
 
-def make_member_command(
-    verb: Sequence[str], scene: Path, run_folder: Path, overrides: Sequence[str]
-) -> list[str]:
-    """The command line of a member; on a folder with a run it goes on with that."""
-    words = [*COMMAND, *verb, str(scene), "--run-folder", str(run_folder)]
-    return words + [word for override in overrides for word in ("--set", override)]
-
-
-def run_member(
-    verb: Sequence[str], scene: Path, run_folder: Path, overrides: Sequence[str], log: Path,
-    stop_file: Path,
-) -> Ended:  # fmt: skip
-    """Run a member to its end, or until ``stop_file`` exists.
+def run_member(words: Sequence[str], log: Path, stop_file: Path) -> Ended:
+    """Run a member, the command with ``words``, to its end, or until ``stop_file`` exists.
 
     What it prints goes to ``screen.txt`` in the folder ``log``.
     """
@@ -62,10 +51,9 @@ def run_member(
 
     threads = [f"{name}=1" for name in THREADS if name not in os.environ]
     log.mkdir(parents=True, exist_ok=True)
-    command = ["env", *threads, *make_member_command(verb, scene, run_folder, overrides)]
     try:
         watch()
-        exit_code, _, _ = run_process(command, log, watch)
+        exit_code, _, _ = run_process(["env", *threads, *COMMAND, *words], log, watch)
     except SweepStopped:
         return STOPPED
     return Ended(exit_code, read_sentence(exit_code, log / "screen.txt"))

@@ -54,10 +54,12 @@ class Sweep:
         """Whether members are runs of this story."""
         return not self.kind.states
 
-    @property
-    def verb(self) -> list[str]:
-        """The words that run a member, or go on with it: ``run`` does so by itself."""
-        return ["run"] if self.settles else [self.kind.verb, "--resume"]
+    def list_words(self, member: Member, more: Sequence[str] = ()) -> list[str]:
+        """What behind ``trackbed`` runs a member with ``more`` overrides, or goes on with it."""
+        folder = str(self.run_folder(member).absolute())
+        verb = ["run"] if self.settles else [self.kind.verb, "--resume"]
+        settings = [word for one in (*member.overrides, *more) for word in ("--set", one)]
+        return [*verb, str(self.scene_path), "--run-folder", folder, *settings]
 
     def run_folder(self, member: Member) -> Path:
         """Where a member runs."""

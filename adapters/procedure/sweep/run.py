@@ -13,7 +13,7 @@ from adapters.errors import Interrupted, UsageError
 from adapters.files import RunFolder, explain_full_disk
 from adapters.procedure import Progress, read_status
 from adapters.procedure.sweep.cluster import Cluster, open_client
-from adapters.procedure.sweep.member import STOPPED, Ended, make_member_command, run_member
+from adapters.procedure.sweep.member import COMMAND, STOPPED, Ended, run_member
 from adapters.procedure.sweep.plan import Member, Sweep, check_folder, find_pinned_engine
 from trackbed.run_files import MANIFEST, RESULT, hold_signals, read_object, write_whole
 
@@ -111,17 +111,11 @@ def _run(
         engine = choose_engine(sweep, pending, client, progress)
         futures = {
             client.submit(
-                run_member,
-                sweep.verb,
-                sweep.scene_path,
-                sweep.run_folder(member).absolute(),
-                [*member.overrides, *engine],
-                sweep.log(member).absolute(),
-                sweep.stop_file.absolute(),
-                pure=False,
+                run_member, sweep.list_words(member, engine), sweep.log(member).absolute(),
+                sweep.stop_file.absolute(), pure=False,
             ): member
             for member in pending
-        }
+        }  # fmt: skip
 
         def take_result(future: Any) -> None:
             member = futures[future]
@@ -215,9 +209,7 @@ def list_dry_run(sweep: Sweep) -> list[str]:
 
     lines = []
     for member in sweep.members:
-        words = make_member_command(
-            sweep.verb, sweep.scene_path, sweep.run_folder(member).absolute(), member.overrides
-        )
+        words = [*COMMAND, *sweep.list_words(member)]
         state = find_result(sweep, member, None).state
         lines.append(f"# {member.name}: {state}\n{shlex.join(words)}")
     return lines
