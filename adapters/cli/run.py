@@ -91,7 +91,6 @@ def register_run(parser: argparse.ArgumentParser) -> None:
 def list_jump_overrides(arguments: argparse.Namespace) -> list[str]:
     """KEY=VALUE of ``--tolerance``, ``--cycles``, ``--members`` and ``--fast``; `UsageError` beside
     a k or h by hand."""
-    overrides = []
     if arguments.tolerance is not None:
         if arguments.procedure not in (None, "tolerance"):
             raise UsageError(
@@ -104,14 +103,12 @@ def list_jump_overrides(arguments: argparse.Namespace) -> list[str]:
                 f"--tolerance chooses k and h, and --set {by_hand[0]} gives one by hand",
                 remedy="leave one of the two out",
             )
-        overrides.append(f"procedure.tolerance={arguments.tolerance!r}")
-    if arguments.cycles is not None:
-        overrides.append(f"procedure.total_cycles={arguments.cycles}")
-    if arguments.fast:
-        overrides.append('engine.rayleigh_share="fast"')
-    if arguments.members is not None:
-        overrides.append(f"procedure.members={arguments.members}")
-    return overrides
+    given = {
+        "procedure.tolerance": arguments.tolerance, "procedure.total_cycles": arguments.cycles,
+        "engine.rayleigh_share": '"fast"' if arguments.fast else None,
+        "procedure.members": arguments.members,
+    }  # fmt: skip
+    return [f"{key}={value}" for key, value in given.items() if value is not None]
 
 
 def run_command(arguments: argparse.Namespace) -> int:

@@ -7,13 +7,12 @@ cycles with a share of the move, whose rest the next jump is asked for.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 
 import numpy as np
 
 from adapters.errors import EngineFailed, NotConverged, NotCredible
-from adapters.files import Outcome, explain_full_disk
+from adapters.files import Outcome, explain_full_disk, place_stage
 from adapters.procedure import stages
 from adapters.procedure.forecast import estimate_gains
 from adapters.procedure.seating import find_count_start, seat_piston, warn_if_hung
@@ -109,13 +108,9 @@ def compute_on(run: Run, bed: Bed) -> Bed:
     """Windows in place of a jump: one at the first place that no jump leaves, twice as many at each
     further one, so that tries stay few where none succeeds."""
     p = run.procedure
-    last_tries = (
-        n for n in run.folder.stage_names() if re.fullmatch(rf"jump_\d+_{RETRIES + 1}", n)
-    )
-    places = sum(
-        bool(run.folder.failure(name)) and int(name.split("_")[1]) <= bed.cycle
-        for name in last_tries
-    )
+    tries = [name for name in run.folder.stage_names() if name.endswith(f"_{RETRIES + 1}")]
+    failed = [name for name in tries if run.folder.failure(name)]
+    places = sum(place_stage(name)[0] <= bed.cycle for name in failed)
     end = min(p.total_cycles, bed.cycle + p.window_cycles * 2 ** (places - 1))
     while bed.cycle < end:
         bed = stages.compute(run, bed, min(p.window_cycles, end - bed.cycle))

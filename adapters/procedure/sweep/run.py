@@ -35,7 +35,7 @@ class Result:
     loaded_body_m: float | None  # permanent settlement of the loaded body
     stiffness_n_per_m: float | None
     mean_grain_m: float | None
-    speed_up: float | None  # cycles done over cycles computed
+    speed_up: float | None  # CPU time of the full run beside it over its own; None without one
     cpu_s: float  # CPU time of its finished stages [s]
     run_folder: str
 
