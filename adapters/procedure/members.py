@@ -18,6 +18,9 @@ from adapters.jumps import BAND_PROBABILITY
 from adapters.procedure.history import History, find_speed_up, sum_cost
 from adapters.procedure.record import Record
 
+ROUND_OFF = 1e-6
+"""Of the mean grain's settlement: a body that settles by less is not driven by a force [-]."""
+
 
 @dataclass(frozen=True)
 class Mean:
@@ -49,6 +52,8 @@ class Settled:
     """Gain of the loaded body since the first jump, less that of the full run, over the mean gain
     of the full runs; its chaos is what these differ by."""
     mean_grain_error: Mean  # likewise
+    full_run: Mean  # permanent settlement of the loaded body in the full runs by then [m]
+    full_stiffness: Mean  # secant stiffness under it there [N/m]
     speed_up: float  # CPU time of the full runs over that of the members beside them
 
     def __str__(self) -> str:
@@ -58,14 +63,19 @@ class Settled:
         said = f"sleeper settles {body} by cycle {self.cycle:,}"
         if self.cycle > 1 and isfinite(first := self.first_cycle.value) and first:
             said += f", {format_length(Mean(first))} of it in the first"
+        full = "full run" if self.pairs == 1 else "full runs"
         if isfinite(self.stiffness.value):
             said += f"; stiffness {1e-6 * self.stiffness.value:.3g} kN/mm"
+            if isfinite(self.full_stiffness.value):
+                said += f" ({full}: {1e-6 * self.full_stiffness.value:.3g})"
         if isfinite(self.speed_up):
             dearer = self.speed_up < 1
             ratio = 1 / self.speed_up if dearer else self.speed_up
             said += f"; {ratio:.1f} times {'dearer' if dearer else 'cheaper'}"
         at = f" at cycle {self.compared_at:,}" * (self.compared_at != self.cycle)
-        return said + format_error(self.error, at)
+        said += format_error(self.error, at)
+        known = isfinite(self.error.value)
+        return said + f"; {full}: {format_length(replace(self.full_run, chaos=nan))}" * known
 
 
 def estimate_mean(values: FloatArray, probability: float) -> tuple[Any, Any]:
@@ -114,12 +124,15 @@ def judge_members(record: Record) -> Settled | None:
     error, grain_error = (
         compare_pairs(pairs, min(jumps, default=at), at, of) for of in ("loaded_body", "settlement")
     )
+    full = average_members([one.gain(0, at, "loaded_body") for _, one in pairs])
+    full_stiffness = average_members([one.late_mean("stiffness", at) for _, one in pairs])
     spent, spent_by_full = (sum(pair[i].gain(0, at, "cpu_s") for pair in pairs) for i in (0, 1))
     return Settled(
         members=len(runs), asked=record.asked, cycle=cycle, loaded_body=sunk, first_cycle=seated,
         stiffness=average_members([one.run.history.late_mean("stiffness", cycle) for one in runs]),
         mean_grain=grain, cost=sum_members_cost(record), pairs=len(pairs), compared_at=at,
-        error=error, mean_grain_error=grain_error, speed_up=find_speed_up(spent_by_full, spent),
+        error=error, mean_grain_error=grain_error, full_run=full, full_stiffness=full_stiffness,
+        speed_up=find_speed_up(spent_by_full, spent),
     )  # fmt: skip
 
 
@@ -155,8 +168,10 @@ def describe_result(record: Record) -> list[str]:
     how = "all" if computed == settled.cycle else f"{computed:,}"
     said = f"mean grain settles {format_length(settled.mean_grain)}"
     said += f"; {how} of {settled.cycle:,} cycles computed{record.run.exchanged}"
-    sleeper = [str(settled)] if isfinite(settled.loaded_body.value) else []
-    return [said + format_error(settled.mean_grain_error), *sleeper]
+    said += format_error(settled.mean_grain_error)
+    if abs(settled.loaded_body.value) <= ROUND_OFF * abs(settled.mean_grain.value):
+        return [f"{said}; the loaded body goes a prescribed way and does not settle"]
+    return [said, *([str(settled)] if isfinite(settled.loaded_body.value) else [])]
 
 
 def format_length(length: Mean, members: str = "") -> str:

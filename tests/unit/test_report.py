@@ -124,12 +124,17 @@ def test_status_ends_with_what_came_out(finished: Path, tmp_path, capsys) -> Non
     )
     ratio = f"{max(run['speed_up'], 1 / run['speed_up']):.1f} times "
     ratio += "dearer" if run["speed_up"] < 1 else "cheaper"
-    first = read_run_record(finished).run.history.gain(0, 1, "loaded_body")
+    record = read_run_record(finished)
+    first = record.run.history.gain(0, 1, "loaded_body")
+    assert record.control is not None
+    full = record.control.history
     assert sleeper == (
         f"sleeper settles {1e6 * numbers['loaded_body']:.3g} um (one member, so no band) by cycle "
         f"40, {1e6 * first:.3g} um of it in the first; "
-        f"stiffness {1e-6 * numbers['stiffness']:.3g} kN/mm; {ratio}; error "
-        f"{100 * run['loaded_body_error']:+.1f} %"
+        f"stiffness {1e-6 * numbers['stiffness']:.3g} kN/mm "
+        f"(full run: {1e-6 * full.late_mean('stiffness', 40):.3g}); {ratio}; error "
+        f"{100 * run['loaded_body_error']:+.1f} %; full run: "
+        f"{1e6 * full.gain(0, 40, 'loaded_body'):.3g} um"
     )
     assert main(["status", str(finished), "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == json.loads(

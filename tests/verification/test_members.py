@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from math import isnan, nan, sqrt
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from adapters.engines import fake as engine_fake
 from adapters.engines.contract import EngineRun
 from adapters.engines.fake import FakeBed, FakeEngine
 from adapters.files.window import load_window
-from adapters.procedure.members import Mean, Settled
+from adapters.procedure.members import Mean, Settled, describe_result
 from adapters.procedure.status import read_status
 from tests.small_bed import read_rows, small_bed
 from trackbed.command import main
@@ -213,12 +214,13 @@ def test_a_damaged_member_is_named_with_its_remedy(copy: Path, capsys) -> None:
     ("changes", "said"),
     [
         ({}, "sleeper settles 3.41 mm (2.9 ... 3.9; 5 members; chaos 0.52) by cycle 10,000, "
-         "2.5 mm of it in the first; stiffness 41 kN/mm; 9.6 times cheaper; error "
-         "+3.0 % (-2.0 ... +8.0), chaos of the full runs 15.0 %"),
+         "2.5 mm of it in the first; stiffness 41 kN/mm (full runs: 40); 9.6 times cheaper; error "
+         "+3.0 % (-2.0 ... +8.0), chaos of the full runs 15.0 %; full runs: 3.31 mm (3 ... 3.6)"),
         ({"members": 1, "asked": 1, "loaded_body": Mean(3.41e-4), "first_cycle": Mean(0.0),
-          "stiffness": Mean(nan), "speed_up": 0.5, "error": Mean(-0.25), "compared_at": 1000},
+          "stiffness": Mean(nan), "speed_up": 0.5, "error": Mean(-0.25), "compared_at": 1000,
+          "pairs": 1, "full_run": Mean(4.5e-4)},
          "sleeper settles 341 um (one member, so no band) by cycle 10,000; 2.0 times dearer; error "
-         "at cycle 1,000 -25.0 %"),
+         "at cycle 1,000 -25.0 %; full run: 450 um"),
     ],
 )  # fmt: skip
 def test_the_sentence_says_what_is_known(changes: dict[str, Any], said: str) -> None:
@@ -228,8 +230,27 @@ def test_the_sentence_says_what_is_known(changes: dict[str, Any], said: str) -> 
         first_cycle=Mean(2.5e-3), stiffness=Mean(41e6), mean_grain=Mean(nan), cost=1.0, pairs=5,
         compared_at=10_000,
         error=Mean(0.03, (-0.02, 0.08), 0.15), mean_grain_error=Mean(nan), speed_up=9.6,
+        full_run=Mean(3.31e-3, (3e-3, 3.6e-3), 5e-4), full_stiffness=Mean(40e6),
     )  # fmt: skip
     assert str(replace(settled, **changes)) == said
+
+
+@pytest.mark.parametrize(("way", "loaded"), [(1e-16, False), (-5e-11, False), (1e-9, True)])
+def test_a_body_on_a_prescribed_way_is_no_sleeper(
+    way: float, loaded: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its settlement is the round-off of its way: the mean grain's is the last sentence then."""
+    settled = Settled(
+        members=1, asked=1, cycle=9, loaded_body=Mean(way), first_cycle=Mean(nan),
+        stiffness=Mean(nan), mean_grain=Mean(2e-4), cost=1.0, pairs=0, compared_at=0,
+        error=Mean(nan), mean_grain_error=Mean(nan), full_run=Mean(nan), full_stiffness=Mean(nan),
+        speed_up=nan,
+    )  # fmt: skip
+    monkeypatch.setattr("adapters.procedure.members.judge_members", lambda _: settled)
+    run: Any = SimpleNamespace(history=SimpleNamespace(count_computed=lambda _: 9), exchanged="")
+    last = describe_result(SimpleNamespace(run=run))[-1]  # type: ignore[arg-type]
+    assert last.startswith("sleeper") == loaded
+    assert last.endswith("does not settle") != loaded
 
 
 @pytest.mark.long
