@@ -19,15 +19,16 @@ pyplot.rcParams.update(STYLE)
 record = Path(__file__).parents[2] / "validation" / "studies" / "settlement" / "record.jsonl"
 rows = [json.loads(line) for line in record.read_text().splitlines()]
 kind = KINDS["coarse"]
+COLOURS = "#0072B2", "#56B4E9", "#E69F00", "#000000", "#009E73", "#D55E00", "#CC79A7"
 
 figure, axes = pyplot.subplots(figsize=(7.2, 4))
 axes.axhline(0, color="0.5", lw=0.8)
-for method in list_methods(kind):
+for method, colour, mark in zip(list_methods(kind), COLOURS, "osD^vPX", strict=True):
     errors = 100 * find_errors(rows, kind, method.name, "loaded_body")
     if len(errors) > 1:
         mean, half = estimate_mean(errors, LEVEL)
         cost = 1 / find_step_speedup(rows, kind, method.name)
-        axes.errorbar(cost, mean, half, fmt="o", capsize=3, label=method.name)
+        axes.errorbar(cost, mean, half, fmt=mark, color=colour, capsize=3, label=method.name)
 axes.set(xlim=(0, 1), xlabel="cost over that of every cycle", ylabel="error (%)", title=kind.title)
-axes.legend(loc="lower right")
+axes.legend(loc="upper right")
 figure.savefig(sys.argv[1])

@@ -1,7 +1,8 @@
-"""The site: its reference says what the code does, its pictures are drawn, its links lead on."""
+"""The site: its reference says what the code does, pictures and notebooks run, links lead on."""
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
@@ -19,6 +20,7 @@ from trackbed.command import VERBS
 
 ROOT = Path(__file__).parents[2]
 SCRIPTS = sorted(ROOT.glob("docs/gallery/*.py"))
+BOOKS = sorted(ROOT.glob("docs/notebooks/*.ipynb"))
 QUICK = ("grading", "which_law")
 LINES = 40
 """Of a script at most, so that it can be read beside its picture."""
@@ -106,6 +108,28 @@ def test_a_picture_is_drawn(script: Path, tmp_path: Path) -> None:
     run = subprocess.run(words, cwd=tmp_path, env=env, capture_output=True, text=True)
     assert run.returncode == 0, run.stderr[-2000:]
     assert (np.ptp(imread(picture)[..., :3], axis=2) > 0.1).mean() > COLOURED
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "book",
+    [
+        pytest.param(book, id=book.stem, marks=[pytest.mark.engine] * (book.stem == "settlement"))
+        for book in BOOKS
+    ],
+)
+def test_a_notebook_runs(book: Path, tmp_path: Path) -> None:
+    """Its cells run in order in an empty folder; it is kept without what they print and draw."""
+    content = json.loads(book.read_text())
+    cells = [cell for cell in content["cells"] if cell["cell_type"] == "code"]
+    assert content["nbformat"] == 4
+    assert not any(cell["outputs"] for cell in cells)
+    code = "\n\n".join("".join(cell["source"]) for cell in cells)
+    words = [sys.executable, "-W", "error", "-c", code]
+    env = os.environ | {"PYTHONPATH": str(ROOT), "MPLBACKEND": "Agg"}
+    run = subprocess.run(words, cwd=tmp_path, env=env, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr[-2000:]
+    assert run.stdout
 
 
 @pytest.mark.long
