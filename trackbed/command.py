@@ -25,6 +25,7 @@ VERBS = {
     "sweep": ("adapters.cli.sweep", "several seeds and values of a scene's keys, side by side"),
     "status": (RUN, "how far a run is, its settlement and speed-up"),
     "report": (RUN, "write report.html and the figures of a run"),
+    "plot": ("adapters.cli.compare", "curves of runs of one kind, as plot.png in the first"),
     "compare": ("adapters.cli.compare", "two runs of one kind side by side: keys and results"),
     "export": ("adapters.cli.export", "a run as files of ParaView, OVITO, ON-DEM or CSV"),
     "fit": (

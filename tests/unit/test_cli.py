@@ -40,7 +40,7 @@ def test_help_names_every_verb_and_exit_code(capsys: pytest.CaptureFixture[str])
     text = capsys.readouterr().out
     shipped = {"doctor", "new", "run", "resume", "status", "report", "export", "fit", "relax"}
     others = {"adopt", "sweep", "qdem", "grains", "train", "rigid", "line", "validate", "cite"}
-    assert shipped | others | {"stone", "compare"} == set(VERBS)
+    assert shipped | others | {"stone", "compare", "plot"} == set(VERBS)
     for verb in VERBS:
         assert f"\n    {verb}" in text
     codes = {

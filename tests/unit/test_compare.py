@@ -1,4 +1,4 @@
-"""compare, completion and the list of scenes."""
+"""compare, plot, completion and the list of scenes."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ from pathlib import Path
 
 import pytest
 
+from adapters.cli.compare import CURVES, draw_curves
 from tests.small_bed import small_bed
 from trackbed.command import main
 from trackbed.scenes import list_scenes
+from trackbed.series_file import read_table
 
 LINES = {
     "first": ({"line": {"axles": 100, "seed": 1}, "axle": [{"force": 5e4}, {"force": 9e4}]},
@@ -59,6 +61,18 @@ def test_two_settlement_runs(tmp_path: Path, capsys) -> None:
     few, many = shown["found"]["jumps"]
     assert 0 < few < many
     assert "cycle" not in shown["found"]
+    assert main(["plot", *runs]) == 0
+    assert Path(capsys.readouterr().out.strip()).stat().st_size > 10_000
+
+
+def test_curves_are_those_of_the_tables(tmp_path: Path) -> None:
+    """Against the first column, without rows that lack a number; all columns of probes."""
+    path = tmp_path / "probes.csv"
+    path.write_text("time,x10_x,tip_z\n0,1,5\n1,,6\n2,3,7\n")
+    across, along = draw_curves([read_table(path)] * 2, CURVES["qdem"][1]).axes
+    assert (across.get_ylabel(), along.get_xlabel()) == ("x10_x (m)", "time (s)")
+    assert [line.get_xydata().tolist() for line in across.lines] == [[[0, 1], [2, 3]]] * 2
+    assert along.lines[1].get_xydata().tolist() == [[0, 5], [1, 6], [2, 7]]
 
 
 def test_runs_that_can_not_be_compared(lines, tmp_path: Path, capsys) -> None:
@@ -73,6 +87,7 @@ def test_runs_that_can_not_be_compared(lines, tmp_path: Path, capsys) -> None:
     ):
         assert main(["compare", *words]) == 2
         assert said in capsys.readouterr().err
+    assert main(["plot", lines[0]]) == 2
 
 
 def test_a_shell_completes_verbs_and_flags() -> None:
