@@ -165,7 +165,7 @@ def run_fit(arguments: argparse.Namespace) -> int:
         agreeing = ", ".join(name for name, said in found.laws.items() if said.agrees)
         print(f"laws that agree to {fit.AGREE:.0%} of the increment: {agreeing or 'none'}")
     if auto and arguments.frequency is None:
-        say_prior(series, ahead, found, unit)
+        print_prior(series, ahead, found, unit)
     settled, low, high = round_to_band(fitted["prediction"], *fitted["band"])
     print(f"settlement at cycle {to_cycle:.10g}: {settled} {unit}".rstrip(), end=", ")
     if ahead == series.cycle.max(initial=0.0):
@@ -177,14 +177,14 @@ def run_fit(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def say_prior(series: Series, to_cycle: float, found: Prediction, unit: str) -> None:
+def print_prior(series: Series, to_cycle: float, found: Prediction, unit: str) -> None:
     """Print what the laws say without the prior, where that moved the increment by a tenth."""
-    from adapters.laws.fit.outlook import AGREE, find_outlook
+    from adapters.laws import fit
 
     rows = series.cycle > 0
     cycle, settlement = series.cycle[rows], series.settlement[rows]
-    alone = float(find_outlook(cycle, settlement[:, None], to_cycle).alone[0])
-    if abs(alone - found.prediction) > AGREE * abs(found.prediction - settlement[-1]):
+    alone = float(fit.outlook.find_outlook(cycle, settlement[:, None], to_cycle).alone[0])
+    if abs(alone - found.prediction) > fit.AGREE * abs(found.prediction - settlement[-1]):
         said, *_ = round_to_band(alone, *found.band)
         print(
             f"the laws alone: {said} {unit}".rstrip() + "; the rest is the prior that ballast "

@@ -27,7 +27,7 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--scheduler", default="local", metavar="WHERE",
-        help="local (default: in this process), slurm, or the address of a Dask scheduler",
+        help="local (default: side by side here), slurm, or the address of a Dask scheduler",
     )  # fmt: skip
     parser.add_argument(
         "--cluster-config", type=Path, metavar="FILE",

@@ -18,7 +18,7 @@ from adapters.jumps import BAND_PROBABILITY
 from adapters.procedure.history import History, find_speed_up, sum_cost
 from adapters.procedure.record import Record
 
-ROUND_OFF = 1e-6
+PRESCRIBED = 1e-6
 """Of the mean grain's settlement: a body that settles by less is not driven by a force [-]."""
 
 
@@ -169,7 +169,7 @@ def describe_result(record: Record) -> list[str]:
     said = f"mean grain settles {format_length(settled.mean_grain)}"
     said += f"; {how} of {settled.cycle:,} cycles computed{record.run.exchanged}"
     said += format_error(settled.mean_grain_error)
-    if abs(settled.loaded_body.value) <= ROUND_OFF * abs(settled.mean_grain.value):
+    if abs(settled.loaded_body.value) <= PRESCRIBED * abs(settled.mean_grain.value):
         return [f"{said}; the loaded body goes a prescribed way and does not settle"]
     return [said, *([str(settled)] if isfinite(settled.loaded_body.value) else [])]
 

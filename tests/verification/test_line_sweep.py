@@ -18,11 +18,7 @@ from track_line.settling import march_line, start_line
 from trackbed.command import main
 from trackbed.scenes import read_template
 
-pytestmark = [
-    pytest.mark.long,
-    pytest.mark.peer("distributed"),
-    pytest.mark.peer("pyarrow.parquet"),
-]
+pytestmark = pytest.mark.long
 
 
 def test_a_sweep_on_the_fake_engine(tmp_path, monkeypatch, capsys):

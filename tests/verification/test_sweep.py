@@ -1,4 +1,4 @@
-"""A sweep on Dask: failed members are named, the others finish, a killed sweep goes on."""
+"""A sweep, here and on Dask: failed members are named, the others finish, killed it goes on."""
 
 from __future__ import annotations
 
@@ -20,19 +20,14 @@ import pytest
 from adapters.files.run_folder import RunFolder
 from adapters.procedure.sweep import member as sweep_member
 from adapters.procedure.sweep import run as run_sweep
-from adapters.procedure.sweep.cluster import ANY_PORT
 from adapters.procedure.sweep.member import Ended
 from adapters.procedure.sweep.plan import Member, Sweep
 from tests.forked_commands import comes_true, gone
 from tests.small_bed import small_bed
 from trackbed import command
 
-pytestmark = [
-    pytest.mark.peer("distributed"),
-    pytest.mark.peer("dask_jobqueue"),
-    pytest.mark.peer("pyarrow.parquet"),
-]
-
+ANY_PORT = "127.0.0.1:0"
+"""Of a scheduler's pages: Dask's own port is taken where two sweeps run at once."""
 ROOT = Path(__file__).parents[2]
 FREQUENCIES = ("--set", "loading.frequency=10,20")
 
@@ -80,6 +75,7 @@ def sweep(
     return code, json.loads(printed.out) if printed.out else None, printed.err
 
 
+@pytest.mark.peer("pyarrow.parquet")
 def test_tables_and_picture(scene: Path, tmp_path, in_process: list[list[str]], capsys) -> None:
     """Every member's cycles and their mean are in CSV and Parquet alike; the rest is not run."""
     into = tmp_path / "sweep"
@@ -121,6 +117,23 @@ def test_tables_and_picture(scene: Path, tmp_path, in_process: list[list[str]], 
     assert [words[-1] for words in in_process[4:]] == ["sample.seed=3", "sample.seed=3"]
 
 
+def test_without_extra_libraries(
+    scene: Path, tmp_path: Path, in_process: list[list[str]], monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    """A sweep on this machine needs neither Dask nor PyArrow, and leaves its tables as CSV."""
+    for name in ("distributed", "dask_jobqueue", "pyarrow"):
+        monkeypatch.setitem(sys.modules, name, None)
+    monkeypatch.setattr("adapters.procedure.sweep.results.find_spec", lambda _: None)
+    code, shown, _ = sweep(capsys, scene, "--seeds", 2, "--into", tmp_path / "sweep")
+    assert code == 0
+    assert shown is not None
+    assert sorted(shown["files"]) == ["band.csv", "members.csv", "picture", "settlement.csv"]
+    with (tmp_path / "sweep" / "members.csv").open() as stream:
+        assert [row["state"] for row in csv.DictReader(stream)] == ["finished", "finished"]
+
+
+@pytest.mark.peer("pyarrow.parquet")
 def test_failed_members_are_named_and_the_others_finish(
     scene: Path, tmp_path: Path, in_process: list[list[str]], capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
@@ -166,6 +179,8 @@ def test_dry_run_runs_none(scene: Path, tmp_path: Path, capsys: pytest.CaptureFi
     assert not (tmp_path / "sweep").exists()
 
 
+@pytest.mark.peer("distributed")
+@pytest.mark.peer("dask_jobqueue")
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
@@ -186,6 +201,7 @@ def test_wrong_use(
     assert sentence in capsys.readouterr().err
 
 
+@pytest.mark.peer("distributed")
 def test_any_dask_cluster_by_its_address(
     scene: Path, tmp_path: Path, in_process: list[list[str]], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -222,6 +238,8 @@ SCANCEL = "#!/bin/sh\nkill -- -$1\n"
 
 
 @pytest.mark.long
+@pytest.mark.peer("distributed")
+@pytest.mark.peer("dask_jobqueue")
 def test_slurm_jobs_that_are_lost_are_replaced(tmp_path: Path) -> None:
     """``--scheduler slurm`` submits a job; killed, its member goes on in the next; none is left."""
     for name, text in (("sbatch", SBATCH), ("scancel", SCANCEL)):

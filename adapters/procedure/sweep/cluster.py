@@ -1,10 +1,11 @@
-"""The Dask cluster a sweep runs on: in this process, one that is there already, or SLURM jobs."""
+"""Where the members of a sweep run: threads here, a Dask cluster that is there, or SLURM jobs."""
 
 from __future__ import annotations
 
 import os
 import tomllib
 from collections.abc import Iterator
+from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,8 +15,6 @@ from adapters.errors import EngineMissing, UsageError
 
 LOCAL, SLURM = "local", "slurm"
 """Names for ``--scheduler``; anything else is the address of a scheduler."""
-ANY_PORT = "127.0.0.1:0"
-"""Of a scheduler's pages: Dask's own port is taken where two sweeps run at once."""
 CONNECT_S = 30
 """How long a scheduler may take to answer [s]."""
 EXTRA = "pip install 'trackbed[sweep]'"
@@ -25,10 +24,10 @@ def check_libraries(scheduler: str) -> None:
     """Raise `EngineMissing` before anything starts where a library of the extra is missing."""
     from importlib.util import find_spec
 
-    needed = ["distributed", "pyarrow", *["dask_jobqueue"] * (scheduler == SLURM)]
-    missing = [name for name in needed if find_spec(name) is None]
-    if missing:
-        raise EngineMissing(f"a sweep needs {', '.join(missing)}", remedy=EXTRA)
+    needed = {LOCAL: (), SLURM: ("distributed", "dask_jobqueue")}.get(scheduler, ("distributed",))
+    if missing := [name for name in needed if find_spec(name) is None]:
+        what = f"a sweep by --scheduler {scheduler} needs {', '.join(missing)}"
+        raise EngineMissing(what, remedy=EXTRA)
 
 
 @dataclass(frozen=True)
@@ -42,28 +41,24 @@ class Cluster:
 
 
 @contextmanager
-def open_client(cluster: Cluster, members: int) -> Iterator[Any]:
-    """A `distributed.Client`, closed at the end, and with it what was started for it.
+def open_executor(cluster: Cluster, members: int) -> Iterator[Executor]:
+    """What members are handed to, closed at the end, and with it what was started for it.
 
     Raises `UsageError` where the scheduler does not answer or the configuration is wrong.
     """
+    if cluster.scheduler == LOCAL:
+        most = cluster.workers or len(os.sched_getaffinity(0))
+        with ThreadPoolExecutor(min(most, members)) as threads:
+            yield threads
+        return
     import distributed
 
     with ExitStack() as stack:
-        if cluster.scheduler == LOCAL:
-            most = cluster.workers or len(os.sched_getaffinity(0))
-            place: Any = distributed.LocalCluster(
-                n_workers=1, threads_per_worker=min(most, members), processes=False,
-                dashboard_address=None, scheduler_kwargs={"dashboard_address": ANY_PORT},
-                memory_limit=None,
-            )  # fmt: skip
-            stack.enter_context(place)
-        elif cluster.scheduler == SLURM:
+        place: Any = cluster.scheduler
+        if cluster.scheduler == SLURM:
             place = stack.enter_context(_open_slurm(cluster.config))
             jobs = cluster.workers or members
             place.adapt(minimum_jobs=jobs, maximum_jobs=jobs)  # a job that is lost is replaced
-        else:
-            place = cluster.scheduler
         try:
             client = stack.enter_context(distributed.Client(place, timeout=CONNECT_S))
         except (OSError, ValueError) as error:
@@ -73,7 +68,7 @@ def open_client(cluster: Cluster, members: int) -> Iterator[Any]:
                 remedy="give local, slurm, or the address that dask-scheduler printed, such as "
                 "tcp://node1:8786",
             ) from error
-        yield client
+        yield client.get_executor(pure=False)
 
 
 def _open_slurm(config: Path | None) -> Any:

@@ -1,4 +1,4 @@
-"""What a sweep leaves for other tools: tables as CSV and Parquet, the loaded body with its band.
+"""What a sweep leaves for other tools: tables as CSV, and as Parquet where PyArrow is; the band.
 
 ================ =====================================================================
 ``members``      a row for each member: settings, state, settlement, cost, its error
@@ -12,10 +12,12 @@ The tables are derived from the run folders and can be written again at any time
 
 from __future__ import annotations
 
+import csv
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -139,14 +141,19 @@ def join_summaries(sweep: Sweep, results: Sequence[Result]) -> dict[str, str]:
 
 
 def save_table(stem: Path, rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
-    """Write rows to ``stem.csv`` and ``stem.parquet``, atomically; their paths by name.
-
-    A column whose values are of several kinds becomes text.
-    """
-    import pyarrow as pa
-    from pyarrow import csv, parquet
-
+    """Write rows to ``stem.csv``, and to ``stem.parquet`` where PyArrow is, atomically; their paths
+    by name.  In the latter a column whose values are of several kinds becomes text."""
+    paths = {f"{stem.name}.csv": str(stem.with_name(f"{stem.name}.csv"))}
     names = list(rows[0]) if rows else []
+    with replace_file(Path(paths[f"{stem.name}.csv"])) as temporary, temporary.open("w") as stream:
+        table = csv.DictWriter(stream, names, lineterminator="\n")
+        table.writeheader()
+        table.writerows(rows)
+    if find_spec("pyarrow") is None:
+        return paths
+    import pyarrow as pa
+    from pyarrow import parquet
+
     columns = {}
     for name in names:
         values = [row[name] for row in rows]
@@ -154,14 +161,10 @@ def save_table(stem: Path, rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
             columns[name] = pa.array(values)
         except (pa.ArrowInvalid, pa.ArrowTypeError):
             columns[name] = pa.array([None if value is None else str(value) for value in values])
-    table = pa.table(columns)
-    paths = {}
-    for kind, write in (("csv", csv.write_csv), ("parquet", parquet.write_table)):
-        path = stem.with_name(f"{stem.name}.{kind}")
-        with replace_file(path) as temporary:
-            write(table, temporary)
-        paths[f"{stem.name}.{kind}"] = str(path)
-    return paths
+    path = stem.with_name(f"{stem.name}.parquet")
+    with replace_file(path) as temporary:
+        parquet.write_table(pa.table(columns), temporary)
+    return paths | {path.name: str(path)}
 
 
 def draw_bands(bands: Sequence[Band]) -> Figure:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from concurrent.futures import Executor, Future, as_completed, wait
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -12,7 +13,7 @@ from adapters.engines import allow_interrupts, find_engine
 from adapters.errors import Interrupted, UsageError
 from adapters.files import RunFolder, explain_full_disk
 from adapters.procedure import Progress, read_status
-from adapters.procedure.sweep.cluster import Cluster, open_client
+from adapters.procedure.sweep.cluster import Cluster, open_executor
 from adapters.procedure.sweep.member import COMMAND, STOPPED, Ended, run_member
 from adapters.procedure.sweep.plan import Member, Sweep, check_folder, find_pinned_engine
 from trackbed.run_files import MANIFEST, RESULT, hold_signals, read_object, write_whole
@@ -105,19 +106,17 @@ def _run(
     progress: Progress,
 ) -> None:  # fmt: skip
     """Hand the members to the cluster, and take the results in as they come."""
-    with open_client(cluster, len(pending)) as client:
-        from distributed import as_completed, wait
-
-        engine = choose_engine(sweep, pending, client, progress)
+    with open_executor(cluster, len(pending)) as executor:
+        engine = choose_engine(sweep, pending, executor, progress)
         futures = {
-            client.submit(
+            executor.submit(
                 run_member, sweep.list_words(member, engine), sweep.log(member).absolute(),
-                sweep.stop_file.absolute(), pure=False,
+                sweep.stop_file.absolute(),
             ): member
             for member in pending
         }  # fmt: skip
 
-        def take_result(future: Any) -> None:
+        def take_result(future: Future[Ended]) -> None:
             member = futures[future]
             result = find_result(sweep, member, _find_end(future))
             results[member.name] = result
@@ -141,7 +140,7 @@ def _run(
 
 
 def choose_engine(
-    sweep: Sweep, pending: Sequence[Member], client: Any, progress: Progress
+    sweep: Sweep, pending: Sequence[Member], executor: Executor, progress: Progress
 ) -> list[str]:
     """The override that gives every member the same engine, where the scene says ``auto``.
 
@@ -151,7 +150,7 @@ def choose_engine(
         return []
     name = find_pinned_engine(sweep)
     if name is None:
-        name, version = client.submit(find_worker_engine, pure=False).result()
+        name, version = executor.submit(find_worker_engine).result()
         progress.print_line(f"engine: {name} ({version})")
     return [f'engine.name="{name}"']
 
@@ -162,13 +161,12 @@ def find_worker_engine() -> tuple[str, str]:
     return engine.name, engine.version()
 
 
-def _find_end(future: Any) -> Ended:
+def _find_end(future: Future[Ended]) -> Ended:
     """How a member ended; one whose workers died again and again failed as its engine does."""
     if not future.done():
         return STOPPED
     try:
-        ended: Ended = future.result()
-        return ended
+        return future.result()
     except Exception as error:
         return Ended(5, f"its worker failed: {error or type(error).__name__}")
 
