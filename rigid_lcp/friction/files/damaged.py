@@ -25,13 +25,22 @@ DAMAGED = (
 
 
 @contextmanager
+def refuse_damage(what: str, where: str, remedy: str) -> Iterator[None]:
+    """Put a `ProblemError`, ``what`` can not be done, in place of what is `DAMAGED`."""
+    try:
+        yield
+    except DAMAGED as error:
+        raise ProblemError(f"{what}: {error}", where=where, remedy=remedy) from error
+
+
+@contextmanager
 def describe_damage(path: Path) -> Iterator[None]:
     """Put the file's name before what the checks of a problem say."""
     try:
         yield
     except ProblemError as error:
         where = f"{path}: {error.where}" if error.where else str(path)
-        raise ProblemError(error.what, where=where, remedy=error.remedy) from error
+        raise error.relocate(where) from error
 
 
 def name_missing_part(path: Path, name: str, have: list[str], why: str = "") -> ProblemError:

@@ -26,9 +26,9 @@ from scipy.sparse.linalg import splu
 from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import LibraryMissing, ProblemError
 from rigid_lcp.friction.files.damaged import (
-    DAMAGED,
     describe_damage,
     name_missing_part,
+    refuse_damage,
     refuse_unused_parts,
     take_whole_number,
 )
@@ -97,36 +97,23 @@ def _open_fclib(path: Path) -> Iterator[Any]:
             "HDF5 files are read by h5py, which is not installed", where=str(path),
             remedy="pip install h5py",
         ) from error  # fmt: skip
-    try:
+    remedy = "fetch it again; a few lines of text stand for a file that Git LFS keeps"
+    with refuse_damage("it can not be read as HDF5", str(path), remedy):
         file = h5py.File(path, "r")
-    except OSError as error:
-        raise ProblemError(
-            f"it can not be read as HDF5: {error}", where=str(path),
-            remedy="fetch it again; a few lines of text stand for a file that Git LFS keeps",
-        ) from error  # fmt: skip
-    try:
-        with file:
-            yield file
-    except DAMAGED as error:  # h5py opens a file whose inside is damaged
-        raise ProblemError(
-            f"a part of it can not be read: {error}", where=str(path), remedy="fetch it again"
-        ) from error
+    # h5py opens a file whose inside is damaged
+    with refuse_damage("a part of it can not be read", str(path), "fetch it again"), file:
+        yield file
 
 
 def _read_numbers(group: Any, name: str, path: Path) -> NDArray[Any]:
     """A data set as an array of numbers."""
     if name not in group:
         raise name_missing_part(path, f"{group.name.rstrip('/')}/{name}".lstrip("/"), sorted(group))
-    try:
+    where, remedy = f"{path}: {name}", "write the file again"
+    with refuse_damage("it can not be read", where, remedy):
         values = np.asarray(group[name])
-    except (OSError, ValueError, TypeError) as error:
-        raise ProblemError(
-            f"it can not be read: {error}", where=f"{path}: {name}", remedy="write the file again"
-        ) from error
     if values.dtype.kind not in "iuf" or not values.size:
-        raise ProblemError(
-            "it is not made of numbers", where=f"{path}: {name}", remedy="write the file again"
-        )
+        raise ProblemError("it is not made of numbers", where=where, remedy=remedy)
     return values
 
 
@@ -137,7 +124,8 @@ def _read_fclib_matrix(kind: Any, name: str, path: Path) -> sp.csr_array:
     group = kind[name]
     m, n, nz = (int(_read_numbers(group, name, path).ravel()[0]) for name in ("m", "n", "nz"))
     p, i, x = (_read_numbers(group, name, path).ravel() for name in ("p", "i", "x"))
-    try:
+    where, remedy = f"{path}: {group.name.strip('/')}", "fetch or write the file again"
+    with refuse_damage("its m, n, nz, p, i and x are no matrix", where, remedy):
         if nz == -2:
             matrix = sp.csr_array((x, i, p), shape=(m, n))
         elif nz == -1:
@@ -152,11 +140,6 @@ def _read_fclib_matrix(kind: Any, name: str, path: Path) -> sp.csr_array:
         if x[used:].any():
             raise ValueError(f"x has {x.size} numbers, of which it says that {used} are used")
         return sp.csr_array(matrix)
-    except (ValueError, IndexError) as error:
-        raise ProblemError(
-            f"its m, n, nz, p, i and x are no matrix: {error}",
-            where=f"{path}: {group.name.strip('/')}", remedy="fetch or write the file again",
-        ) from error  # fmt: skip
 
 
 def build_global_problem(

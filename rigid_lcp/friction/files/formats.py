@@ -27,9 +27,9 @@ from numpy.typing import NDArray
 from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import ProblemError
 from rigid_lcp.friction.files.damaged import (
-    DAMAGED,
     describe_damage,
     name_missing_part,
+    refuse_damage,
     take_whole_number,
 )
 from rigid_lcp.friction.files.fclib import read_fclib_forces, read_fclib_problem
@@ -136,13 +136,9 @@ def _read_npz_forces(path: Path) -> Floats:
 
 def _read_npz_arrays(path: Path) -> dict[str, NDArray[Any]]:
     """All arrays of a file."""
-    try:
+    remedy = "write it again with numpy.savez, numbers only; the file may be cut short"
+    with refuse_damage("it can not be read as npz", str(path), remedy):
         return read_arrays(path)
-    except DAMAGED as error:
-        raise ProblemError(
-            f"it can not be read as npz: {error}", where=str(path),
-            remedy="write it again with numpy.savez, numbers only; the file may be cut short",
-        ) from error  # fmt: skip
 
 
 def _read_npz_matrix(path: Path, parts: dict[str, NDArray[Any]]) -> Any:
@@ -164,15 +160,11 @@ def _read_npz_sparse(path: Path) -> sp.csr_array:
             "it is not there, and the problem has no array W", where=path.name,
             remedy="write W beside it with scipy.sparse.save_npz",
         )  # fmt: skip
-    try:
+    remedy = "write it again with scipy.sparse.save_npz"
+    with refuse_damage("it can not be read as a sparse matrix", path.name, remedy):
         with path.open("rb") as stream:  # numpy leaves a broken file open that it opened itself
             matrix = sp.csr_array(sp.load_npz(stream))
         matrix.check_format(full_check=True)
-    except DAMAGED as error:
-        raise ProblemError(
-            f"it can not be read as a sparse matrix: {error}", where=path.name,
-            remedy="write it again with scipy.sparse.save_npz",
-        ) from error  # fmt: skip
     return matrix
 
 

@@ -22,8 +22,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from rigid_lcp.arrays import Floats, Ints
-from rigid_lcp.errors import ProblemError
-from rigid_lcp.friction.files.damaged import describe_damage
+from rigid_lcp.friction.files.damaged import describe_damage, refuse_damage
 from rigid_lcp.friction.problem import FrictionProblem, make_problem
 
 DENSE, BLOCKS, SPARSE = 0, 1, 2
@@ -61,15 +60,12 @@ class _Numbers:
 def read_siconos_problem(path: Path) -> FrictionProblem:
     """The problem of a ``.dat`` file, in the units that it has.  Raises `ProblemError`, which says
     which part of the file is wrong."""
-    try:
-        text = path.read_text(encoding="utf-8")
-        matrix, q, mu, dim = _read_parts(text)
-    except (OSError, ValueError, OverflowError, MemoryError) as error:
-        raise ProblemError(
-            f"it can not be read as a friction problem of Siconos: {error}", where=str(path),
-            remedy="give dim, number of contacts, W, q and mu as frictionContact_printInFile does; "
-            "global (GFC3D) and rolling (RFC3D) problems are not known",
-        ) from error  # fmt: skip
+    remedy = (
+        "give dim, number of contacts, W, q and mu as frictionContact_printInFile does; "
+        "global (GFC3D) and rolling (RFC3D) problems are not known"
+    )
+    with refuse_damage("it can not be read as a friction problem of Siconos", str(path), remedy):
+        matrix, q, mu, dim = _read_parts(path.read_text(encoding="utf-8"))
     with describe_damage(path):
         problem: FrictionProblem = make_problem(matrix, q, mu, dim)
     return problem
