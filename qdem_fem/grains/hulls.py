@@ -9,7 +9,6 @@ A stretch is affine and moves no node across a plane of others: what is convex s
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
@@ -55,23 +54,22 @@ class GrainRecipe:
     """Fewest and most corners M; a grain has 8 (2 M - 4) tetrahedra and 5 M - 5 nodes."""
 
     def __post_init__(self) -> None:
-        low, high = self.corners
-        spread = (self.sphericity_scatter, self.roundness_scatter)
-        for what, sound in (
-            (f"sphericity {self.sphericity} +- {spread[0]}",
-             spread[0] >= 0 and self.sphericity - spread[0] >= 0.4
-             and self.sphericity + spread[0] <= 0.97),
-            (f"roundness {self.roundness} +- {spread[1]}",
-             spread[1] >= 0 and self.roundness - spread[1] >= 0.3
-             and self.roundness + spread[1] <= 1),
-            (f"corners {self.corners}", 6 <= low <= high <= 40),
-        ):  # fmt: skip
-            if not sound:
-                raise MeshError(
-                    f"no grain has {what}", where="grain recipe",
-                    remedy="use sphericity 0.4 to 0.97, roundness 0.3 to 1, scatters of 0 or more "
-                    "within them, 6 to 40 corners",
-                )  # fmt: skip
+        wrong = [
+            f"{name} {mean} +- {spread}"
+            for name, mean, spread, least, most in (
+                ("sphericity", self.sphericity, self.sphericity_scatter, 0.4, 0.97),
+                ("roundness", self.roundness, self.roundness_scatter, 0.3, 1.0),
+            )
+            if not (spread >= 0 and mean - spread >= least and mean + spread <= most)
+        ]
+        if not 6 <= self.corners[0] <= self.corners[1] <= 40:
+            wrong.append(f"corners {self.corners}")
+        if wrong:
+            raise MeshError(
+                f"no grain has {wrong[0]}", where="grain recipe",
+                remedy="use sphericity 0.4 to 0.97, roundness 0.3 to 1, scatters of 0 or more "
+                "within them, 6 to 40 corners",
+            )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -209,50 +207,39 @@ class _Drawn:
     def solve(self, psi: float, roundness: float, reached: list[float]) -> GrainForm | None:
         """The grain of this sphericity and roundness, None if these corners can not have both.
 
-        What roundness was had on the way is noted in ``reached``.
+        Lifts are raised until one is too round where the last was too angular, then the two are
+        halved.  What roundness was had on the way is noted in ``reached``.
         """
 
-        def try_lift(lift: float) -> tuple[float, Floats] | None:
+        def try_lift(lift: float) -> tuple[float, Floats]:
             nodes = self.stretch_nodes(self.lift_nodes(lift), psi)
             if nodes is None:
-                return None
+                return np.nan, self.flat
             reached.append(measures.find_roundness(nodes, self.faces, self.edges))
             return reached[-1] - roundness, nodes
 
-        below: float | None = None
-        for lift in np.linspace(0.0, HULLS.greatest_lift, HULLS.lifts):
-            found = try_lift(float(lift))
-            if found is None:
-                below = None
-            elif abs(found[0]) <= HULLS.roundness_within:
-                return self._make_form(found[1], psi, reached[-1])
-            elif found[0] < 0:
-                below = float(lift)
-            elif below is not None:
-                return self._halve_bracket(below, float(lift), psi, try_lift, reached)
-        return None
-
-    def _halve_bracket(
-        self, below: float, above: float, psi: float, tried: Any, reached: list[float]
-    ) -> GrainForm | None:
-        """The bracket of two lifts halved until the roundness is near enough; None if it jumps."""
+        below = np.nan
+        for above in np.linspace(0.0, HULLS.greatest_lift, HULLS.lifts).tolist():
+            excess, surface = try_lift(above)
+            if abs(excess) <= HULLS.roundness_within or (excess > 0 and below >= 0):
+                break
+            below = above if excess < 0 else np.nan
+        else:
+            return None
         for _ in range(HULLS.halvings):
+            if not abs(excess) > HULLS.roundness_within:  # near enough, or nan
+                break
             middle = (below + above) / 2
-            found = tried(middle)
-            if found is None:
-                return None
-            if abs(found[0]) <= HULLS.roundness_within:
-                return self._make_form(found[1], psi, reached[-1])
-            below, above = (middle, above) if found[0] < 0 else (below, middle)
-        return None
-
-    def _make_form(self, surface: Floats, psi: float, roundness: float) -> GrainForm | None:
-        """The grain of a solved surface, None where its mesh has a sliver."""
+            excess, surface = try_lift(middle)
+            below, above = (middle, above) if excess < 0 else (below, middle)
+        if not abs(excess) <= HULLS.roundness_within:
+            return None
         turned = surface @ self.turn.T
         inner = place_apex_and_spokes(turned, self.faces, self.count)
         nodes = np.vstack([turned, inner]) - inner[0]
         worst = find_radius_ratios(nodes, make_grain_elements(nodes, self.corner_faces)).min()
-        return GrainForm(self.corner_faces, nodes, psi, roundness) if worst >= HULLS.ratio else None
+        sound = worst >= HULLS.ratio
+        return GrainForm(self.corner_faces, nodes, psi, reached[-1]) if sound else None
 
 
 SHAPE = draw_grain

@@ -64,6 +64,7 @@ class Edges:
     """The two nodes of each edge, (e, 2), as the first of its faces runs through them."""
     faces: Integers  # the two faces of each edge, (e, 2)
     opposite: Integers  # the third node of each of these faces, (e, 2)
+    number: Integers  # of the edges 0-1, 1-2, 2-0 of each face, (k, 3)
 
 
 def find_surface_edges(faces: Integers) -> Edges:
@@ -76,7 +77,10 @@ def find_surface_edges(faces: Integers) -> Edges:
     twin = order[np.searchsorted(key, back, sorter=order)]
     one = np.flatnonzero(start < end)
     pair = np.stack([one, twin[one]], axis=1)
-    return Edges(np.stack([start[one], end[one]], axis=1), owner[pair], third[pair])
+    number = np.empty(len(start), np.int64)
+    number[pair] = np.arange(len(one))[:, None]
+    nodes = np.stack([start[one], end[one]], axis=1)
+    return Edges(nodes, owner[pair], third[pair], number.reshape(-1, 3))
 
 
 def quarter_faces(faces: Integers, edges: Edges) -> Integers:
@@ -85,19 +89,9 @@ def quarter_faces(faces: Integers, edges: Edges) -> Integers:
     The middle of edge e is node n + e, behind the n nodes of ``faces``.
     """
     a, b, c = faces.T
-    ab, bc, ca = number_edges(faces, edges).T + int(faces.max()) + 1
+    ab, bc, ca = edges.number.T + int(faces.max()) + 1
     four = [(a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca)]
     return np.concatenate([np.stack(one, axis=1) for one in four])
-
-
-def number_edges(faces: Integers, edges: Edges) -> Integers:
-    """Numbers of the edges 0-1, 1-2, 2-0 of each triangle, (k, 3)."""
-    size = int(faces.max()) + 1
-    key = edges.nodes.min(axis=1) * size + edges.nodes.max(axis=1)
-    order = np.argsort(key)
-    following = np.roll(faces, -1, axis=1)
-    wanted = np.minimum(faces, following) * size + np.maximum(faces, following)
-    return np.asarray(order[np.searchsorted(key, wanted, sorter=order)])
 
 
 def find_edge_angles(nodes: Floats, faces: Integers, edges: Edges) -> tuple[Floats, Floats]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from qdem_fem.files import Floats, Integers, MeshError
-from qdem_fem.grains.measures import find_surface_edges, integrate_polyhedron, number_edges
+from qdem_fem.grains.measures import find_surface_edges, integrate_polyhedron
 from qdem_fem.mesh import TetMesh, name_some
 
 SPOKE = 0.5
@@ -64,7 +64,7 @@ def make_grain_elements(nodes: Floats, corner_faces: Integers) -> Integers:
     `find_radius_ratios`.
     """
     corners = int(corner_faces.max()) + 1
-    middle = corners + number_edges(corner_faces, find_surface_edges(corner_faces))
+    middle = corners + find_surface_edges(corner_faces).number
     apex = 4 * corners - 6
     local = np.column_stack(
         [corner_faces, middle, apex + 1 + corner_faces, np.full(len(corner_faces), apex)]
