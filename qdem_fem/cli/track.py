@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from trackbed.choices import find_choices
+from trackbed.errors import UsageError
 from trackbed.plausible import describe_implausible
 
 SEAT_AREA = 0.13 * 0.17
@@ -62,7 +63,6 @@ def make_grain_file(arguments: argparse.Namespace) -> int:
     """Make random ballast grains, of EN 13450 31.5/50 A or between two sieves, and save them."""
     import numpy as np
 
-    from qdem_fem.files import UsageError
     from qdem_fem.grains import BALLAST, GrainRecipe, make_grains, save_grains
     from trackbed.scene_files import Grading
 
@@ -81,7 +81,6 @@ def make_grain_file(arguments: argparse.Namespace) -> int:
 
 def make_train_file(arguments: argparse.Namespace) -> int:
     """Write the made-up record of a passing train."""
-    from qdem_fem.files import UsageError
     from qdem_fem.track import loads
 
     _refuse_name(arguments.out, ".csv")
@@ -106,8 +105,6 @@ def _select_given(arguments: argparse.Namespace, *names: str) -> dict[str, Any]:
 def _refuse_name(out: Path, ending: str) -> None:
     """Raise `UsageError` where ``out`` can not be written, before minutes of work are lost, or is
     named as another kind of file."""
-    from qdem_fem.files import UsageError
-
     if out.is_dir() or not out.parent.is_dir():
         why = "a folder" if out.is_dir() else "in a folder that is not there"
         raise UsageError(f"{out} is {why}", where="--out", remedy="name a file in a folder that is")

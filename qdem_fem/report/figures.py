@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from itertools import cycle
 from math import floor, log10
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -43,8 +42,8 @@ def draw_history(
     scale, name = choose_unit(greatest, unit)
     with write_figure(path, (7.2, 3.2)) as figure:
         panel = figure.subplots()
-        for (label, (time, values)), colour in zip(curves.items(), cycle(COLOURS), strict=False):
-            panel.plot(time, values / scale, color=colour, label=label)
+        for label, (time, values) in curves.items():
+            panel.plot(time, values / scale, label=label)
         panel.set(xlabel=against, ylabel=f"{quantity} ({name})")
         if logarithmic:
             panel.set_yscale("log")
@@ -56,9 +55,9 @@ def draw_spectrum(path: Path, curves: Mapping[str, Curve], modes: Sequence[Mode]
     with write_figure(path, (7.2, 3.2)) as figure:
         panel = figure.subplots()
         highest = 0.0
-        for (label, (time, values)), colour in zip(curves.items(), cycle(COLOURS), strict=False):
+        for label, (time, values) in curves.items():
             frequency, amplitude = find_amplitudes(time, values)
-            panel.plot(frequency[1:], amplitude[1:], color=colour, label=label)
+            panel.plot(frequency[1:], amplitude[1:], label=label)
             highest = max(highest, float(frequency[-1]))
         for mode in modes:
             panel.axvline(mode.frequency, color="#888888", lw=0.8, ls=":")
@@ -82,9 +81,8 @@ def draw_energy(path: Path, energy: Mapping[str, Floats]) -> None:
     scale, unit = choose_unit(max(float(np.abs(energy[n]).max(initial=0.0)) for n in names), "J")
     with write_figure(path, (7.2, 2.8)) as figure:
         panel = figure.subplots()
-        for number, (name, colour) in enumerate(zip(names, cycle(COLOURS), strict=False)):
-            line = "-" if number < len(COLOURS) else "-."
-            panel.plot(time, energy[name] / scale, color=colour, ls=line, label=name)
+        for name in names:
+            panel.plot(time, energy[name] / scale, label=name)
         total = (energy["kinetic"] + energy["elastic"]) / scale
         panel.plot(time, total, color="#111111", lw=0.9, ls="--", label="kinetic + elastic")
         panel.set(xlabel="time (s)", ylabel=f"energy ({unit})")
@@ -110,8 +108,10 @@ def write_figure(path: Path, size: tuple[float, float]) -> Iterator[Figure]:
     """A figure that is written to ``path``, atomically, at the end."""
     import matplotlib
     from matplotlib.figure import Figure
+    from matplotlib.rcsetup import cycler
 
-    with matplotlib.rc_context(STYLE | LINES):
+    curves = cycler(ls=["-", "-."]) * cycler(color=COLOURS)
+    with matplotlib.rc_context(STYLE | LINES | {"axes.prop_cycle": curves}):
         figure = Figure(figsize=size)
         yield figure
         write_whole(path, encode_figure(figure, path.suffix))

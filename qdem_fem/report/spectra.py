@@ -55,7 +55,7 @@ def find_amplitudes(time: Floats, values: Floats) -> tuple[Floats, Floats]:
     finite series.
     """
     step, values = _check_record(time, values)
-    weight = _make_hann(len(values))
+    weight = np.hanning(len(values) + 1)[:-1]
     centred = values - np.average(values, weights=weight)
     amplitude = 2 * np.abs(np.fft.rfft(weight * centred)) / weight.sum()
     return np.asarray(np.fft.rfftfreq(len(values), step), float), amplitude
@@ -162,7 +162,7 @@ def _find_highest_peak(values: Floats, step: float, windowed: bool) -> float:
     A Hann window finds modes that last, and would hide one that dies out at once.
     """
     length = MODES.padding * len(values)
-    weight = _make_hann(len(values)) if windowed else np.ones(len(values))
+    weight = np.hanning(len(values) + 1)[:-1] if windowed else np.ones(len(values))
     spectrum = np.abs(np.fft.rfft(weight * values, length))
     lowest = MODES.padding // 2
     top = lowest + int(np.argmax(spectrum[lowest:-1]))
@@ -201,11 +201,6 @@ def _make_modes(
         )
         for i, (cycles, decay) in enumerate(pairs)
     ]
-
-
-def _make_hann(length: int) -> Floats:
-    """The periodic Hann window."""
-    return np.asarray(0.5 - 0.5 * np.cos(2 * pi * np.arange(length) / length))
 
 
 def _check_record(time: Floats, values: Floats) -> tuple[float, Floats]:

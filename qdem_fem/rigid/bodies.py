@@ -198,14 +198,19 @@ class RigidBodies:
 
     def find_motion(self, acting: Acting) -> RigidNow:
         """The motion at the time of the displacements."""
-        state, step = self._every, acting.step
-        if not acting.behind:
-            return RigidNow(state.velocity.copy(), state.spin.copy())
+        return self._find_motions(acting)[1]
+
+    def _find_motions(self, acting: Acting) -> tuple[RigidNow, RigidNow]:
+        """The motion half a step ago, and now."""
+        state, half = self._every, 0.5 * acting.step
         force, torque = self.forces(acting)
-        velocity = state.velocity + 0.5 * step * force / self.mass[:, None]
-        moved = state.given_weight * (acting.table[1] - acting.table[0])[state.given] / step
-        velocity = np.where(state.given < 0, velocity, 0.5 * (state.velocity + moved))
-        return RigidNow(velocity, state.spin + 0.5 * step * torque)
+        change = np.where(state.given < 0, half * force / self.mass[:, None], 0.0)
+        kept = RigidNow(state.velocity.copy(), state.spin.copy())
+        if not acting.behind:
+            return RigidNow(kept.velocity - change, kept.spin - half * torque), kept
+        moved = state.given_weight * (acting.table[1] - acting.table[0])[state.given] / acting.step
+        velocity = np.where(state.given < 0, kept.velocity + change, 0.5 * (kept.velocity + moved))
+        return kept, RigidNow(velocity, kept.spin + half * torque)
 
     def forces(self, acting: Acting) -> tuple[Floats, Floats]:
         """Force [N] and torque about the centre [N m] on each body now, (b, 3) each."""
@@ -291,16 +296,6 @@ class RigidBodies:
         to = now if sign > 0 else behind
         work[:2] += sign * self.find_half_work(acting)
         self._every.velocity[:], self._every.spin[:] = to.velocity, to.spin
-
-    def _find_motions(self, acting: Acting) -> tuple[RigidNow, RigidNow]:
-        """The motion half a step ago, and now."""
-        state, now = self._every, self.find_motion(acting)
-        if acting.behind:
-            return RigidNow(state.velocity.copy(), state.spin.copy()), now
-        force, torque = self.forces(acting)
-        half = 0.5 * acting.step
-        change = np.where(self._every.given < 0, half * force / self.mass[:, None], 0.0)
-        return RigidNow(now.velocity - change, now.spin - half * torque), now
 
     def find_half_work(self, acting: Acting) -> Floats:
         """Work in the half step up to now [J], (2,): of loads, of prescribed motion."""
