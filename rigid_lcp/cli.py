@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from trackbed.run_files import Progress, add_run_arguments, place_run, time_step
+from trackbed.run_verbs import print_fields
 
 if TYPE_CHECKING:
     from rigid_lcp.scene import SceneFile, Simulation
@@ -32,37 +32,17 @@ def run_rigid(arguments: argparse.Namespace) -> int:
     for doubt in list_doubts(file.tables):
         print(f"warning: {doubt}", file=sys.stderr)
     answer = _preview_run(file) if arguments.dry_run else _run(file, path, arguments)
-    if arguments.json:
-        print(json.dumps(answer, indent=1))
-    else:
-        for key, value in answer.items():
-            print(f"{key.replace('_', ' '):22} {_format_value(value)}")
+    print_fields(answer, arguments.json)
     return 0
-
-
-def _format_value(value: Any) -> str:
-    if isinstance(value, float):
-        return f"{value:.6g}"
-    if isinstance(value, list):
-        return "; ".join(_format_value(each) for each in value)
-    if isinstance(value, dict):
-        return "; ".join(f"{key} ({_format_value(each)})" for key, each in value.items())
-    return str(value)
 
 
 def _preview_run(file: SceneFile) -> dict[str, Any]:
     """What a run would be: bodies, steps, about what they cost, what is left out."""
-    from rigid_lcp.scene import (
-        count_unknowns,
-        describe_scans,
-        list_left_out,
-        make_simulation,
-        plan_steps,
-    )
+    from rigid_lcp import scene
 
-    _, run = make_simulation(file)
+    _, run = scene.make_simulation(file)
     tables = file.tables.run
-    steps, step = plan_steps(tables)
+    steps, step = scene.plan_steps(tables)
     seconds = time_step(run.advance, step, steps)
     return {
         "title": file.tables.title,
@@ -70,11 +50,11 @@ def _preview_run(file: SceneFile) -> dict[str, Any]:
         "bodies": int(run.world.movable.sum()),
         "steps": steps,
         "step": step,
-        "unknowns_a_contact": count_unknowns(file),
+        "unknowns_a_contact": scene.count_unknowns(file),
         "frames": tables.frames,
         "estimated_s": seconds * steps,
-        **describe_scans(file),
-        "left_out": list_left_out(file),
+        **scene.describe_scans(file),
+        "left_out": scene.list_left_out(file),
     }
 
 

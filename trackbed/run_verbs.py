@@ -136,8 +136,17 @@ def print_fields(content: dict[str, Any], as_json: bool) -> None:
         print(json.dumps(content, indent=2, allow_nan=False))
     else:
         for key, value in content.items():
-            shown = f"{value:.6g}" if isinstance(value, float) else value
-            print(f"{key.replace('_', ' '):28}{'-' if shown in (None, '') else shown}")
+            print(f"{key.replace('_', ' '):28}{_format_value(value)}")
+
+
+def _format_value(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, list):
+        return "; ".join(map(_format_value, value))
+    if isinstance(value, dict):
+        return "; ".join(f"{key} ({_format_value(each)})" for key, each in value.items())
+    return "-" if value in (None, "") else str(value)
 
 
 def show_page(path: Path, open_it: bool) -> None:

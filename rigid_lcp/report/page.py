@@ -79,8 +79,7 @@ def draw_movie(folder: RunFolder, scene: Scene, title: str) -> list[Path]:
     """Draw every frame as ``picture-NUMBER.png``, and all as ``movie.gif``; the pictures' paths."""
     frames = {f"{n:06d}": read_frame(path) for n, path in enumerate(folder.frames())}
     drawn = draw_frames(folder, scene, title, frames)
-    movie = pictures.encode_movie([path.read_bytes() for path in drawn])
-    write_whole(folder.path / "movie.gif", movie)
+    write_whole(folder.path / "movie.gif", pictures.encode_movie(drawn))
     return drawn
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from io import BytesIO
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -145,16 +146,12 @@ def draw_history(history: dict[str, Floats]) -> Any:
     return figure
 
 
-def encode_movie(pictures: Sequence[bytes]) -> bytes:
+def encode_movie(pictures: Sequence[Path]) -> bytes:
     """PNG pictures of equal size put together as an animated GIF."""
     from PIL import Image
 
-    frames = [
-        Image.open(BytesIO(picture)).convert("P", palette=Image.Palette.ADAPTIVE)
-        for picture in pictures
-    ]
+    adaptive = Image.Palette.ADAPTIVE
+    first, *others = (Image.open(path).convert("P", palette=adaptive) for path in pictures)
     movie = BytesIO()
-    frames[0].save(
-        movie, format="GIF", save_all=True, append_images=frames[1:], duration=120, loop=0
-    )
+    first.save(movie, format="GIF", save_all=True, append_images=others, duration=120, loop=0)
     return movie.getvalue()

@@ -44,32 +44,26 @@ def pack_bodies(run: Simulation) -> dict[str, Any]:
         return {}
     scene = run.world.scene
     none = np.zeros((0, scene.dim))
-    corners = [
-        getattr(body.shape, "vertices", none) if body.movable else none for body in scene.bodies
-    ]
+    corners = [getattr(b.shape, "vertices", none) if b.movable else none for b in scene.bodies]
     # the number of the body of the file's scene that each body is a part of
     whole = list(range(len(scene.bodies) - len(run.broken)))
     for event in run.broken:
         whole.append(whole[event.body])
     arrays: dict[str, Any] = {
         "body_corners": np.concatenate(corners),
-        "body_count": np.array([len(each) for each in corners]),
-        "body_mass": np.array([body.mass for body in scene.bodies]),
-        "body_inertia": np.array([body.inertia for body in scene.bodies if body.movable]),
-        "body_whole": np.array(whole),
-        "broken": np.array([astuple(event) for event in run.broken])
-        .reshape(-1, len(fields(Broken))),
-    }  # fmt: skip
-    worn = run.worn
-    if worn is not None:
+        "body_count": [len(each) for each in corners],
+        "body_mass": [body.mass for body in scene.bodies],
+        "body_inertia": [body.inertia for body in scene.bodies if body.movable],
+        "body_whole": whole,
+        "broken": np.reshape([astuple(event) for event in run.broken], (-1, len(fields(Broken)))),
+    }
+    if (worn := run.worn) is not None:
         grains = [grain for grain in worn.grains if grain is not None]
-        arrays |= {
-            "wear_sums": np.array([worn.volume, worn.work, worn.mass, worn.energy]),
-            "wear_counts": np.array([-1 if g is None else len(g.lost) for g in worn.grains]),
-        }
+        arrays["wear_sums"] = [worn.volume, worn.work, worn.mass, worn.energy]
+        arrays["wear_counts"] = [-1 if g is None else len(g.lost) for g in worn.grains]
         for name in WORN if grains else ():
             arrays[f"wear_{name}"] = np.concatenate([getattr(grain, name) for grain in grains])
-    return arrays
+    return {name: np.asarray(one) for name, one in arrays.items()}
 
 
 def restore_bodies(run: Simulation, frame: dict[str, Any]) -> None:
@@ -94,17 +88,15 @@ def rebuild_frame_scene(frame: dict[str, Any], scene: Scene) -> Scene:
     """The bodies of a frame, where ``scene`` is the one of the file; itself if none has changed."""
     if "body_corners" not in frame:
         return scene
-    ends = np.cumsum(frame["body_count"])
     made = Scene(scene.dim, scene.gravity)
-    moving = 0
-    for number, whole in enumerate(frame["body_whole"]):
+    inertias = iter(frame["body_inertia"])
+    each = np.split(frame["body_corners"], np.cumsum(frame["body_count"])[:-1])
+    for whole, mass, corners in zip(frame["body_whole"], frame["body_mass"], each, strict=True):
         body = scene.bodies[whole]
-        corners = frame["body_corners"][ends[number] - frame["body_count"][number] : ends[number]]
         if body.movable:
-            inertia, moving = frame["body_inertia"][moving], moving + 1
+            inertia = next(inertias)
             inertia = float(inertia) if scene.dim == 2 else inertia
-            mass = float(frame["body_mass"][number])
-            body = replace(body, mass=mass, inertia=inertia)
+            body = replace(body, mass=float(mass), inertia=inertia)
             if len(corners) and not np.array_equal(corners, body.shape.vertices):
                 body = replace(body, shape=type(body.shape).from_corners(corners))
         made.bodies.append(body)
@@ -141,12 +133,10 @@ class RunFolder(run_folder.RunFolder):
         arrays |= {
             f"contact_{f.name}": getattr(run.contacts, f.name) for f in fields(ContactForces)
         }
-        arrays |= {name: np.asarray(getattr(run, name)) for name in COUNTERS}
-        arrays |= {"energy": np.asarray(run.energy), "overlap": np.asarray(run.overlap)}
-        arrays |= {f"pace_{f.name}": np.asarray(getattr(run.pace, f.name)) for f in fields(Pace)}
-        arrays |= pack_bodies(run)
+        arrays |= {f"pace_{f.name}": getattr(run.pace, f.name) for f in fields(Pace)}
+        arrays |= {name: getattr(run, name) for name in (*COUNTERS, "energy", "overlap")}
         buffer = io.BytesIO()
-        np.savez_compressed(buffer, cpu=np.asarray(cpu), **arrays)
+        np.savez_compressed(buffer, cpu=cpu, **arrays, **pack_bodies(run))
         write_whole(self.path / FRAME.format(number), buffer.getvalue())
 
     def frames(self) -> list[Path]:
