@@ -12,6 +12,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from qdem_fem.files import Floats, Integers, MeshError
 
@@ -146,11 +149,8 @@ def find_index_problems(elements: Integers, n_nodes: int) -> tuple[BoolArray, li
             f"element {bad[0]} names nodes {row}"
         )
         one = elements.min() == 1 and elements.max() == n_nodes
-        problems.append(
-            Problem(text, "subtract 1: nodes count from 0" if one else "nodes count from 0")
-        )
-    a, b, c, d = elements.T
-    twice = (a == b) | (a == c) | (a == d) | (b == c) | (b == d) | (c == d)
+        problems.append(Problem(text, "subtract 1: " * bool(one) + "nodes count from 0"))
+    twice = (np.diff(np.sort(elements, axis=1), axis=1) == 0).any(axis=1)
     bad = np.flatnonzero(twice)
     if len(bad):
         text = (
@@ -223,10 +223,6 @@ def find_doubts(nodes: Floats, elements: Integers, gradients: Floats) -> Iterato
 
     ``gradients`` (m, 3, 3) [1/m] of the right-handed elements.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-    from scipy.spatial import cKDTree
-
     count, n = len(elements), len(nodes)
     face = np.sort(elements[:, [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]].reshape(-1, 3), axis=1)
     _, edge = np.unique(face[:, 0] * n + face[:, 1], return_inverse=True)

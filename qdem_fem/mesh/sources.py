@@ -137,9 +137,8 @@ def _read_meshio(mesh: Any, where: str) -> MeshParts:
         rest = "" if marks else "; one array alone, of whole numbers, would number groups"
         warn_user(f"{where}: these data of its cells are not used: {', '.join(unused)}{rest}")
     if marks == PHYSICAL:
-        tags = [t for t, b in zip(mesh.cell_data[PHYSICAL], mesh.cells, strict=True)
-                if b.type == "tetra"]  # fmt: skip
-        elements, element_sets = _join_groups(elements, np.concatenate(tags), element_sets)
+        tags = mesh.get_cell_data(PHYSICAL, "tetra")
+        elements, element_sets = _join_groups(elements, tags, element_sets)
     return MeshParts(mesh.points, elements, node_sets, element_sets)
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from qdem_fem.files import Floats
+from qdem_fem.grains import find_edge_angles, find_surface_edges
 from qdem_fem.report.figures import choose_unit, round_below, write_figure
 
 if TYPE_CHECKING:
@@ -121,8 +122,6 @@ def _paint(panel: Axes, corners: Floats, values: Floats, label: str) -> None:
 def _outline(panel: Axes, bodies: Sequence[Any], frame: Floats) -> None:
     """Sharp edges of the undeformed bodies."""
     from matplotlib.collections import LineCollection
-
-    from qdem_fem.grains import find_edge_angles, find_surface_edges
 
     lines = []
     for body in bodies:

@@ -5,16 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from qdem_fem.files import Integers
+from qdem_fem.mesh import TetMesh
 from qdem_fem.tables.keys import BodyTable, Output, Scene, SeriesTable, SimulationTable
 from trackbed.run_files import digest_file
 from trackbed.scene_files import Problem, SceneText, Table
-
-if TYPE_CHECKING:
-    from qdem_fem.mesh import TetMesh
-
 
 ROWS_MOST = 100_000_000
 """Most rows of a table that is written."""

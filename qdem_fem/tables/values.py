@@ -7,20 +7,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from qdem_fem.files import Floats, Integers, Series, make_ramp, warn_user
+from qdem_fem.mesh import TetMesh, make_box_mesh, read_mesh
 from qdem_fem.tables.keys import Mesh, Nodes, SeriesTable
 from qdem_fem.tables.types import WrongKey
 from trackbed.errors import LibraryMissing, UsageError
 from trackbed.scene_files import suggest_word
 from trackbed.series_file import TIMES, read_columns
-
-if TYPE_CHECKING:
-    from qdem_fem.mesh import TetMesh
-
 
 SIDE = 1e-6
 """Distance to a side, over the size of the mesh, within which a node lies on it; mesh files keep
@@ -44,8 +40,6 @@ def make_body_mesh(table: Mesh, folder: Path, key: str) -> TetMesh:
 
     Raises `MeshError`, or `WrongKey` with the key for measures that make no mesh.
     """
-    from qdem_fem.mesh import make_box_mesh, read_mesh
-
     if (table.file is None) == (table.box is None):
         raise WrongKey(key, "give one of file, box")
     if table.box is None:
@@ -61,8 +55,7 @@ def make_body_mesh(table: Mesh, folder: Path, key: str) -> TetMesh:
 
 def list_node_sets(mesh: TetMesh) -> dict[str, Integers]:
     """The mesh's own node sets, and x-min ... z-max where it has none of these names."""
-    used = np.ones(len(mesh.nodes), bool)
-    used[mesh.unused] = False
+    used = ~np.isin(np.arange(len(mesh.nodes)), mesh.unused)
     low, high = mesh.nodes[used].min(axis=0), mesh.nodes[used].max(axis=0)
     near = SIDE * float((high - low).max())
     sets = {}
@@ -83,8 +76,7 @@ def find_named_nodes(nodes: Nodes, mesh: TetMesh, key: str) -> Integers:
         raise WrongKey(key, f"give exactly one of {', '.join(KINDS)}")
     kind = given[0]
     x = mesh.nodes
-    used = np.ones(len(x), bool)
-    used[mesh.unused] = False
+    used = ~np.isin(np.arange(len(x)), mesh.unused)
     if nodes.set is not None:
         sets = list_node_sets(mesh)
         if nodes.set not in sets:

@@ -126,6 +126,10 @@ def build_scene(file: SceneFile) -> Scene:
         given = table.model_dump(include={"friction", "restitution"}, exclude_none=True)
         return tables.surface.model_dump() | given
 
+    def pour(table: Poured, placed: Iterator[tuple[Any, Floats, Any]]) -> None:
+        for shape, position, angle in placed:
+            scene.add(shape, density=table.density, position=position, angle=angle, **merge(table))
+
     for i, ground in enumerate(tables.ground):
         with name_shape(f"ground {i}"):
             plane = shapes.HalfSpace(ground.normal, ground.offset)
@@ -137,16 +141,10 @@ def build_scene(file: SceneFile) -> Scene:
         if body.inertia is not None:
             scene.bodies[number] = replace(scene.bodies[number], inertia=body.inertia)
     for grains in tables.grains:
-        for shape, position, angle in place_grains(grains, tables.dimensions):
-            scene.add(
-                shape, density=grains.density, position=position, angle=angle, **merge(grains)
-            )
+        pour(grains, place_grains(grains, tables.dimensions))
     for number, (stones, scans) in enumerate(zip(tables.stones or (), file.scans, strict=True)):
         try:
-            for shape, position, angle in place_stones(stones, scans):
-                scene.add(
-                    shape, density=stones.density, position=position, angle=angle, **merge(stones)
-                )
+            pour(stones, place_stones(stones, scans))
         except SceneError as error:
             raise error.relocate(f"stones.{number}.grading") from error
     return scene
