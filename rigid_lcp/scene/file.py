@@ -252,10 +252,9 @@ def list_doubts(tables: SceneTables) -> list[str]:
         if isinstance(one, Poured) and one.size:
             found.append(describe_implausible("grain", one.size[1], f"{key}.size"))
         if isinstance(one, BodyTable):
-            size = 2 * (one.radius or 0.0) if one.vertices is None else float(
-                np.ptp(np.array(one.vertices), axis=0).max()
-            )  # fmt: skip
-            found.append(describe_implausible("body", max(size, *(one.box or [0.0])), key))
+            edges = one.box or np.ptp(one.vertices or [[0.0]], axis=0)
+            size = max(2 * (one.radius or 0.0), *edges)
+            found.append(describe_implausible("body", float(size), key))
     return [*(said for said in found if said), *list_unused(tables)]
 
 

@@ -257,20 +257,17 @@ def describe_scans(file: SceneFile) -> dict[str, list[str]]:
 def list_left_out(file: SceneFile) -> list[str]:
     """Physics that the scene does not name, or gives in vain: it is not computed."""
     tables = file.tables
-    absent = list(list_unused(tables))
-    if not _has_any(file, "friction"):
-        absent.append("friction: no surface has any; one unknown a contact, no tangential forces")
-    if not _has_any(file, "restitution"):
-        absent.append("restitution: every impact is inelastic")
-    if not any(is_felt(load, tables) for load in tables.load):
-        absent.append("loads: none but gravity")
-    absent.append("elastic deformation: grains are rigid; forces where they are not unique are one "
-                  "of many")  # fmt: skip
-    if tables.wear is None:
-        absent.append("abrasion: no corner wears")
-    if tables.strength is None:
-        absent.append("fragmentation: no grain breaks")
-    return absent
+    missing = [
+        (not _has_any(file, "friction"),
+         "friction: no surface has any; one unknown a contact, no tangential forces"),
+        (not _has_any(file, "restitution"), "restitution: every impact is inelastic"),
+        (not any(is_felt(load, tables) for load in tables.load), "loads: none but gravity"),
+        (True, "elastic deformation: grains are rigid; forces where they are not unique are one "
+               "of many"),
+        (tables.wear is None, "abrasion: no corner wears"),
+        (tables.strength is None, "fragmentation: no grain breaks"),
+    ]  # fmt: skip
+    return [*list_unused(tables), *(text for absent, text in missing if absent)]
 
 
 def summarise_run(

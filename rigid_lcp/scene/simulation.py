@@ -232,15 +232,14 @@ class Simulation:
         """What the forces of the last step do to the bodies (section 8, end, and section 10)."""
         if self.worn is not None and self.wear is not None:
             step_wear(self.worn, self.wear, self.contacts, before, self.motion, h)
-            cut = None
             if self.steps % self.wear.every == 0:
                 try:
                     cut = swap_worn(self.world.scene, self.motion, self.worn)
                 except ShapeError as error:
                     raise error.relocate(f"{error.where} at {self.time:.6g} s") from error
-            if cut is not None:
-                scene, self.worn = cut
-                self.world, self.motion = motion.make_world(scene)
+                if cut is not None:
+                    scene, self.worn = cut
+                    self.world, self.motion = motion.make_world(scene)
         if self.breakage is not None and self.steps % self.breakage.every == 0:
             forces = self.unique_forces() if self.breakage.unique else self.contacts
             found = find_breaks(self.world.scene, self.motion, forces, self.breakage)

@@ -140,19 +140,16 @@ def _read_sparse(text: str, size: int) -> tuple[sp.csr_array, _Numbers]:
     columns = list(COLUMN.finditer(text))
     if len(columns) != size or any(int(each[1]) != k for k, each in enumerate(columns)):
         raise ValueError(f"it prints {len(columns)} columns of W, not 0 to {size - 1} in order")
-    row, value = [], []
+    entries = [np.zeros((0, 2))]
     for k, each in enumerate(columns):
         count = int(each[3]) - int(each[2]) + 1
         until = columns[k + 1].start() if k + 1 < size else len(text)
         inside = _Numbers(text[each.end() : until].replace(":", " "))
-        entries = inside.take(2 * max(count, 0), f"column {k} of W").reshape(-1, 2)
-        row.append(entries[:, 0].astype(np.int64))
-        value.append(entries[:, 1])
-    counts = [len(each) for each in row]
-    rows = np.concatenate(row) if row else np.zeros(0, dtype=np.int64)
-    if len(rows) and (rows.min() < 0 or rows.max() >= size):
-        raise ValueError(f"W has a value in row {rows.max()} of {size}")
-    values = np.concatenate(value) if value else np.zeros(0)
-    matrix = sp.coo_array((values, (rows, np.repeat(np.arange(size), counts))), shape=(size, size))
+        entries.append(inside.take(2 * max(count, 0), f"column {k} of W").reshape(-1, 2))
+    column = np.repeat(np.arange(size), [len(each) for each in entries[1:]])
+    row, value = np.concatenate(entries).T
+    if len(row) and (row.min() < 0 or row.max() >= size):
+        raise ValueError(f"W has a value in row {row.max():.0f} of {size}")
+    matrix = sp.coo_array((value, (row.astype(np.int64), column)), shape=(size, size))
     rest = inside if columns else _Numbers("")
     return sp.csr_array(matrix), rest
