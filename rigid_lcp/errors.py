@@ -6,6 +6,7 @@ from trackbed.errors import (
     LibraryMissing,
     NotConverged,
     NotCredible,
+    NotValid,
     SceneError,
     TrackbedError,
     UsageError,
@@ -20,16 +21,12 @@ RigidError = TrackbedError
 """Base of all errors that `rigid_lcp` raises."""
 
 
-class ProblemError(TrackbedError):
+class ProblemError(NotValid):
     """A friction problem can not be posed: W is not square, q holds NaN, friction is negative."""
 
-    exit_code = 3
 
-
-class ShapeError(TrackbedError):
+class ShapeError(NotValid):
     """A shape can not be used: a polygon is not convex, a body has no volume."""
-
-    exit_code = 3
 
 
 class Overlapping(NotCredible):

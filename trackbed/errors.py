@@ -51,16 +51,18 @@ class UsageError(TrackbedError):
     exit_code = 2
 
 
-class SceneError(TrackbedError):
+class NotValid(TrackbedError):
+    """What is given can not be computed with: a scene, a mesh, a material, a problem."""
+
+    exit_code = 3
+
+
+class SceneError(NotValid):
     """A scene, or its file, is not valid."""
 
-    exit_code = 3
 
-
-class MeshError(TrackbedError):
+class MeshError(NotValid):
     """A mesh can not be used: no tetrahedra, no volume, coordinates that are not finite, ..."""
-
-    exit_code = 3
 
 
 class LibraryMissing(TrackbedError):

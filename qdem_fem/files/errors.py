@@ -11,6 +11,7 @@ from trackbed.errors import (
     MeshError,
     NotConverged,
     NotCredible,
+    NotValid,
     SceneError,
     TrackbedError,
     UsageError,
@@ -27,16 +28,12 @@ QdemError = TrackbedError
 """Base of all errors that `qdem_fem` raises."""
 
 
-class MaterialError(TrackbedError):
+class MaterialError(NotValid):
     """A material breaks a law of physics: density zero, Poisson's ratio 0.5, ..."""
 
-    exit_code = 3
 
-
-class ConditionError(TrackbedError):
+class ConditionError(NotValid):
     """A boundary condition or load can not be used: it names no node, holds NaN, ..."""
-
-    exit_code = 3
 
 
 class Unstable(NotCredible):

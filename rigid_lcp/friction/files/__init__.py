@@ -1,5 +1,1 @@
 """Friction problems as files: npz, FCLIB, Siconos."""
-
-from rigid_lcp.friction.files.damaged import DAMAGED
-
-__all__ = ["DAMAGED"]

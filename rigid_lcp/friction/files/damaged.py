@@ -1,12 +1,7 @@
-"""What reading a damaged file raises, and errors that name the file and a part of it."""
+"""Errors that name a damaged file and a part of it."""
 
 from __future__ import annotations
 
-import lzma
-import struct
-import tokenize
-import zipfile
-import zlib
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,13 +10,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from rigid_lcp.errors import ProblemError
-
-DAMAGED = (
-    OSError, EOFError, ValueError, LookupError, TypeError, AttributeError, RuntimeError,
-    MemoryError, OverflowError, SyntaxError, tokenize.TokenError, struct.error, zipfile.BadZipFile,
-    zlib.error, lzma.LZMAError,
-)  # fmt: skip
-"""What numpy and h5py raise as they read a damaged file: any byte of it may be wrong."""
+from trackbed.memory import DAMAGED
 
 
 @contextmanager
