@@ -81,17 +81,14 @@ def find_opposite_pair(points: Floats, forces: Floats) -> tuple[int, int, float]
     The squeeze of a pair is the lesser of the two forces' components along the line that joins
     them, towards each other.  None where no pair squeezes.
     """
-    best: tuple[int, int, float] | None = None
-    for i in range(len(points)):
-        for j in range(i + 1, len(points)):
-            apart = points[j] - points[i]
-            distance = float(np.linalg.norm(apart))
-            if distance == 0:
-                continue
-            squeeze = min(float(forces[i] @ apart), -float(forces[j] @ apart)) / distance
-            if squeeze > (best[2] if best else 0.0):
-                best = (i, j, squeeze)
-    return best
+    apart = points - points[:, None]  # from i to j
+    distance = np.linalg.norm(apart, axis=2)
+    towards = np.einsum("id,ijd->ij", forces, apart)
+    squeeze = np.minimum(towards, towards.T) / np.where(distance > 0, distance, np.inf)
+    if not squeeze.max(initial=0.0) > 0:
+        return None
+    i, j = divmod(int(squeeze.argmax()), len(points))
+    return i, j, float(squeeze[i, j])
 
 
 def find_splitting_line(
