@@ -35,17 +35,12 @@ def find_radius_ratios(nodes: Floats, elements: Integers) -> Floats:
     """
     x = nodes[elements]
     e = x[:, 1:] - x[:, :1]
-    sixfold = np.einsum("mi,mi->m", e[:, 0], np.cross(e[:, 1], e[:, 2]))
-    faces = [(0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3)]
-    twice = sum(
-        np.linalg.norm(np.cross(x[:, b] - x[:, a], x[:, c] - x[:, a]), axis=1) for a, b, c in faces
-    )
+    across = [np.cross(e[:, k - 2], e[:, k - 1]) for k in range(3)]  # e1 x e2, e2 x e0, e0 x e1
+    sixfold = np.einsum("mi,mi->m", e[:, 0], across[0])
+    faces = [*reversed(across), np.cross(x[:, 2] - x[:, 1], x[:, 3] - x[:, 1])]
+    twice = sum(np.linalg.norm(face, axis=1) for face in faces)
     squares = (e**2).sum(axis=2)
-    centre = (
-        squares[:, :1] * np.cross(e[:, 1], e[:, 2])
-        + squares[:, 1:2] * np.cross(e[:, 2], e[:, 0])
-        + squares[:, 2:] * np.cross(e[:, 0], e[:, 1])
-    )
+    centre = sum(squares[:, k, None] * across[k] for k in range(3))
     # inscribed: 3 V/A = sixfold/twice; circumscribed: |centre|/(12 V)
     size = 6 * sixfold**2 / (twice * np.linalg.norm(centre, axis=1))
     return np.asarray(size * np.sign(sixfold))

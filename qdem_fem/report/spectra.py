@@ -144,7 +144,7 @@ def find_peak_frequencies(
             _find_misfit, start, args=(elapsed / duration, target), x_scale="jac", method="lm",
             xtol=1e-14, ftol=1e-14, gtol=1e-14,
         )  # fmt: skip
-        left = _find_misfit(fit.x, elapsed / duration, target)
+        left = fit.fun
         found = _make_modes(fit.x, elapsed / duration, target, duration, scale)
         if any(not 0 < mode.frequency < 0.5 / step for mode in found):
             break
@@ -190,17 +190,10 @@ def _make_modes(
     unknowns: Floats, t: Floats, target: Floats, duration: float, scale: float
 ) -> list[Mode]:
     weight = np.linalg.lstsq(_make_columns(unknowns, t), target, rcond=None)[0]
-    pairs = np.reshape(unknowns, (-1, 2))
-    cosine, sine = weight[: len(pairs)], weight[len(pairs) : -1]
-    return [
-        Mode(
-            float(cycles / duration),
-            float(decay / duration),
-            float(scale * np.hypot(cosine[i], sine[i])),
-            float(np.arctan2(-sine[i], cosine[i])),
-        )
-        for i, (cycles, decay) in enumerate(pairs)
-    ]
+    frequency, decay = np.reshape(unknowns, (-1, 2)).T / duration
+    cosine, sine = np.split(weight[:-1], 2)
+    numbers = (frequency, decay, scale * np.hypot(cosine, sine), np.arctan2(-sine, cosine))
+    return [Mode(*row) for row in np.transpose(numbers).tolist()]
 
 
 def _check_record(time: Floats, values: Floats) -> tuple[float, Floats]:

@@ -78,9 +78,5 @@ def split_conditions(
 
 def _select_held(held: Constraints, mask: NDArray[np.bool_]) -> Constraints:
     """Some of the held components, and all rollers."""
-    return held._replace(
-        node_at=held.node_at[mask],
-        series=held.series[mask],
-        weight=held.weight[mask],
-        previous=held.previous[mask],
-    )
+    names = ("node_at", "series", "weight", "previous")
+    return held._replace(**{name: getattr(held, name)[mask] for name in names})

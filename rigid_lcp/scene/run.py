@@ -70,10 +70,8 @@ def restore_bodies(run: Simulation, frame: dict[str, Any]) -> None:
     if "body_corners" not in frame:
         return
     run.world, _ = make_world(rebuild_frame_scene(frame, run.world.scene))
-    run.broken = [
-        Broken(float(t), int(body), int(part), float(tension), float(strength))
-        for t, body, part, tension, strength in frame["broken"]
-    ]
+    broken = frame["broken"].tolist()
+    run.broken = [Broken(t, int(body), int(part), *why) for t, body, part, *why in broken]
     if "wear_counts" in frame:
         grains: list[WornShape | None] = []
         ends = np.cumsum(np.maximum(frame["wear_counts"], 0))
