@@ -7,7 +7,6 @@ is loaded only to read a file.
 from __future__ import annotations
 
 import os
-from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -109,12 +108,9 @@ def _read_meshio(mesh: Any, where: str) -> MeshParts:
         )  # fmt: skip
     blocks = [block.data for block in mesh.cells if block.type == "tetra"]
     if sum(len(block) for block in blocks) == 0:
-        counts: Counter[str] = Counter()
-        for block in mesh.cells:
-            counts[block.type] += len(block.data)
-        found = ", ".join(f"{count} of type {kind}" for kind, count in counts.items()) or "no cells"
+        found = ", ".join(f"{len(data)} of type {kind}" for kind, data in mesh.cells_dict.items())
         raise MeshError(
-            f"the mesh holds no tetrahedra, only {found}" if counts else "the mesh holds no cells",
+            f"the mesh holds no tetrahedra, only {found}" if found else "the mesh holds no cells",
             where=where,
             remedy="mesh the volume with tetrahedra (gmsh: `mesh.generate(3)`), and save them",
         )

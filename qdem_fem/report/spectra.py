@@ -122,8 +122,8 @@ def find_peak_frequencies(
     from scipy.optimize import least_squares
 
     step, values = _check_record(time, values)
-    elapsed: Floats = step * np.arange(len(values), dtype=float)
-    duration = float(elapsed[-1])
+    duration = step * (len(values) - 1)
+    t = np.linspace(0.0, 1.0, len(values))
     scale = float(np.abs(values - values.mean()).max())
     if scale == 0 or len(values) < 8:
         return []
@@ -138,14 +138,13 @@ def find_peak_frequencies(
             for peak in {_find_highest_peak(left, step, windowed) for windowed in (True, False)}
             for decay in MODES.decays
         ]
-        misfits = [_find_misfit(np.array(one), elapsed / duration, target) for one in starts]
-        start = min(zip(starts, misfits, strict=True), key=lambda one: float(one[1] @ one[1]))[0]
+        start = min(starts, key=lambda one: np.linalg.norm(_find_misfit(one, t, target)))
         fit = least_squares(
-            _find_misfit, start, args=(elapsed / duration, target), x_scale="jac", method="lm",
+            _find_misfit, start, args=(t, target), x_scale="jac", method="lm",
             xtol=1e-14, ftol=1e-14, gtol=1e-14,
         )  # fmt: skip
         left = fit.fun
-        found = _make_modes(fit.x, elapsed / duration, target, duration, scale)
+        found = _make_modes(fit.x, t, target, duration, scale)
         if any(not 0 < mode.frequency < 0.5 / step for mode in found):
             break
         if found[-1].amplitude < floor * max(mode.amplitude for mode in found):
@@ -172,7 +171,7 @@ def _find_highest_peak(values: Floats, step: float, windowed: bool) -> float:
     return float((top + np.clip(shift, -1, 1)) / (length * step))
 
 
-def _make_columns(unknowns: Floats, t: Floats) -> Floats:
+def _make_columns(unknowns: npt.ArrayLike, t: Floats) -> Floats:
     """Cosine and sine of each damped oscillation, and the constant: (k, 2 modes + 1)."""
     cycles, decay = np.reshape(unknowns, (-1, 2)).T
     damped = np.exp(-np.clip(decay, -50, 500) * t[:, None])
@@ -180,7 +179,7 @@ def _make_columns(unknowns: Floats, t: Floats) -> Floats:
     return np.hstack([damped * np.cos(angle), damped * np.sin(angle), np.ones((len(t), 1))])
 
 
-def _find_misfit(unknowns: Floats, t: Floats, target: Floats) -> Floats:
+def _find_misfit(unknowns: npt.ArrayLike, t: Floats, target: Floats) -> Floats:
     columns = _make_columns(unknowns, t)
     weight = np.linalg.lstsq(columns, target, rcond=None)[0]
     return np.asarray(target - columns @ weight)

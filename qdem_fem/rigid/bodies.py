@@ -65,16 +65,14 @@ class RigidBodies:
         inertia[:, 3:, 3:] = self._tensor
         self._root = np.linalg.inv(np.linalg.cholesky(inertia))
         """Of the inertia, such that ``root K root^T`` has the squared frequencies, (b, 6, 6)."""
-        starts = first_node[self.number]
-        self.nodes = np.concatenate(
-            [start + np.arange(len(b.nodes)) for b, start in zip(self.bodies, starts, strict=True)]
-        )
-        """All nodes, in the numbers of all bodies, (v,)."""
         counts = [len(body.nodes) for body in self.bodies]
         self.first = np.concatenate([[0], np.cumsum(counts)])
         """First of the nodes of each body, and the end, (b + 1,)."""
         self.body = np.repeat(np.arange(len(counts)), counts)
         """The rigid body that each is of, (v,)."""
+        start = first_node[self.number] - self.first[:-1]
+        self.nodes = np.arange(len(self.body)) + start[self.body]
+        """All nodes, in the numbers of all bodies, (v,)."""
         centre = np.array([own.centre for own in self.own])
         self.arm = np.concatenate([body.nodes for body in self.bodies]) - centre[self.body]
         self.place = assembly.place[self.nodes]
