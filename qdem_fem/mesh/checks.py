@@ -105,8 +105,7 @@ def convert_elements(raw: Any) -> tuple[Integers, list[Problem]]:
         broken = ~(np.abs(array.astype(np.float64)) < 2.0**53) | (array != np.floor(array))
         bad = np.flatnonzero(broken.any(axis=1))
         if len(bad):
-            row = array[bad[0]].tolist()
-            text = f"no whole numbers in {name_some('element', bad)}; element {bad[0]} names {row}"
+            text = name_elements("no whole numbers", bad, f"names {array[bad[0]].tolist()}")
             return none, [Problem(text, remedy)]
     return np.array(array, dtype=np.int64, order="C"), []
 
@@ -143,20 +142,15 @@ def find_index_problems(elements: Integers, n_nodes: int) -> tuple[BoolArray, li
     out = (elements.view(np.uint64) >= np.uint64(n_nodes)).any(axis=1)
     bad = np.flatnonzero(out)
     if len(bad):
-        row = elements[bad[0]].tolist()
-        text = (
-            f"indices out of range, as there are {n_nodes} nodes: {name_some('element', bad)}; "
-            f"element {bad[0]} names nodes {row}"
-        )
+        what = f"indices out of range, as there are {n_nodes} nodes"
+        text = name_elements(what, bad, f"names nodes {elements[bad[0]].tolist()}")
         one = elements.min() == 1 and elements.max() == n_nodes
         problems.append(Problem(text, "subtract 1: " * bool(one) + "nodes count from 0"))
     twice = (np.diff(np.sort(elements, axis=1), axis=1) == 0).any(axis=1)
     bad = np.flatnonzero(twice)
     if len(bad):
-        text = (
-            f"a node named twice by one element: {name_some('element', bad)}; "
-            f"element {bad[0]} names {elements[bad[0]].tolist()}"
-        )
+        row = elements[bad[0]].tolist()
+        text = name_elements("a node named twice by one element", bad, f"names {row}")
         problems.append(Problem(text, "remove the elements that collapsed, and mesh again there"))
     return ~(out | twice), problems
 
@@ -171,10 +165,8 @@ def find_repeated_elements(elements: Integers, usable: BoolArray) -> list[Proble
     if not len(again):
         return []
     bad = numbers[again]
-    text = (
-        f"the same four nodes as an earlier element: {name_some('element', bad)}; "
-        f"element {bad[0]} repeats element {numbers[lead[again[0]]]}"
-    )
+    repeated = f"repeats element {numbers[lead[again[0]]]}"
+    text = name_elements("the same four nodes as an earlier element", bad, repeated)
     return [Problem(text, "keep one of the elements that repeat")]
 
 
@@ -203,11 +195,11 @@ def find_flat_elements(
     if len(bad) == 0:
         return volume, []
     at = bad[0]
-    text = (
-        f"no volume: {name_some('element', bad)}; element {at} of nodes {elements[at].tolist()} "
-        f"has {volume[at]:.3g} m^3, {abs(shape[at]):.1e} of the cube of its longest edge "
-        f"(at least {np.fmax(FLAT, noise[at]):.0e} is needed)"
+    measured = (
+        f"of nodes {elements[at].tolist()} has {volume[at]:.3g} m^3, {abs(shape[at]):.1e} of the "
+        f"cube of its longest edge (at least {np.fmax(FLAT, noise[at]):.0e} is needed)"
     )
+    text = name_elements("no volume", bad, measured)
     return volume, [Problem(text, "remove the flat elements or mesh again there")]
 
 
@@ -216,6 +208,11 @@ def name_some(kind: str, indices: Integers) -> str:
     shown = ", ".join(str(index) for index in indices[:_SHOWN])
     more = f" and {len(indices) - _SHOWN} more" if len(indices) > _SHOWN else ""
     return f"{kind}{'s' if len(indices) > 1 else ''} {shown}{more}"
+
+
+def name_elements(what: str, bad: Integers, first: str) -> str:
+    """``what`` is wrong with which elements, and in words what the ``first`` of them has."""
+    return f"{what}: {name_some('element', bad)}; element {bad[0]} {first}"
 
 
 def find_doubts(nodes: Floats, elements: Integers, gradients: Floats) -> Iterator[str]:

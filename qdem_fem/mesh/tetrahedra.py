@@ -133,8 +133,7 @@ def find_gradients(nodes: Floats, elements: Integers) -> tuple[Floats, Floats]:
     bad = np.flatnonzero(~(volumes > 0))
     if len(bad):
         raise MeshError(
-            f"no positive volume: {checks.name_some('element', bad)}; "
-            f"element {bad[0]} has {volumes[bad[0]]:.3g} m^3",
+            checks.name_elements("no positive volume", bad, f"has {volumes[bad[0]]:.3g} m^3"),
             where="mesh", remedy="pass the mesh through read_mesh first",
         )  # fmt: skip
     return gradients, volumes
