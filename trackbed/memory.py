@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import lzma
 import os
 import resource
-import struct
-import tokenize
 import zipfile
-import zlib
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -41,19 +37,11 @@ def refuse_more_memory(needed: float, what: str, where: str, remedy: str) -> Non
         )  # fmt: skip
 
 
-DAMAGED = (
-    OSError, EOFError, ValueError, LookupError, TypeError, AttributeError, RuntimeError,
-    MemoryError, OverflowError, SyntaxError, tokenize.TokenError, struct.error, zipfile.BadZipFile,
-    zlib.error, lzma.LZMAError,
-)  # fmt: skip
-"""What numpy and h5py raise as they read a damaged file: any byte of it may be wrong."""
-
-
 def read_arrays(path: Path) -> dict[str, Any]:
     """Arrays of an ``.npz`` by name; no objects are unpacked.
 
-    Raises `OutOfMemory` for more than there is room for, whatever its packed size, and one of
-    `DAMAGED`.
+    Raises `OutOfMemory` for more than there is room for, whatever its packed size, and what numpy
+    raises for a damaged file, which are many kinds.
     """
     import numpy as np
 

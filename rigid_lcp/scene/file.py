@@ -126,10 +126,6 @@ def build_scene(file: SceneFile) -> Scene:
         given = table.model_dump(include={"friction", "restitution"}, exclude_none=True)
         return tables.surface.model_dump() | given
 
-    def pour(table: Poured, placed: Iterator[tuple[Any, Floats, Any]]) -> None:
-        for shape, position, angle in placed:
-            scene.add(shape, density=table.density, position=position, angle=angle, **merge(table))
-
     for i, ground in enumerate(tables.ground):
         with name_shape(f"ground {i}"):
             plane = shapes.HalfSpace(ground.normal, ground.offset)
@@ -141,10 +137,16 @@ def build_scene(file: SceneFile) -> Scene:
         if body.inertia is not None:
             scene.bodies[number] = replace(scene.bodies[number], inertia=body.inertia)
     for grains in tables.grains:
-        pour(grains, place_grains(grains, tables.dimensions))
+        for shape, position, angle in place_grains(grains, tables.dimensions):
+            scene.add(
+                shape, density=grains.density, position=position, angle=angle, **merge(grains)
+            )
     for number, (stones, scans) in enumerate(zip(tables.stones or (), file.scans, strict=True)):
         try:
-            pour(stones, place_stones(stones, scans))
+            for shape, position, angle in place_stones(stones, scans):
+                scene.add(
+                    shape, density=stones.density, position=position, angle=angle, **merge(stones)
+                )
         except SceneError as error:
             raise error.relocate(f"stones.{number}.grading") from error
     return scene

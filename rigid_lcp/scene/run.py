@@ -20,11 +20,12 @@ import numpy as np
 from rigid_lcp.arrays import Floats
 from rigid_lcp.contact import ContactForces
 from rigid_lcp.errors import SceneError, UsageError
+from rigid_lcp.friction.files import DAMAGED
 from rigid_lcp.motion import Motion, Pace, Scene, make_world
 from rigid_lcp.scene.file import SceneFile, build_scene, is_felt, list_unused, make_loads
 from rigid_lcp.scene.simulation import Simulation
 from rigid_lcp.wear import Breakage, Broken, Wear, WearState, WornShape
-from trackbed.memory import DAMAGED, read_arrays
+from trackbed.memory import read_arrays
 from trackbed.run_files import RESULT, write_whole
 from trackbed.run_files import folder as run_folder
 

@@ -1,7 +1,12 @@
-"""Errors that name a damaged file and a part of it."""
+"""What reading a damaged file raises, and errors that name the file and a part of it."""
 
 from __future__ import annotations
 
+import lzma
+import struct
+import tokenize
+import zipfile
+import zlib
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,7 +15,13 @@ from typing import Any
 from numpy.typing import NDArray
 
 from rigid_lcp.errors import ProblemError
-from trackbed.memory import DAMAGED
+
+DAMAGED = (
+    OSError, EOFError, ValueError, LookupError, TypeError, AttributeError, RuntimeError,
+    MemoryError, OverflowError, SyntaxError, tokenize.TokenError, struct.error, zipfile.BadZipFile,
+    zlib.error, lzma.LZMAError,
+)  # fmt: skip
+"""What numpy and h5py raise as they read a damaged file: any byte of it may be wrong."""
 
 
 @contextmanager
