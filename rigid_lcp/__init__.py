@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from rigid_lcp.collision import collide
     from rigid_lcp.errors import RigidError
     from rigid_lcp.friction.auto import solve_friction
+    from rigid_lcp.friction.files import read_problem
     from rigid_lcp.friction.problem import BodySpace, FrictionProblem, FrictionSolution
     from rigid_lcp.motion import Scene
     from rigid_lcp.scene import Simulation
@@ -26,6 +27,7 @@ _ROOMS = {
     "collision": ("collide",),
     "errors": ("RigidError",),
     "friction.auto": ("solve_friction",),
+    "friction.files": ("read_problem",),
     "friction.problem": ("BodySpace", "FrictionProblem", "FrictionSolution"),
     "motion": ("Scene",),
     "scene": ("Simulation",),
@@ -36,7 +38,7 @@ _HOMES = {name: room for room, names in _ROOMS.items() for name in names}
 __all__ = [
     "BodySpace", "Breakage", "Disc", "FrictionProblem", "FrictionSolution", "HalfSpace", "Polygon",
     "Polyhedron", "RigidError", "Scene", "Simulation", "Sphere", "Wear", "collide", "make_box",
-    "solve_friction",
+    "read_problem", "solve_friction",
 ]  # fmt: skip
 
 

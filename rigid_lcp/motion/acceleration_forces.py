@@ -9,7 +9,7 @@ import scipy.sparse as sp
 
 from rigid_lcp.arrays import Floats
 from rigid_lcp.errors import NoSolution, NotConverged
-from rigid_lcp.friction.auto import solve_friction
+from rigid_lcp.friction.auto import solve_problem
 from rigid_lcp.friction.methods import solve_dantzig, solve_pivoting
 from rigid_lcp.friction.problem import BodySpace, FrictionSolution, make_problem
 from rigid_lcp.motion.time_stepping import find_forces_error
@@ -40,10 +40,10 @@ def find_forces(
     lasting = try_lasting_forces(bodies, offset, friction, slip)
     if lasting is not None and lasting.residual <= tolerance:
         return lasting, find_forces_error(bodies, lasting, gravity)
+    problem = make_problem(bodies, offset, friction, dim)
     if not (slip.any(axis=1) & (friction > 0)).any():
-        solution = solve_friction(bodies, offset, friction, dim=dim, tolerance=tolerance)
+        solution = solve_problem(problem, tolerance=tolerance)
     elif dim == 2:
-        problem = make_problem(bodies, offset, friction, dim)
         solution = solve_pivoting(problem, None, tolerance, tangential_velocity=slip[:, 0])
         if not solution.solved:
             solution = solve_dantzig(problem, None, tolerance, tangential_velocity=slip[:, 0])
@@ -122,5 +122,6 @@ def _find_sliding_forces(
         (along.ravel(), (rows, np.repeat(sliding * dim, dim - 1))), shape=(size, size)
     )
     limits = np.where(speed > 0, 0.0, friction)
-    solution = solve_friction(bodies.matrix @ mixing, offset, limits, dim=dim, tolerance=tolerance)
+    mixed = make_problem(bodies.matrix @ mixing, offset, limits, dim)
+    solution = solve_problem(mixed, tolerance=tolerance)
     return replace(solution, r=np.asarray(mixing @ solution.r))

@@ -44,8 +44,8 @@ from rigid_lcp.collision import (
 )
 from rigid_lcp.contact import ContactForces, Contacts, build_frames, match_keys
 from rigid_lcp.errors import NotConverged
-from rigid_lcp.friction.auto import solve_friction
-from rigid_lcp.friction.problem import SHARE_LEFT, BodySpace, FrictionSolution
+from rigid_lcp.friction.auto import solve_problem
+from rigid_lcp.friction.problem import SHARE_LEFT, BodySpace, FrictionSolution, make_problem
 from rigid_lcp.motion.equations import (
     find_inertial_acceleration,
     find_relative_velocity,
@@ -106,13 +106,8 @@ def step_moreau(
     ``accept``, as `solve_friction` has them.  Raises `NotConverged` for a body that turns by more
     than half a turn within the step.
     """
-    _refuse_fast_spin(world, motion, h)
-    middle = world.move_freely(motion, 0.5 * h)
     pull = None if loads is None else np.asarray(loads, dtype=float)
-    accelerations = world.accelerations(middle, pull, gyroscopic=False)
-    free = replace_rates(middle, middle.rates + h * accelerations)
-    margin = find_margin(world, motion, accelerations, h)
-    contacts = world.contacts(middle, margin, 0.5 * h)
+    middle, free, margin, contacts = begin_step(world, motion, pull, h)
     if len(contacts) == 0:
         end = separate_bodies(world, motion, world.move_freely(free, 0.5 * h), pull, h)
         return Step(end, make_contact_forces(contacts, np.zeros((0, motion.dim)), None, h), 0.0)
@@ -134,6 +129,19 @@ def step_moreau(
     end = separate_bodies(world, motion, end, pull, h, touching, restitution)
     forces = make_contact_forces(contacts, found.impulse, found.velocity, h)
     return Step(end, forces, found.error, found.message, scaled, found.cut_off)
+
+
+def begin_step(
+    world: World, motion: Motion, loads: ArrayLike | None, h: float
+) -> tuple[Motion, Motion, Floats, Contacts]:
+    """The bodies at the midpoint with the rates of the start, and with those of the end without
+    impulses; how far each can get [m], (n,), and the contacts so near.  Raises as `step_moreau`."""
+    _refuse_fast_spin(world, motion, h)
+    middle = world.move_freely(motion, 0.5 * h)
+    accelerations = world.accelerations(middle, loads, gyroscopic=False)
+    free = replace_rates(middle, middle.rates + h * accelerations)
+    margin = find_margin(world, motion, accelerations, h)
+    return middle, free, margin, world.contacts(middle, margin, 0.5 * h)
 
 
 def solve_step_contacts(
@@ -244,10 +252,8 @@ def judge_impulses(
     """Impulses and their `find_forces_error`, ``slow`` the velocity that gravity gives in a
     step.
     """
-    found = solve_friction(
-        bodies, offset.ravel(), friction, dim=offset.shape[1], start=start, tolerance=tolerance,
-        accept=accept,
-    )  # fmt: skip
+    problem = make_problem(bodies, offset, friction, offset.shape[1])
+    found = solve_problem(problem, start, tolerance, accept=accept)
     return found, find_forces_error(bodies, found, slow, offset)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -27,6 +27,7 @@ from rigid_lcp.motion.gyroscopic import (
 )
 from rigid_lcp.motion.state import Motion, displace_motion
 from rigid_lcp.shapes import HalfSpace, require_vector
+from trackbed.scene_files import suggest_word
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,8 @@ class Body:
     friction: float | None
     restitution: float | None
     name: str
+    surface: str = ""
+    """What it is made of, by which `Scene.set_pair` names it."""
 
     @property
     def movable(self) -> bool:
@@ -64,6 +67,14 @@ class Scene:
         given = default if gravity is None else gravity
         self.gravity = require_vector(given, dim, "gravity", "scene", BOUNDS.state)
         self.bodies: list[Body] = []
+        self.pairs: dict[tuple[str, str], dict[str, float]] = {}
+        """What `set_pair` was given, by the two surfaces in the order of the alphabet."""
+
+    def replace_bodies(self, bodies: Iterable[Body]) -> Scene:
+        """A scene of other bodies, with the gravity and the pairs of surfaces of this one."""
+        made = Scene(self.dim, self.gravity)
+        made.bodies, made.pairs = list(bodies), dict(self.pairs)
+        return made
 
     def name_body(self, body: int) -> str:
         """Name of a body for messages; its number where it has none."""
@@ -73,7 +84,7 @@ class Scene:
         self, shape: Any, *, density: float | None = None, position: ArrayLike | None = None,
         angle: Any = None, velocity: ArrayLike | None = None, spin: Any = None,
         friction: float | None = None, restitution: float | None = None, fixed: bool = False,
-        name: str = "",
+        name: str = "", surface: str = "",
     ) -> int:  # fmt: skip
         """Add a body; returns its number.
 
@@ -82,7 +93,8 @@ class Scene:
         mass [m]; without it, the body stays where its vertices were given.  ``angle`` [rad], in 3D
         a quaternion (w, x, y, z).  ``velocity`` [m/s], ``spin`` [rad/s].  ``friction`` and
         ``restitution`` of a contact are the smaller of its two bodies'; a body without a value
-        leaves it to the other; without any both are zero.  Raises `SceneError`.
+        leaves it to the other; without any both are zero.  ``surface``: a word for which
+        `set_pair` says otherwise.  Raises `SceneError`.
         """
         where = name or f"body {len(self.bodies)}"
         if isinstance(shape, type) or getattr(shape, "dim", None) != self.dim:
@@ -98,12 +110,7 @@ class Scene:
         mass, inertia = np.inf, np.inf
         if not fixed:
             mass, inertia = shape.mass_properties(require_density(density, where))
-        if friction is not None:
-            remedy = f"give 0 to {MOST_FRICTION:g}"
-            friction = require_number_in(friction, 0.0, MOST_FRICTION, "friction", where, remedy)
-        if restitution is not None:
-            key, remedy = "restitution", "give 0 to 1"
-            restitution = require_number_in(restitution, 0.0, 1.0, key, where, remedy)
+        given = require_surface(friction, restitution, where)
 
         def check_state(values: ArrayLike | None, usual: Floats | list[float], what: str) -> Floats:
             given = usual if values is None else values
@@ -118,9 +125,40 @@ class Scene:
         self.bodies.append(Body(
             shape, mass, inertia, check_state(position, origin, "position"), angle / length,
             check_state(velocity, np.zeros(self.dim), "velocity"),
-            check_state(spin, np.zeros(turn), "spin"), friction, restitution, name,
+            check_state(spin, np.zeros(turn), "spin"), given.get("friction"),
+            given.get("restitution"), name, surface,
         ))  # fmt: skip
         return len(self.bodies) - 1
+
+    def set_pair(
+        self, one: str, other: str, *, friction: float | None = None,
+        restitution: float | None = None,
+    ) -> None:  # fmt: skip
+        """Friction and restitution [-] of contacts between bodies of two surfaces (or of one), in
+        place of what their bodies would give; None leaves it at that.
+
+        Raises `SceneError`; a run does for surfaces that no body has.
+        """
+        given = require_surface(friction, restitution, f"{one} and {other}")
+        if not given:
+            raise SceneError(
+                "the pair has no value", where=f"{one} and {other}",
+                remedy="give friction, restitution or both",
+            )  # fmt: skip
+        pair = min(one, other), max(one, other)
+        self.pairs[pair] = self.pairs.get(pair, {}) | given
+
+
+def require_surface(
+    friction: float | None, restitution: float | None, where: str
+) -> dict[str, float]:
+    """Those of the two that are not None.  Raises `SceneError` for what is no coefficient."""
+    given = ("friction", friction, MOST_FRICTION), ("restitution", restitution, 1.0)
+    return {
+        name: require_number_in(value, 0.0, most, name, where, f"give 0 to {most:g}")
+        for name, value, most in given
+        if value is not None
+    }
 
 
 @dataclass(frozen=True)
@@ -253,6 +291,10 @@ class World:
         for name, value in self.surfaces.items():  # the smaller, or what one of them has
             both = np.fmin(value[found.body_a], value[found.body_b])
             surface[name] = np.where(np.isnan(both), 0.0, both)
+            if name in self.pairs:
+                kind, value = self.pairs[name]
+                own = value[kind[found.body_a], kind[found.body_b]]
+                surface[name] = np.where(np.isnan(own), surface[name], own)
         return Contacts(**vars(found) | surface)
 
     @cached_property
@@ -262,6 +304,24 @@ class World:
             name: np.array([getattr(body, name) for body in self.scene.bodies], dtype=float)
             for name in ("friction", "restitution")
         }
+
+    @cached_property
+    def pairs(self) -> dict[str, tuple[Ints, Floats]]:
+        """Number of each body's surface (n,), and friction or restitution of every pair of surfaces
+        (k, k), NaN where their bodies decide; only what `Scene.set_pair` was given."""
+        words, kind = np.unique([body.surface for body in self.scene.bodies], return_inverse=True)
+        known, found = words.tolist(), dict[str, tuple[Ints, Floats]]()
+        for pair, given in self.scene.pairs.items():
+            for word in (word for word in pair if word not in known):
+                raise SceneError(
+                    f"no body has the surface {word!r}{suggest_word(word, known)}",
+                    where="set_pair", remedy=f"give it to a body: add(..., surface={word!r})",
+                )  # fmt: skip
+            one, other = map(known.index, pair)
+            for name, value in given.items():
+                table = found.setdefault(name, (kind, np.full((len(known),) * 2, np.nan)))[1]
+                table[one, other] = table[other, one] = value
+        return found
 
     def energy(self, motion: Motion) -> float:
         """Kinetic and potential energy of the movable bodies [J]."""
@@ -282,8 +342,8 @@ def make_world(scene: Scene) -> tuple[World, Motion]:
 
     What is done to ``scene`` later changes neither.
     """
-    given, scene = scene, Scene(scene.dim, scene.gravity)
-    scene.bodies = bodies = list(given.bodies)
+    scene = scene.replace_bodies(scene.bodies)
+    bodies = scene.bodies
     movable = np.array([body.movable for body in bodies], dtype=bool)
     if not movable.any():
         raise SceneError("no body can move", where="scene", remedy="add a body with a density")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import product
 from math import ceil, inf
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ from rigid_lcp.scene.types import (
     SceneTables,
     Stones,
     find_faults,
+    list_surfaces,
     plan_steps,
 )
 from trackbed.errors import MeshError
@@ -129,26 +131,32 @@ def build_scene(file: SceneFile) -> Scene:
     for i, ground in enumerate(tables.ground):
         with name_shape(f"ground {i}"):
             plane = shapes.HalfSpace(ground.normal, ground.offset)
-        scene.add(plane, name=f"ground {i}", **merge(ground))
+        scene.add(plane, name=f"ground {i}", surface=f"ground.{i}", **merge(ground))
     for body in tables.body:
         keys = {"density", "position", "angle", "velocity", "spin", "fixed", "name"}
         shape, given = make_shape(body, tables.dimensions), body.model_dump(include=keys)
-        number = scene.add(shape, **given, **merge(body))
+        number = scene.add(shape, **given, **merge(body), surface=body.name)
         if body.inertia is not None:
             scene.bodies[number] = replace(scene.bodies[number], inertia=body.inertia)
-    for grains in tables.grains:
+    for number, grains in enumerate(tables.grains):
         for shape, position, angle in place_grains(grains, tables.dimensions):
             scene.add(
-                shape, density=grains.density, position=position, angle=angle, **merge(grains)
-            )
+                shape, density=grains.density, position=position, angle=angle, **merge(grains),
+                surface=f"grains.{number}",
+            )  # fmt: skip
     for number, (stones, scans) in enumerate(zip(tables.stones or (), file.scans, strict=True)):
         try:
             for shape, position, angle in place_stones(stones, scans):
                 scene.add(
-                    shape, density=stones.density, position=position, angle=angle, **merge(stones)
-                )
+                    shape, density=stones.density, position=position, angle=angle, **merge(stones),
+                    surface=f"stones.{number}",
+                )  # fmt: skip
         except SceneError as error:
             raise error.relocate(f"stones.{number}.grading") from error
+    known = list_surfaces(tables)
+    for pair in tables.pair or ():
+        for one, other in product(*(known[word] for word in pair.between)):
+            scene.set_pair(one, other, friction=pair.friction, restitution=pair.restitution)
     return scene
 
 
@@ -244,7 +252,7 @@ def refuse_lost_vertices(given: Floats, shape: shapes.Polyhedron) -> None:
 def list_doubts(tables: SceneTables) -> list[str]:
     """Sentences on values that are likely in another unit than SI, and on what is not used."""
     named: list[tuple[str, Any]] = [("surface", tables.surface)]
-    for kind in ("ground", "body", "grains", "stones"):
+    for kind in ("ground", "body", "grains", "stones", "pair"):
         named += [(f"{kind}.{i}", one) for i, one in enumerate(getattr(tables, kind) or ())]
     found: list[str | None] = []
     for key, one in named:

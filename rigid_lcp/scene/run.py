@@ -86,7 +86,7 @@ def rebuild_frame_scene(frame: dict[str, Any], scene: Scene) -> Scene:
     """The bodies of a frame, where ``scene`` is the one of the file; itself if none has changed."""
     if "body_corners" not in frame:
         return scene
-    made = Scene(scene.dim, scene.gravity)
+    made = scene.replace_bodies(())
     inertias = iter(frame["body_inertia"])
     each = np.split(frame["body_corners"], np.cumsum(frame["body_count"])[:-1])
     for whole, mass, corners in zip(frame["body_whole"], frame["body_mass"], each, strict=True):

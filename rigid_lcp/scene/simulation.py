@@ -140,6 +140,16 @@ class Simulation:
                 for _ in range(parts):
                     self._take_step(seconds / count / parts)
 
+    def problem(self, h: float | None = None) -> motion.StepProblem:
+        """The friction problem of the step that comes next, of length ``h`` [s], by default
+        ``step``: A, b, W, q, friction, and ``save``.
+
+        After a step that was not found this is the one that was not, as the state before it is
+        kept.  Raises `UsageError` for a length that is none.
+        """
+        h = self.step if h is None else motion.require_seconds(h, "the step")
+        return motion.make_step_problem(self.world, self.motion, self._find_loads(h), h)
+
     def fragment(self, body: int, line: tuple[ArrayLike, ArrayLike]) -> int:
         """Break a polygon (polyhedron) that moves in two; returns the number of the second part.
 
@@ -205,11 +215,14 @@ class Simulation:
         gap = self.world.contacts(self.motion, 0.0).gap
         return float(max(0.0, -gap.min(initial=0.0)))
 
+    def _find_loads(self, h: float) -> Floats | None:
+        """Those at the midpoint of a step."""
+        if self.loads is None:
+            return None
+        return self.loads(self.time + h / 2, self.world.move_freely(self.motion, h / 2))
+
     def _take_step(self, h: float) -> None:
-        loads = None
-        if self.loads is not None:
-            middle = self.world.move_freely(self.motion, h / 2)
-            loads = self.loads(self.time + h / 2, middle)
+        loads = self._find_loads(h)
         try:
             made = motion.step_moreau(
                 self.world, self.motion, loads, h, self.contacts, self.tolerance, SIMULATION.accept

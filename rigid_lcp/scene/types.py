@@ -188,6 +188,23 @@ class Stones(Poured):
         return self
 
 
+class Pair(Table):
+    """Friction and restitution of contacts between two kinds of bodies, in place of the smaller one
+    of each body's own; of pairs that name the same bodies, the last."""
+
+    between: Annotated[list[Text], Field(min_length=2, max_length=2)]
+    """Two of: the name of a body; ground, grains, stones; or one table of these, as grains.0.  A
+    name of a body goes first."""
+    friction: NonNegative | None = None  # Coulomb's coefficient [-]
+    restitution: Restitution | None = None  # Newton's coefficient [-]
+
+    @model_validator(mode="after")
+    def _check_pair(self) -> Pair:
+        if self.friction is None and self.restitution is None:
+            raise ValueError("give friction, restitution or both")
+        return self
+
+
 class Load(Table):
     """A force on a named body, constant or cyclic between two values."""
 
@@ -239,6 +256,7 @@ class SceneTables(Table):
     body: list[BodyTable] = Field([])
     grains: list[Grains] = Field([])
     stones: list[Stones] | None = None  # None, not empty: older runs without this key still go on
+    pair: list[Pair] | None = None  # as stones
     load: list[Load] = Field([])
     wear: WearTable | None = None
     strength: StrengthTable | None = None
@@ -262,6 +280,7 @@ def find_faults(tables: SceneTables) -> Iterator[Problem]:
             yield Problem(f"body.{i}.name", f"two bodies have the name {body.name}")
         if body.inertia is not None and (tables.dimensions == 3 or body.fixed):
             yield Problem(f"body.{i}.inertia", "for bodies that move, in 2 dimensions")
+    yield from _find_wrong_pairs(tables, held)
     for i, load in enumerate(tables.load):
         if load.body not in names:
             near = suggest_word(load.body, names)
@@ -285,6 +304,28 @@ def find_faults(tables: SceneTables) -> Iterator[Problem]:
     if not (tables.grains or tables.stones) and all(body.fixed for body in tables.body):
         said = "no body can move: add a [[body]] with a density, [[grains]] or [[stones]]"
         yield Problem("", said)
+
+
+def list_surfaces(tables: SceneTables) -> dict[str, list[str]]:
+    """What a pair may name, and the surfaces of bodies that it means."""
+    found: dict[str, list[str]] = {}
+    for kind in ("ground", "grains", "stones"):
+        if own := [f"{kind}.{i}" for i in range(len(getattr(tables, kind) or ()))]:
+            found |= {kind: own} | {one: [one] for one in own}
+    return found | {body.name: [body.name] for body in tables.body}
+
+
+def _find_wrong_pairs(tables: SceneTables, held: set[str]) -> Iterator[Problem]:
+    """Pairs of bodies that are not there, or that never touch."""
+    known, bodies = list_surfaces(tables), {body.name for body in tables.body}
+    moving = {word for word in known if word.startswith(("grains", "stones"))} | bodies
+    for i, pair in enumerate(tables.pair or ()):
+        one, other = pair.between
+        lost = [word for word in pair.between if word not in known]
+        for word in lost:
+            yield Problem(f"pair.{i}.between", f"there is no {word}{suggest_word(word, known)}")
+        if not (lost or (moving - held) & {one, other}) or one == other in bodies:
+            yield Problem(f"pair.{i}.between", f"{one} and {other} never touch, or neither moves")
 
 
 def _find_wrong_sizes(tables: SceneTables) -> Iterator[Problem]:

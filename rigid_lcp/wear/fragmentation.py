@@ -24,15 +24,13 @@ LEAST_WIDTH = 1e-3
 
 def restart_scene(scene: Scene, motion: Motion) -> Scene:
     """The same bodies, starting from the state ``motion``."""
-    made = Scene(scene.dim, scene.gravity)
-    made.bodies = [
+    return scene.replace_bodies(
         replace(
             each, position=motion.position[k], velocity=motion.velocity[k],
             angle=np.atleast_1d(motion.angle[k]), spin=np.atleast_1d(motion.spin[k]),
         )
         for k, each in enumerate(scene.bodies)
-    ]  # fmt: skip
-    return made
+    )  # fmt: skip
 
 
 def split_body(

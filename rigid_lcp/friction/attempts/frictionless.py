@@ -27,6 +27,7 @@ from scipy.sparse.linalg import splu
 
 from rigid_lcp.arrays import Bools, Floats
 from rigid_lcp.errors import ProblemError
+from rigid_lcp.friction.linear import NO_LIMIT, Clock
 from rigid_lcp.friction.problem import FrictionProblem, FrictionSolution, judge_forces
 from rigid_lcp.friction.sweeps import build_band, find_bandwidth, multiply_normals, sweep_normals
 from rigid_lcp.sparse import split_csr
@@ -63,9 +64,10 @@ NUMBERS = FrictionlessNumbers()
 
 
 def solve_frictionless(
-    problem: FrictionProblem, start: Floats | None = None, tolerance: float = 1e-12
-) -> FrictionSolution:
-    """Solve a friction problem without friction (mu = 0), in 2D or 3D.
+    problem: FrictionProblem, start: Floats | None = None, tolerance: float = 1e-12, *,
+    clock: Clock = NO_LIMIT,
+) -> FrictionSolution:  # fmt: skip
+    """Solve a friction problem without friction (mu = 0), in 2D or 3D, in the time of ``clock``.
 
     ``start`` r (nc * dim,): forces near the solution.  ``work``: ``sweeps``; ``exchanges`` of
     sides, each with one factorisation; ``proximal`` steps.  Not for a W that is not symmetric or
@@ -91,7 +93,7 @@ def solve_frictionless(
         for step in range(NUMBERS.shift_steps):
             before = work["exchanges"]
             f, sharper = pivot_principally(
-                a, b, order, f, carries, work, limit, smoothings if step == 0 else 0
+                a, b, order, f, carries, work, limit, smoothings if step == 0 else 0, clock
             )
             better = False
             for candidate in (sharper, f):
@@ -101,7 +103,7 @@ def solve_frictionless(
                     best, least, better = force, residual, True
                 if least <= tolerance:
                     return _make_solution(problem, best, tolerance, work)
-            if (step > 4 and not better) or work["exchanges"] - before >= limit:
+            if (step > 4 and not better) or work["exchanges"] - before >= limit or clock.late:
                 break
             work["proximal"] += 1
     return _make_solution(problem, best, tolerance, work)
@@ -117,7 +119,7 @@ def _make_solution(
 
 def pivot_principally(
     a_matrix: sp.csr_array, b: Floats, order: Indices, before: Floats, carries: Bools,
-    work: dict[str, float], limit: int, smoothings: int,
+    work: dict[str, float], limit: int, smoothings: int, clock: Clock,
 ) -> tuple[Floats, Floats]:  # fmt: skip
     """One proximal step: forces of ``a = b + A f + shift (f - before)`` that obey eq. 19.
 
@@ -143,7 +145,7 @@ def pivot_principally(
         margin = NUMBERS.sign_margin * (scale + unit * float(np.abs(f).max()))
         wrong = np.where(carries, f < -margin / unit, a < -margin)
         count = int(wrong.sum())
-        if count == 0 or limit <= 0:
+        if count == 0 or limit <= 0 or clock.late:
             break
         if smoothed and count > 0.7 * fewest:
             smoothings = 0

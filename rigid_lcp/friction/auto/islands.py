@@ -18,6 +18,7 @@ import scipy.sparse as sp
 from numba import njit
 
 from rigid_lcp.arrays import Bools, Floats, Ints
+from rigid_lcp.friction.linear import NO_LIMIT, Clock
 from rigid_lcp.friction.problem import BodySpace, FrictionProblem, FrictionSolution, judge_forces
 from rigid_lcp.friction.sweeps import NONE, solve_contacts_apart
 from rigid_lcp.sparse import find_diagonal_blocks, split_csr
@@ -129,13 +130,15 @@ def solve_islands(
     method: Method,
     start: Floats | None = None,
     tolerance: float = 1e-12,
+    clock: Clock = NO_LIMIT,
     **options: Any,
 ) -> FrictionSolution:
     """Solve every island apart by ``method(problem, start, tolerance, **options)``, and join them.
 
     Contacts that are islands of their own are solved exactly, without ``method``.  An island
     measures its residual by its own forces, the whole by all: where the whole comes out above
-    ``tolerance`` although the islands did not, they are solved finer from where they are.
+    ``tolerance`` although the islands did not, they are solved finer from where they are.  Small
+    ones go first, none with more than an equal share of the time that ``clock`` leaves.
     """
     parts = find_islands(problem)
     if len(parts) == 1:
@@ -151,10 +154,12 @@ def solve_islands(
         begin: list[Floats | None] = [None] * len(larger)
         if start is not None or round_ > 0:
             begin = [force[list_contact_rows(part, problem.dim)] for part in larger]
-        solutions = [
-            method(island, near, finer, **options)
-            for island, near in zip(problems, begin, strict=True)
-        ]
+        found: dict[int, FrictionSolution] = {}
+        for k in sorted(range(len(larger)), key=lambda k: len(larger[k])):
+            if clock is not NO_LIMIT:
+                options["clock"] = clock.share(1.0 / (len(larger) - len(found)))
+            found[k] = method(problems[k], begin[k], finer, **options)
+        solutions = [found[k] for k in range(len(larger))]
         joined = join_islands(problem, [single, *larger], [alone, *solutions], tolerance)
         joined.work["islands"] = float(len(parts))
         for name, count in joined.work.items():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,6 +41,9 @@ class ConvexPath:
     bent_useful: float = 3e-6
     """Residual [-] at which Newton is tried, and again at `Limits.hand_over`."""
     bent_newton: int = 8  # steps of Newton
+    end_steps: int = 5
+    """Further along the convex path, to its end as good as it can be found [-]: where a bed all but
+    yields, Newton's method needs a dozen steps from there."""
     heavy_steps: int = 20
     """Along the convex path where light bodies bear heavy ones, as it has to go further."""
     heavy_newton: int = 10  # steps of Newton from its end
@@ -119,6 +123,7 @@ def follow_convex_path(trial: Trial) -> bool:
         rest = follow(trial, path, CONVEX.rest_until, CONVEX.rest_steps)
         trial.run_newton(rest.r, CONVEX.newton, rest.method, CONVEX.patience)
         path.x, path.s = part
+    trial.convex_part = copy(path)
     path.path = BENT_PATH
     steps = CONVEX.bent_steps
     for until in (CONVEX.bent_useful, LIMITS.hand_over):
@@ -185,6 +190,15 @@ def follow_sharp_path(trial: Trial) -> bool:
         found = trial.run_newton(found.r, LIMITS.newton, found.method)
     if not trial.best.solved and found.residual <= SHARP.near:
         take_turns(trial, found.r, SHARP.turns)
+    return trial.best.solved
+
+
+def end_convex_path(trial: Trial) -> bool:
+    """The convex path from its part to its end, and Newton from there, though the residual of these
+    forces may be no less than that of the part's."""
+    assert trial.convex_part is not None
+    found = follow(trial, trial.convex_part, 0.0, min(CONVEX.end_steps, trial.affordable))
+    trial.run_newton(trial.convex_part.force(), LIMITS.newton, found.method)
     return trial.best.solved
 
 

@@ -19,6 +19,7 @@ from rigid_lcp.arrays import Floats
 from rigid_lcp.friction.auto import paths as along
 from rigid_lcp.friction.auto import sweeps as by
 from rigid_lcp.friction.auto.trial import LIMITS, Trial
+from rigid_lcp.friction.linear import NO_LIMIT, Clock
 from rigid_lcp.friction.problem import FrictionProblem, prove_forces_insufficient
 
 PROOF_CONTACTS = 3000
@@ -38,6 +39,8 @@ class Stage:
 def run_plan(trial: Trial, plan: tuple[Stage, ...]) -> bool:
     """Try the stages of ``plan`` one after another; whether one of them ended the search."""
     for stage in plan:
+        if trial.clock.late:
+            return True
         if not stage.when(trial):
             continue
         if isinstance(stage.attempt, tuple):
@@ -51,11 +54,11 @@ def run_plan(trial: Trial, plan: tuple[Stage, ...]) -> bool:
 
 def run_attempts(
     problem: FrictionProblem, start: Floats | None, tolerance: float, accept: float = 0.0,
-    plan: tuple[Stage, ...] | None = None,
+    plan: tuple[Stage, ...] | None = None, clock: Clock = NO_LIMIT,
 ) -> Trial:  # fmt: skip
     """`PLAN`, or another, until a stage reaches ``tolerance``, or ``accept`` where the problem is
     large; the trial holds the best point."""
-    trial = Trial(problem, start, tolerance, accept)
+    trial = Trial(problem, start, tolerance, accept, clock)
     if trial.best.solved:
         trial.sharpen()
     else:
@@ -65,16 +68,17 @@ def run_attempts(
 
 def prove_insoluble(trial: Trial) -> bool:
     """Look for a proof that there is no solution, before paths are followed in vain."""
-    if not is_proved_insoluble(trial.problem):
+    if not is_proved_insoluble(trial.problem, trial.clock):
         return False
     trial.forget_endless()
     trial.best = replace(trial.best, status="no solution")
     return True
 
 
-def is_proved_insoluble(problem: FrictionProblem) -> bool:
-    """Whether a linear programme proves that there is no solution."""
-    return problem.contacts <= PROOF_CONTACTS and prove_forces_insufficient(problem)
+def is_proved_insoluble(problem: FrictionProblem, clock: Clock = NO_LIMIT) -> bool:
+    """Whether a linear programme proves that there is no solution, in the time left."""
+    few = problem.contacts <= PROOF_CONTACTS and not clock.late
+    return few and prove_forces_insufficient(problem, seconds=clock.left)
 
 
 # --- the plan ---------------------------------------------------------------------------------
@@ -83,12 +87,14 @@ def is_proved_insoluble(problem: FrictionProblem) -> bool:
 
 FROM_PATH = (
     Stage("sharp path", lambda t: not t.sharp, along.follow_sharp_path),
+    Stage("convex end", lambda t: t.convex_part is not None, along.end_convex_path),
     Stage("smoothed path", lambda t: True, along.smooth_further),
     Stage("turns", lambda t: True, lambda t: by.take_turns(t, t.best.r)),
 )  # fmt: skip
-"""From where the convex path ended short.  The sharp path solves most of what is left and jams
-where forces are many times what approaches; the smoothed one need not stay inside the cones
-(kicked, tilted and slippery beds); turns let a self-stress grow a long way."""
+"""From where the convex path was left or ended short.  The sharp path solves most of what is left,
+and jams where forces are many times what approaches; Newton's method ends the convex path where a
+bed all but yields; the smoothed path need not stay inside the cones (kicked, tilted and slippery
+beds); turns let a self-stress grow a long way."""
 
 ALL_PATHS = (
     Stage("convex path, late", lambda t: t.path_point is None, along.follow_convex_path),

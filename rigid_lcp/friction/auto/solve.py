@@ -7,9 +7,11 @@ best.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from importlib import import_module
+from time import perf_counter
 
 import numpy as np
 import scipy.sparse as sp
@@ -21,6 +23,7 @@ from rigid_lcp.friction.attempts import solve_frictionless
 from rigid_lcp.friction.auto.islands import find_islands, solve_islands
 from rigid_lcp.friction.auto.plan import FIRST, is_proved_insoluble, run_attempts
 from rigid_lcp.friction.auto.trial import LIMITS, Trial
+from rigid_lcp.friction.linear import NO_LIMIT, Clock
 from rigid_lcp.friction.problem import (
     FORCE_ROUND_OFF,
     SHARE_LEFT,
@@ -35,6 +38,7 @@ from rigid_lcp.friction.problem import (
     require_start,
 )
 from trackbed.choices import find_choices
+from trackbed.plausible import describe_implausible
 
 LEAST_OFFSET = 1e-60
 """Problems with a smaller q [that of u] are solved in other units."""
@@ -47,7 +51,7 @@ ENERGY_GIVEN = (
 def solve_friction(
     W: ArrayLike | sp.sparray | sp.spmatrix | BodySpace, q: ArrayLike, mu: ArrayLike, dim: int,
     start: ArrayLike | None = None, tolerance: float = 1e-12, method: str = "auto",
-    accept: float = 0.0,
+    accept: float = 0.0, max_time: float | None = None,
 ) -> FrictionSolution:  # fmt: skip
     """Forces r and velocities u with ``u = W r + q`` under unilateral contact and Coulomb friction.
 
@@ -60,15 +64,36 @@ def solve_friction(
     ``accept``: where sweeps and Newton leave more than ``tolerance``, but not more than this,
     ``auto`` tries no more on problems of more than `Limits.few_contacts` contacts.
 
+    ``max_time`` [s] of wall clock, for ``auto``: when it is up the best point so far comes back
+    with the status ``out of time``.  A limit that is not reached changes nothing; what one that is
+    reached finds depends on the machine.  The first calls of a process load kernels (those after an
+    installation compile them), which counts.
+
     ``method``: ``auto`` (module docstring); ``interior-point`` and ``newton`` are polished by
     Newton; ``pivoting`` and ``dantzig`` (2D) are in the modules of their names.
 
     Never fails silently: see ``status`` and ``message`` of the `FrictionSolution`, which holds
     the best point found.  Raises `ProblemError` for input that poses no problem, `UsageError` for
-    an unknown method or a tolerance that is not positive.  Forces, and sometimes velocities, are
-    not unique: compare residuals.
+    an unknown method, a tolerance or a time that is not positive.  Warns of friction above 2.
+    Forces, and sometimes velocities, are not unique: compare residuals.
     """
+    seconds = np.inf if max_time is None else require_number(max_time, "max_time")
+    clock = NO_LIMIT if max_time is None else Clock(perf_counter() + seconds)
     problem: FrictionProblem = make_problem(W, q, mu, dim)
+    if said := describe_implausible("friction", float(problem.friction.max(initial=0.0)), "mu"):
+        warnings.warn(said, stacklevel=2)
+    if max_time is not None and method != "auto":
+        raise UsageError(
+            f"{method} knows no time limit", where="max_time", remedy="leave it out, or use auto"
+        )
+    return solve_problem(problem, start, tolerance, method, accept, clock)
+
+
+def solve_problem(
+    problem: FrictionProblem, start: ArrayLike | None = None, tolerance: float = 1e-12,
+    method: str = "auto", accept: float = 0.0, clock: Clock = NO_LIMIT,
+) -> FrictionSolution:  # fmt: skip
+    """`solve_friction` of a problem that is made already, whose friction is not judged."""
     if method != "auto" and method not in find_methods():
         raise UsageError(
             f"there is no method {method!r}", where="method",
@@ -86,23 +111,21 @@ def solve_friction(
     if 0.0 < largest < LEAST_OFFSET:  # squares of such numbers are zero
         unit = 2.0 ** np.frexp(largest)[1]
         large = replace(problem, offset=problem.offset / unit)
-        found = solve_friction(
-            large.bodies or large.delassus, large.offset, large.friction, dim,
-            None if begin is None else begin / unit, tolerance, method, accept,
-        )  # fmt: skip
+        begin = None if begin is None else begin / unit
+        found = solve_problem(large, begin, tolerance, method, accept, clock)
         return replace(found, r=found.r * unit, u=found.u * unit)
     if method == "auto":
-        return solve_auto(problem, begin, tolerance, accept)
+        return solve_auto(problem, begin, tolerance, accept, clock)
     return solve_alone(problem, begin, tolerance, method)
 
 
 def solve_auto(
     problem: FrictionProblem, start: Floats | None = None, tolerance: float = 1e-12,
-    accept: float = 0.0,
+    accept: float = 0.0, clock: Clock = NO_LIMIT,
 ) -> FrictionSolution:  # fmt: skip
     """The default of `solve_friction` on a problem that is made already."""
     if not problem.friction.any():
-        exact = solve_frictionless(problem, start, tolerance)
+        exact = solve_frictionless(problem, start, tolerance, clock=clock)
         if exact.solved:
             return exact
     parts = find_islands(problem) if problem.contacts > LIMITS.few_contacts else []
@@ -110,29 +133,32 @@ def solve_auto(
     split = len(parts) > 1 and larger <= LIMITS.few_islands
     if split:
         trial = Trial(problem, start, tolerance)
-        trial.keep(solve_islands(problem, _solve_island, start, tolerance, accept=accept))
+        trial.keep(solve_islands(problem, _solve_island, start, tolerance, clock, accept=accept))
     else:
-        trial = run_attempts(problem, start, tolerance, accept)
+        trial = run_attempts(problem, start, tolerance, accept, clock=clock)
     finer = tolerance
-    while trial.best.residual <= finer and not trial.best.solved and finer > FORCE_ROUND_OFF:
+    while (
+        trial.best.residual <= finer and not trial.best.solved and finer > FORCE_ROUND_OFF
+        and not clock.late
+    ):  # fmt: skip
         # what leaves little of the error without forces: light bodies that still fall may leave
         # much beside the forces of heavy ones
         enough = SHARE_LEFT * problem.error_without_forces / (norm(trial.best.r) or 1.0)
         finer = 0.5 * min(enough, finer)
-        trial.keep(run_attempts(problem, trial.best.r, finer, accept, FIRST).solution())
+        trial.keep(run_attempts(problem, trial.best.r, finer, accept, FIRST, clock).solution())
     if trial.best.solved or (
         trial.best.residual <= accept and problem.contacts > LIMITS.few_contacts
     ):  # fmt: skip
         return trial.solution()
-    parts = parts or find_islands(problem)
+    parts = [] if clock.late else parts or find_islands(problem)
     if len(parts) > 1 and not split:
-        apart = trial.keep(solve_islands(problem, _solve_island, trial.best.r, tolerance))
+        apart = trial.keep(solve_islands(problem, _solve_island, trial.best.r, tolerance, clock))
         if _find_error(apart) < _find_error(
             trial.best
         ):  # endless forces on one hide the errors of others
             trial.best = apart
     if not trial.best.solved and (
-        trial.best.status == "no solution" or is_proved_insoluble(problem)
+        trial.best.status == "no solution" or is_proved_insoluble(problem, clock)
     ):
         if len(parts) <= 1:
             trial.forget_endless()
@@ -142,6 +168,12 @@ def solve_auto(
             " a linear programme)\n  -> look for bodies held between others that can not give way"
             " (a press), or contacts that bear on no mass; where r are forces, use impulses: a"
             " velocity-level time step",
+        )
+    if not trial.best.solved and clock.late:
+        return trial.solution(
+            "out of time",
+            f"the time is up at a residual of {trial.best.residual:.2g} (asked: {tolerance:.2g})"
+            "\n  -> give it more, ask for less, or begin from these forces",
         )
     if not trial.best.solved and trial.gives_energy:
         return trial.solution(message=ENERGY_GIVEN.format(trial.best.residual))
@@ -154,9 +186,10 @@ def _find_error(found: FrictionSolution) -> float:
 
 
 def _solve_island(
-    problem: FrictionProblem, start: Floats | None, tolerance: float, accept: float = 0.0
-) -> FrictionSolution:
-    return run_attempts(problem, start, tolerance, accept).solution()
+    problem: FrictionProblem, start: Floats | None, tolerance: float, accept: float = 0.0,
+    clock: Clock = NO_LIMIT,
+) -> FrictionSolution:  # fmt: skip
+    return run_attempts(problem, start, tolerance, accept, clock=clock).solution()
 
 
 def solve_alone(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,14 @@ from rigid_lcp.friction.attempts import (
     solve_proximal,
     solve_sticking,
 )
-from rigid_lcp.friction.linear import Factorisation, choose_factorisation
-from rigid_lcp.friction.methods import NEWTON, lay_out_sweeps, solve_gauss_seidel, solve_newton
+from rigid_lcp.friction.linear import NO_LIMIT, SLOWEST, Clock, Factorisation, TimedFactorisation
+from rigid_lcp.friction.methods import (
+    NEWTON,
+    PathStep,
+    lay_out_sweeps,
+    solve_gauss_seidel,
+    solve_newton,
+)
 from rigid_lcp.friction.problem import (
     FORCE_ROUND_OFF,
     FrictionProblem,
@@ -79,10 +86,13 @@ class Trial:
     """The best point so far, who found it, and the work of all."""
 
     def __init__(
-        self, problem: FrictionProblem, start: Floats | None, tolerance: float, accept: float = 0.0
-    ) -> None:
+        self, problem: FrictionProblem, start: Floats | None, tolerance: float,
+        accept: float = 0.0, clock: Clock = NO_LIMIT,
+    ) -> None:  # fmt: skip
         zero = np.zeros(len(problem.offset))
-        self.problem, self.tolerance, self.accept = problem, tolerance, accept
+        self.problem, self.tolerance, self.accept, self.clock = problem, tolerance, accept, clock
+        self.sweep_cost = problem.contacts * LIMITS.update_flops * problem.dim**2 / SLOWEST
+        """The least that a sweep took so far [s], where time is limited."""
         self.work = dict[str, float]()
         self.best = judge_forces(
             problem, zero, tolerance, "no forces", velocity=problem.offset.copy()
@@ -90,6 +100,8 @@ class Trial:
         self.linear: Factorisation | None = None
         self.path_end: Floats | None = None
         self.path_point: tuple[Floats, float] | None = None
+        self.convex_part: PathStep | None = None
+        """Where the convex path was left, to go on along it."""
         self.sharp = self.smoothed = False
         """Whether the sharp path was followed, and the smoothed one."""
         self.stuck: FrictionSolution | None = None
@@ -133,15 +145,16 @@ class Trial:
         return lay_out_sweeps(self.problem)
 
     @property
-    def factors(self) -> Factorisation:
+    def factors(self) -> TimedFactorisation:
         """The factorisations of this problem, made when they are first needed."""
-        self.linear = self.linear or choose_factorisation(self.problem)
+        if not isinstance(self.linear, TimedFactorisation):
+            self.linear = TimedFactorisation(self.problem, self.clock, self.linear)
         return self.linear
 
     @cached_property
     def gives_energy(self) -> bool:
         """Whether W is proved to give energy, so that nothing promises a solution."""
-        return gives_energy(self.problem)
+        return gives_energy(self.problem, self.clock.left)
 
     def keep(self, found: FrictionSolution, after: str = "") -> FrictionSolution:
         """Count the work of a solution and keep it if it is the best; gives it back."""
@@ -167,7 +180,7 @@ class Trial:
         self, found: FrictionSolution, factorisations: int = PROXIMAL.factorisations
     ) -> bool:
         """Proximal points from a point of another method; whether the tolerance is reached."""
-        if self.best.solved or not np.isfinite(found.residual):
+        if self.best.solved or self.clock.late or not np.isfinite(found.residual):
             return self.best.solved
         if found.residual <= LIMITS.hand_over:
             found = self.run_newton(found.r, LIMITS.newton, found.method)
@@ -181,6 +194,8 @@ class Trial:
         self, method: Callable[..., FrictionSolution], start: Any, after: str = "", **options: Any
     ) -> FrictionSolution:
         """What ``method`` finds from ``start`` with this problem's factors: kept, and sharpened."""
+        if self.clock.late:
+            return self.best
         found = method(self.problem, start, self.tolerance, linear=self.factors, **options)
         self.keep(found, after)
         self.sharpen()
@@ -189,10 +204,15 @@ class Trial:
     def run_sweeps(
         self, start: Floats | None, until: float, sweeps: int, **options: Any
     ) -> FrictionSolution:
-        """What so many sweeps of Gauss-Seidel find, to a residual of ``until``."""
-        return self.keep(
-            solve_gauss_seidel(self.problem, start, until, sweeps, blocks=self.blocks, **options)
-        )
+        """What so many sweeps of Gauss-Seidel find in the time left, to a residual of ``until``."""
+        if self.clock.late:
+            return self.best
+        blocks, begun = self.blocks, perf_counter()
+        sweeps = int(min(sweeps, self.clock.left / self.sweep_cost))
+        found = solve_gauss_seidel(self.problem, start, until, sweeps, blocks=blocks, **options)
+        took = perf_counter() - begun
+        self.sweep_cost = min(self.sweep_cost, took / max(1.0, found.work["sweeps"]))
+        return self.keep(found)
 
     def sweep(
         self, start: Floats | None, sweeps: int, until: float = 0.0,
@@ -217,6 +237,8 @@ class Trial:
 
     def stick(self) -> FrictionSolution:
         """Forces at which all contacts stick."""
+        if self.clock.late:
+            return self.best
         exact = FORCE_ROUND_OFF if self.tolerance <= LIMITS.last_word else self.tolerance
         found = self.keep(solve_sticking(self.problem, exact, linear=self.factors))
         self.sharpen()
@@ -238,7 +260,9 @@ class Trial:
 
     @property
     def affordable(self) -> int:
-        """Factorisations up to `Limits.most_flops` and `Limits.most_factored`."""
+        """Factorisations up to `Limits.most_flops` and `Limits.most_factored`; none out of time."""
+        if self.clock.late:
+            return 0
         flops = (LIMITS.most_flops - self.effort) / max(1.0, self.factors.flops)
         count = LIMITS.most_factored / self.problem.contacts - self.work.get("factorisations", 0.0)
         return max(0, int(min(flops, count)))
@@ -273,7 +297,9 @@ class Trial:
         exact = FORCE_ROUND_OFF / max(1.0, self.forces / LIMITS.great_forces)
         if self.best.residual > exact:
             steps = LIMITS.refinements if self.problem.contacts <= LIMITS.few_contacts else 1
-            found = refine_forces(self.problem, self.best.r, exact, linear=self.linear, steps=steps)
+            found = refine_forces(
+                self.problem, self.best.r, exact, linear=self.factors, steps=steps
+            )
             if not self.leaves_rest(found):
                 self.keep(found, self.best.method)
 

@@ -1,4 +1,4 @@
-"""Friction problems from files: scipy's npz pairs, FCLIB's HDF5 and Siconos's text files.
+"""Friction problems in files: scipy's npz pairs, FCLIB's HDF5 and Siconos's text files.
 
     problem = read_problem("discs_125.npz")              # q, mu, dim; W or its factors beside it
     problem = read_problem("KaplasTower-i1061-4.hdf5")   # fclib_local, fclib_global
@@ -37,9 +37,11 @@ from rigid_lcp.friction.files.siconos import read_siconos_problem
 from rigid_lcp.friction.problem import BODY_SIZE, BodySpace, FrictionProblem, make_problem
 from trackbed.memory import read_arrays
 from trackbed.plausible import describe_implausible
+from trackbed.run_files import replace_file
 
-NPZ_ARRAYS = frozenset({"q", "mu", "dim", "W", "Minv", "r", "u", "vfree"})
-"""What a file may hold; r and u are a solution, vfree velocities that q was made of."""
+NPZ_ARRAYS = frozenset({"q", "mu", "dim", "W", "Minv", "r", "u", "vfree", "b", "h"})
+"""What a file may hold; r and u are a solution, vfree velocities that q was made of, b and h of a
+`rigid_lcp.motion.StepProblem`."""
 SAME_MATRIX = 1e-8
 """W and its factors, both stored, differ by less than this share of the largest entry of W."""
 
@@ -64,6 +66,27 @@ def read_forces(path: Path | str) -> Floats:
     `read_problem`.
     """
     return _choose_readers(path)[1](Path(path))
+
+
+def write_problem(path: Path | str, problem: FrictionProblem, **more: Floats) -> list[Path]:
+    """Write q, mu, dim and ``more`` as ``NAME.npz``, W as ``NAME_W.npz``; the two files.
+
+    Raises `ProblemError` for another ending, and where ``NAME_H.npz`` would be read for W's factor;
+    `trackbed.errors.UsageError` where they can not be written.
+    """
+    path = Path(path)
+    beside, factor = (path.with_name(f"{path.stem}_{name}.npz") for name in ("W", "H"))
+    if path.suffix != ".npz" or factor.exists():
+        raise ProblemError(
+            f"{factor.name} beside it belongs to another problem" if factor.exists()
+            else "it is no name of an npz file", where=str(path), remedy="give another name.npz",
+        )  # fmt: skip
+    with replace_file(beside) as temporary, temporary.open("wb") as stream:
+        sp.save_npz(stream, problem.delassus)
+    arrays: dict[str, Any] = {"q": problem.offset, "mu": problem.friction, **more}
+    with replace_file(path) as temporary, temporary.open("wb") as stream:
+        np.savez(stream, dim=problem.dim, **arrays)
+    return [path, beside]
 
 
 def _choose_readers(

@@ -1,4 +1,4 @@
-"""Linear systems of the interior point: factors by bodies, Lorentz cones."""
+"""Linear systems of Newton's steps: factors by bodies, Lorentz cones, a time limit."""
 
 from rigid_lcp.friction.linear.factorisation import (
     Factorisation,
@@ -14,8 +14,15 @@ from rigid_lcp.friction.linear.lorentz_cones import (
     scale_cones,
     square_scaling,
 )
+from rigid_lcp.friction.linear.time_limit import (
+    NO_LIMIT,
+    SLOWEST,
+    Clock,
+    TimedFactorisation,
+)
 
 __all__ = [
-    "Factorisation", "SingularSystem", "Solve", "choose_factorisation", "divide_cones",
-    "find_cone_step", "find_scaling", "multiply_cones", "scale_cones", "square_scaling",
+    "NO_LIMIT", "SLOWEST", "Clock", "Factorisation", "SingularSystem", "Solve",
+    "TimedFactorisation", "choose_factorisation", "divide_cones", "find_cone_step", "find_scaling",
+    "multiply_cones", "scale_cones", "square_scaling",
 ]  # fmt: skip

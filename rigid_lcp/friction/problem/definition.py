@@ -27,7 +27,7 @@ from rigid_lcp.sparse import (
     split_jacobian,
 )
 
-Status = Literal["solved", "not converged", "no solution", "cycled", "singular"]
+Status = Literal["solved", "not converged", "no solution", "cycled", "singular", "out of time"]
 """What became of a problem: ``no solution`` is a proof (a ray), the others are not."""
 
 

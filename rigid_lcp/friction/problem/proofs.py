@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
+from time import perf_counter
 
 import numpy as np
 import scipy.sparse as sp
@@ -35,9 +36,10 @@ class ProofNumbers:
 PROOFS = ProofNumbers()
 
 
-def find_least_energy(problem: FrictionProblem) -> tuple[float, Floats]:
+def find_least_energy(problem: FrictionProblem, seconds: float = np.inf) -> tuple[float, Floats]:
     """``rho r . W r`` [-] of forces r in K of length one, and these, (nc * dim,): where a descent
-    from equal normal forces ends, or becomes less than -`PROOFS.certain_energy`.
+    from equal normal forces ends, in so many seconds, or becomes less than
+    -`PROOFS.certain_energy`.
 
     Negative: a proof that W gives energy.  Positive: no proof that it does not, as the least of a
     form that is not convex may be elsewhere.  The steps, ``r -> P_K(r - S r / |S|)`` with S the
@@ -49,7 +51,10 @@ def find_least_energy(problem: FrictionProblem) -> tuple[float, Floats]:
     force = np.zeros(len(problem.offset))
     force[:: problem.dim] = problem.contacts**-0.5
     energy, ahead, momentum = float(force @ (form @ force)), force, 1.0
+    end = perf_counter() + seconds
     for _ in range(PROOFS.descent_steps):
+        if perf_counter() > end:
+            break
         step = _project_forces(ahead - (form @ ahead) / largest, problem)
         size = float(np.linalg.norm(step))
         if size == 0.0 or energy < -PROOFS.certain_energy:
@@ -67,11 +72,12 @@ def find_least_energy(problem: FrictionProblem) -> tuple[float, Floats]:
     return energy, force
 
 
-def gives_energy(problem: FrictionProblem) -> bool:
-    """Whether forces are found on which W gives energy; never where it is made of bodies."""
+def gives_energy(problem: FrictionProblem, seconds: float = np.inf) -> bool:
+    """Whether forces are found, in so many seconds, on which W gives energy; never where it is made
+    of bodies."""
     return (
         problem.bodies is None and problem.contacts > 0
-        and find_least_energy(problem)[0] < -PROOFS.certain_energy
+        and find_least_energy(problem, seconds)[0] < -PROOFS.certain_energy
     )  # fmt: skip
 
 
@@ -82,12 +88,15 @@ def _project_forces(force: Floats, problem: FrictionProblem) -> Floats:
     return np.asarray(nearest.ravel())
 
 
-def prove_forces_insufficient(problem: FrictionProblem, slip: Ints | None = None) -> bool:
+def prove_forces_insufficient(
+    problem: FrictionProblem, slip: Ints | None = None, *, seconds: float = np.inf
+) -> bool:
     """Whether it is proved that no r in K gives ``u_N >= 0`` at every contact.
 
     ``slip`` (nc,), in 2D: +-1 where a slip leaves the edge of the cone with that sign only, 0
-    where the whole cone is free.  Every force of a cone is a sum of forces along its edges; in 3D
-    the cone is replaced by the pyramid around it, so that a proof stays one.
+    where the whole cone is free.  ``seconds``: within so many, or there is no proof.  Every force
+    of a cone is a sum of forces along its edges; in 3D the cone is replaced by the pyramid around
+    it, so that a proof stays one.
 
     The programme is: least t with ``-u_N <= t``.  Its dual y >= 0 is the proof (Farkas' lemma): no
     force along an edge makes ``y . approach`` less than without forces, where it is above zero.
@@ -121,6 +130,7 @@ def prove_forces_insufficient(problem: FrictionProblem, slip: Ints | None = None
     found = linprog(
         np.append(np.zeros(approach.shape[1]), 1.0), bounds=(0, None), method="highs",
         A_ub=sp.hstack([approach, np.full((contacts, 1), -1.0)]), b_ub=bound,
+        options={"time_limit": seconds},
     )  # fmt: skip
     if found.status != 0 or found.fun <= PROOFS.approach_left:
         return False
