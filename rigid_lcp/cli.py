@@ -29,7 +29,7 @@ def run_rigid(arguments: argparse.Namespace) -> int:
 
     path = place_run(arguments)
     file = load_scene(arguments.scene, arguments.overrides)
-    for doubt in list_doubts(file.tables):
+    for doubt in list_doubts(file.tables, file.scans):
         print(f"warning: {doubt}", file=sys.stderr)
     answer = _preview_run(file) if arguments.dry_run else _run(file, path, arguments)
     print_fields(answer, arguments.json)

@@ -249,7 +249,7 @@ def refuse_lost_vertices(given: Floats, shape: shapes.Polyhedron) -> None:
         )
 
 
-def list_doubts(tables: SceneTables) -> list[str]:
+def list_doubts(tables: SceneTables, scans: Sequence[Sequence[shapes.Scan]] = ()) -> list[str]:
     """Sentences on values that are likely in another unit than SI, and on what is not used."""
     named: list[tuple[str, Any]] = [("surface", tables.surface)]
     for kind in ("ground", "body", "grains", "stones", "pair"):
@@ -265,6 +265,10 @@ def list_doubts(tables: SceneTables) -> list[str]:
             edges = one.box or np.ptp(one.vertices or [[0.0]], axis=0)
             size = max(2 * (one.radius or 0.0), *edges)
             found.append(describe_implausible("body", float(size), key))
+    for i, (stones, read) in enumerate(zip(tables.stones or (), scans, strict=False)):
+        if stones.size is None and stones.grading is None:
+            largest = max(scan.size for scan in read)
+            found.append(describe_implausible("grain", largest, f"stones.{i}.unit"))
     return [*(said for said in found if said), *list_unused(tables)]
 
 

@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from rigid_lcp.errors import SceneError
-from rigid_lcp.scene import load_scene, make_simulation
+from rigid_lcp.scene import list_doubts, load_scene, make_simulation
 from rigid_lcp.scene.file import place_stones
 from rigid_lcp.shapes import make_rotation, normalise, read_scan
 from trackbed.errors import MeshError
@@ -55,6 +55,22 @@ def make_ellipsoid(count: int, axes: np.ndarray = AXES) -> tuple[np.ndarray, np.
 def write(path: Path, point: np.ndarray, triangle: np.ndarray) -> Path:
     meshio.write(path, meshio.Mesh(point, [("triangle", triangle)]))
     return path
+
+
+def test_a_scan_in_millimetres_that_is_read_as_metres_is_named(tmp_path: Path) -> None:
+    """Where no size is given, the scan's own is judged, with the unit that makes it one."""
+    write(tmp_path / "scan.stl", *make_ellipsoid(60))
+    own = SCENE.replace('grading = "EN 13450 31.5/50"\n', "")
+    for text, doubts in (
+        (own, 0),
+        (own.replace('"mm"', '"m"'), 1),
+        (SCENE.replace('"mm"', '"m"'), 0),
+    ):
+        (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
+        file = load_scene(tmp_path / "scene.toml")
+        found = list_doubts(file.tables, file.scans)
+        assert len(found) == doubts
+        assert all("stones.0.unit: a grain of" in one and "as mm it" in one for one in found)
 
 
 def test_hull_tends_to_the_ellipsoid_and_thinning_to_the_hull(tmp_path: Path) -> None:
