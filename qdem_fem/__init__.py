@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from trackbed.cache_folders import provide_cache_folders
 
 if TYPE_CHECKING:
-    from qdem_fem.bodies import Body
+    from qdem_fem.bodies import Body, QuadraticBody
     from qdem_fem.contact import CriticalStep
     from qdem_fem.contact.search import PeriodicWidth
     from qdem_fem.contact.spheres import ContactPlane, SphereContact
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 provide_cache_folders(__path__[0])
 
 _ROOMS = {
-    "bodies": ("Body",),
+    "bodies": ("Body", "QuadraticBody"),
     "contact": ("CriticalStep",),
     "contact.search": ("PeriodicWidth",),
     "contact.spheres": ("ContactPlane", "SphereContact"),
@@ -35,8 +35,8 @@ _ROOMS = {
 _HOMES = {name: room for room, names in _ROOMS.items() for name in names}
 __all__ = [
     "Body", "ContactPlane", "CriticalStep", "Energy", "History", "Material", "PeriodicWidth",
-    "QdemError", "SceneWarning", "Series", "Simulation", "SphereContact", "StaticAnswer",
-    "StepWarning", "SurfaceContact", "make_ramp",
+    "QdemError", "QuadraticBody", "SceneWarning", "Series", "Simulation", "SphereContact",
+    "StaticAnswer", "StepWarning", "SurfaceContact", "make_ramp",
 ]  # fmt: skip
 
 

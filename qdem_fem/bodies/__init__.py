@@ -5,6 +5,7 @@ from qdem_fem.bodies.conditions import COMPONENTS, Conditions, Held, NodalLoad, 
 from qdem_fem.bodies.deformable import Body, Rigid
 from qdem_fem.bodies.discretisation import Discretisation, estimate_bending, estimate_discretisation
 from qdem_fem.bodies.mass_scaling import find_element_step, find_mass_scaling_factor
+from qdem_fem.bodies.quadratic import QuadraticBody
 from qdem_fem.bodies.rigid_mass import (
     RigidMass,
     fit_rigid_displacement,
@@ -16,8 +17,8 @@ from qdem_fem.bodies.rigid_mass import (
 
 __all__ = [
     "COMPONENTS", "EVERY", "NOTHING", "Assembly", "Body", "Conditions", "Discretisation", "Given",
-    "Held", "NodalLoad", "Rigid", "RigidMass", "Roller", "estimate_bending",
-    "estimate_discretisation", "find_element_step", "find_mass_scaling_factor",
-    "fit_rigid_displacement", "fit_rigid_velocity", "make_cross_matrix", "make_stiffness_six",
-    "make_turn_matrix", "remove_held",
+    "Held", "NodalLoad", "QuadraticBody", "Rigid", "RigidMass", "Roller",
+    "estimate_bending", "estimate_discretisation", "find_element_step",
+    "find_mass_scaling_factor", "fit_rigid_displacement", "fit_rigid_velocity",
+    "make_cross_matrix", "make_stiffness_six", "make_turn_matrix", "remove_held",
 ]  # fmt: skip

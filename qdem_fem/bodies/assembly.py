@@ -14,7 +14,18 @@ from qdem_fem.bodies.deformable import Body
 from qdem_fem.bodies.frames import BodyFrames
 from qdem_fem.element import MEASURES, Strain
 from qdem_fem.files import Floats, Integers
-from qdem_fem.kernel.cpu import Constraints, Fields, Loads, Probes, build_layout, make_aligned_zeros
+from qdem_fem.kernel.cpu import (
+    GROUPS,
+    LAWS,
+    POINTS,
+    Constraints,
+    Fields,
+    Loads,
+    Probes,
+    Quadratic,
+    build_layout,
+    make_aligned_zeros,
+)
 from qdem_fem.kernel.cpu import step as kernel
 
 THREAD_ELEMENTS = 16_384
@@ -50,7 +61,8 @@ NOTHING = Given(np.ones((2, 1)))
 
 
 class Assembly:
-    """Bodies side by side; numbers of nodes and elements run through all of them.
+    """Bodies side by side; numbers of nodes and elements run through all of them.  Those that
+    deform are of one kind of element.
 
     ``master`` (n,): the node that a node moves with, itself unless periodic; ``density_factor``
     (m,) from mass scaling [-].  Elements of rigid bodies are in none of the arrays; their nodes
@@ -70,8 +82,10 @@ class Assembly:
         self._first_node = np.cumsum([0] + [len(body.nodes) for body in bodies])
         none = np.zeros(0)
         soft = [i for i, body in enumerate(bodies) if not body.rigid]
-        shifted = [bodies[i].elements + self._first_node[i] for i in soft]
-        self.elements = master[np.concatenate([*shifted, np.zeros((0, 4), np.int64)])]
+        first = bodies[soft[0] if soft else 0]
+        quadratic, shares = first.ELEMENT == "quadratic", np.array(first.MASS_SHARES)
+        shifted = [bodies[i].element_nodes + self._first_node[i] for i in soft]
+        self.elements = master[np.concatenate([*shifted, np.zeros((0, len(shares)), np.int64)])]
         volumes = np.concatenate([*(bodies[i].gradients[1] for i in soft), none])
         materials = [bodies[i].material for i in soft]
         viscous = any(material.is_viscous for material in materials)
@@ -80,24 +94,27 @@ class Assembly:
         gradients = np.concatenate(
             [*(bodies[i].gradients[0].reshape(-1, 9) for i in soft), none.reshape(0, 9)]
         )
-        rows = np.column_stack([gradients, *(modulus * volumes for modulus in moduli)])
+        weight = volumes / POINTS if quadratic else volumes
+        rows = np.column_stack([gradients, *(modulus * weight for modulus in moduli)])
 
-        mass = np.concatenate([*(m.density for m in materials), none]) * volumes / 4
+        mass = np.concatenate([*(m.density for m in materials), none]) * volumes
         if density_factor is not None:
             mass = mass * density_factor
         self.mass: Floats = np.bincount(
-            self.elements.ravel(), np.repeat(mass, 4), self.n_nodes
+            self.elements.ravel(), (mass[:, None] * shares).ravel(), self.n_nodes
         ).astype(float)
-        """Quarter masses of the elements, summed [kg], (n,); zero for nodes that follow others,
+        """Shares of the elements' masses, summed [kg], (n,); zero for nodes that follow others,
         and of rigid bodies."""
         rigid = np.repeat([bool(body.rigid) for body in bodies], np.diff(self._first_node))
         self.packed = build_layout(
-            self.elements, self.n_nodes, rows, self.dtype, np.flatnonzero(rigid)
-        )
+            self.elements[:, GROUPS] if quadratic else self.elements, self.n_nodes, rows,
+            self.dtype, np.flatnonzero(rigid),
+        )  # fmt: skip
         self.place = self.packed.node_place[master]
         """The kernel's number of a node, (n,)."""
         self.viscous = True if viscous else None
-        self.law = kernel.LAWS[strain](kind.type(0.5))
+        law = LAWS[strain](kind.type(0.5))
+        self.law = Quadratic(law) if quadratic else law
         chunks = len(self.packed.layout.chunk_shift)
         most = threads or max(1, len(self.elements) // THREAD_ELEMENTS)
         self.threads = max(1, min(most, numba.get_num_threads(), chunks))

@@ -29,6 +29,10 @@ class Body:
     Raises `MeshError`, `MaterialError`.
     """
 
+    ELEMENT = "linear"
+    MASS_SHARES: tuple[float, ...] = (1 / 4,) * 4
+    """Of an element's mass, at each of its nodes [-]."""
+
     def __init__(
         self, mesh: Any, material: element.Material, name: str = "body", *, rigid: Rigid = False
     ) -> None:
@@ -61,6 +65,11 @@ class Body:
         """Nodes of the right-handed elements, (m, 4)."""
         return self.mesh.elements
 
+    @property
+    def element_nodes(self) -> Integers:
+        """All nodes of the elements, (m, nodes of an element)."""
+        return self.elements
+
     @cached_property
     def surface(self) -> Integers:
         """Nodes of the outward surface triangles, (k, 3)."""
@@ -70,6 +79,17 @@ class Body:
     def gradients(self) -> tuple[Floats, Floats]:
         """Reference gradients of the shape functions [1/m], (m, 3, 3), and volumes [m^3], (m,)."""
         return find_gradients(self.nodes, self.elements)
+
+    def find_shape_gradients(self, part: slice = slice(None)) -> Floats:
+        """grad_X N_a at the points of integration of some elements [1/m], (m, points, nodes, 3)."""
+        gradients = self.gradients[0][part]
+        first = -gradients.sum(axis=1, keepdims=True)
+        return np.concatenate([first, gradients], axis=1)[:, None]
+
+    def find_gradient(self, displacement: Floats) -> Floats:
+        """H of the elements [-], (m, 3, 3), of displacements (n, 3) [m]; of several points in an
+        element (points, m, 3, 3)."""
+        return element.find_displacement_gradient(self.gradients[0], self.elements, displacement)
 
     @cached_property
     def rigid_mass(self) -> RigidMass:
@@ -117,9 +137,7 @@ class Body:
         """Elastic Cauchy stress of the elements [Pa], (m, 3, 3) (eq. 2); zero of a rigid body."""
         if self.rigid:
             return np.zeros((len(self.elements), 3, 3))
-        gradient = element.find_displacement_gradient(
-            self.gradients[0], self.elements, self.displacement
-        )
+        gradient = self.find_gradient(self.displacement)
         nominal = element.MEASURES[self.strain].compute_nominal_stress(
             gradient, self.material.lame_first, self.material.lame_second
         )
@@ -127,10 +145,9 @@ class Body:
 
     def elastic_energy(self, displacement: Floats, strain: element.Strain) -> Floats:
         """Stored energy of the elements [J], (m,), at a displacement (n, 3) [m]."""
-        gradients, volumes = self.gradients
         found: Floats = element.MEASURES[strain].compute_stored_energy(
-            element.find_displacement_gradient(gradients, self.elements, displacement),
-            volumes, self.material.lame_first, self.material.lame_second,
+            self.find_gradient(displacement), self.gradients[1],
+            self.material.lame_first, self.material.lame_second,
         )  # fmt: skip
         return found
 

@@ -21,14 +21,13 @@ from qdem_fem.contact.spheres import GO_ON, Contact, advance_one, advance_thread
 from qdem_fem.contact.surface import advance_surfaces
 from qdem_fem.contact.surface import law as contact_surface_kernel
 from qdem_fem.contact.system import System
-from qdem_fem.element import MEASURES, stress
 from qdem_fem.kernel import digest_sources
-from qdem_fem.kernel.cpu import Probes, lanes
+from qdem_fem.kernel.cpu import Probes
 from qdem_fem.kernel.cpu import step as kernel
 from qdem_fem.rigid import advance_rigid
 from qdem_fem.rigid import step as rigid_step
 
-SOURCES = compiling, kernel, stress, lanes, rigid_step, contact_surface_kernel
+SOURCES = compiling, kernel, *kernel.SOURCES, rigid_step, contact_surface_kernel
 THREAD_SPHERES = 16_384
 """Fewer spheres than this for each thread lose more at barriers than they gain."""
 WINDOW_ONE: Any = kernel.choose_window_kernel(1)
@@ -111,7 +110,7 @@ def build_contact_window(made_from: str) -> Any:
 
 
 contact_window: Any = build_contact_window(
-    digest_sources(*SOURCES, *contact_surface_kernel.SOURCES, *MEASURES.values())
+    digest_sources(*SOURCES, *contact_surface_kernel.SOURCES)
 )
 
 

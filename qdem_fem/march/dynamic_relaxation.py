@@ -319,15 +319,15 @@ class StaticProblem:
 def find_inverse_stiffness(simulation: State, assembly: Assembly) -> Floats:
     """``1/M`` with fictitious masses M: a third of the trace of ``K_aa`` at every node [N/m].
 
-    ``tr K_aa = sum_e V (lambda + 4 mu) |grad N_a|^2``.
+    ``tr K_aa = sum_e V (lambda + 4 mu) |grad N_a|^2``, the mean over an element's points.
     """
     shares = []
     for body in simulation.bodies:
-        gradients, volumes = body.gradients
-        every = np.concatenate([-gradients.sum(axis=1, keepdims=True), gradients], axis=1)
+        every, volumes = body.find_shape_gradients(), body.gradients[1]
         modulus = np.asarray(body.material.lame_first) + 4 * np.asarray(body.material.lame_second)
-        shares.append((modulus * volumes)[:, None] * (every**2).sum(axis=2) / 3)
+        squares = (every**2).sum(axis=3).mean(axis=1)
+        shares.append(((modulus * volumes)[:, None] * squares / 3).ravel())
     at = assembly.place[assembly.elements]
-    trace = np.bincount(at.ravel(), np.concatenate(shares).ravel(), assembly.n_nodes)
+    trace = np.bincount(at.ravel(), np.concatenate(shares), assembly.n_nodes)
     inverse = np.divide(1.0, trace, out=np.zeros_like(trace), where=trace > 0)
     return np.repeat(inverse, 4)

@@ -94,6 +94,22 @@ def check_contact(contact: Any, precision: str, device: str) -> None:
         )  # fmt: skip
 
 
+def check_elements(bodies: list[Body], device: str) -> None:
+    """Raise `ConditionError` for elements that are not computed side by side, or not on a GPU."""
+    kinds = {body.ELEMENT: body.name for body in bodies if not body.rigid}
+    if len(kinds) > 1:
+        (one, name), (other, second) = sorted(kinds.items())[:2]
+        raise ConditionError(
+            f"{name} is of {one} elements and {second} of {other} ones",
+            where="simulation, element", remedy="give all bodies that deform one kind",
+        )  # fmt: skip
+    if device != "cpu" and set(kinds) - {"linear"}:
+        raise ConditionError(
+            f"{kinds['quadratic']} is of quadratic elements, which the processor computes",
+            where="simulation, element", remedy='take device="cpu", or linear elements',
+        )  # fmt: skip
+
+
 def check_rigid(bodies: list[Body], precision: str, device: str) -> None:
     """Raise `ConditionError` for rigid bodies where none are computed."""
     rigid = [body.name for body in bodies if body.rigid]

@@ -20,7 +20,8 @@ def check_held(simulation: State) -> None:
     assembly, conditions = simulation.assembly, simulation.conditions
     n, elements, master = assembly.n_nodes, assembly.elements, simulation.master
     pairs = np.concatenate(
-        [elements[:, [0, k]] for k in (1, 2, 3)] + [np.stack([np.arange(n), master], 1)]
+        [elements[:, [0, k]] for k in range(1, elements.shape[1])]
+        + [np.stack([np.arange(n), master], 1)]
     )
     graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
     count, part = connected_components(graph, directed=False)

@@ -75,6 +75,7 @@ class Simulation(ConditionedBodies):
             threads=threads, mass_scaling=mass_scaling,
         )  # fmt: skip
         options.check_contact(contact, precision, device)
+        options.check_elements(own, device)
         choose_assembly(device)
         options.check_rigid(own, precision, device)
         super().__init__(

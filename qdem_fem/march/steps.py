@@ -11,7 +11,7 @@ import numpy as np
 
 from qdem_fem.bodies import Body, Given
 from qdem_fem.contact import run_window
-from qdem_fem.element import find_displacement_gradient, find_volume_change
+from qdem_fem.element import find_volume_change
 from qdem_fem.files import ElementInverted, Floats, Integers, StepWarning, Unstable
 from qdem_fem.kernel.cpu import Probes
 from qdem_fem.march.energies import find_energy
@@ -182,9 +182,7 @@ def find_inverted(bodies: Sequence[Body], displacement: Floats) -> tuple[str, in
     for body, moved in zip(bodies, np.split(displacement, ends), strict=True):
         if body.rigid:
             continue
-        jacobian = 1 + find_volume_change(
-            find_displacement_gradient(body.gradients[0], body.elements, moved)
-        )
+        jacobian = np.atleast_2d(1 + find_volume_change(body.find_gradient(moved))).min(axis=0)
         wrong = np.flatnonzero(~(jacobian > 0))
         if wrong.size:
             worst = int(wrong[np.argmin(np.nan_to_num(jacobian[wrong], nan=-np.inf))])

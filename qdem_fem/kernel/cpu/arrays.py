@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 class Layout(NamedTuple):
     """Where the elements' data lie (`qdem_fem.kernel.cpu.build_layout`); integers are int64."""
 
-    corners: Any  # 4 x node number of the corners, (blocks x 4 x lanes,) int32
+    corners: Any  # 4 x node number of an element's nodes, (blocks x nodes x lanes,) int32
     rows: Any  # gradients [1/m] and Lame constants times volume [N m], (blocks x rows x lanes,)
     chunk_block: Any  # first block of every chunk, and the end, (chunks + 1,)
     chunk_shift: Any

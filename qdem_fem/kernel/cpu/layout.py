@@ -77,9 +77,9 @@ def build_layout(
     ``loose``: nodes of no element that forces act on all the same, in a window of their own
     that no piece of the motion looks at.
 
-    ``elements`` (m, 4); ``element_rows`` (m, 11 or 13): gradients of corners 1 to 3 [1/m], then
-    Lame constants and viscosities times volume.  The last block is filled up with copies of
-    the last element that have no stiffness.
+    ``elements`` (m, 4), or a multiple of four; ``element_rows`` (m, 11 or 13): gradients of
+    corners 1 to 3 [1/m], then Lame constants and viscosities times volume.  The last block is
+    filled up with copies of the last element that have no stiffness.
     """
     node_order, element_order = order_for_locality(elements, n_nodes)
     node_place = np.empty(n_nodes, dtype=np.int64)
@@ -92,7 +92,7 @@ def build_layout(
     blocks = -(-m // lanes)
     filled = np.concatenate([element_order, np.full(blocks * lanes - m, element_order[-1])])
 
-    corners = node_place[elements[filled]].reshape(blocks, lanes, 4)
+    corners = node_place[elements[filled]].reshape(blocks, lanes, -1)
     width = element_rows.shape[1]
     rows = make_aligned_zeros(blocks * width * lanes, dtype)
     by_block = rows.reshape(blocks, width, lanes)

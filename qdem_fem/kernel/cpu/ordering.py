@@ -12,9 +12,9 @@ from qdem_fem.files import Integers
 def order_for_locality(elements: Integers, n_nodes: int) -> tuple[Integers, Integers]:
     """Reverse Cuthill-McKee numbering of the nodes, and the elements in the order they need them.
 
-    ``elements`` (m, 4).  Returns ``node_order`` (n,) and ``element_order`` (m,): old numbers in
-    the new order, so that ``nodes[node_order]`` and ``elements[element_order]`` are the arrays
-    renumbered; nodes of no element come last.  The new name of old node ``node_order[k]`` is k,
+    ``elements`` (m, nodes of one).  Returns ``node_order`` (n,) and ``element_order`` (m,): old
+    numbers in the new order, so that ``nodes[node_order]`` and ``elements[element_order]`` are the
+    arrays renumbered; nodes of no element come last.  The new name of old node ``node_order[k]`` is k,
     which is also what the corners of the elements have to be replaced by.
 
     A mesh generator's own order is about as good as a random one: half of the time of a step
@@ -23,8 +23,8 @@ def order_for_locality(elements: Integers, n_nodes: int) -> tuple[Integers, Inte
 
     Source: Cuthill and McKee, Proc. 24th Nat. Conf. ACM (1969) 157; A. George (1971).
     """
-    starts = np.arange(0, 4 * len(elements) + 1, 4, dtype=np.int64)
-    small = np.int32 if max(n_nodes, 4 * len(elements)) < 2**31 else np.int64
+    starts = elements.shape[1] * np.arange(len(elements) + 1, dtype=np.int64)
+    small = np.int32 if max(n_nodes, elements.size) < 2**31 else np.int64
     corner_of = csr_matrix(
         (np.ones(elements.size, bool), elements.reshape(-1).astype(small), starts.astype(small)),
         shape=(len(elements), n_nodes),
@@ -39,6 +39,5 @@ def order_for_locality(elements: Integers, n_nodes: int) -> tuple[Integers, Inte
     name = np.empty(n_nodes, np.int64)
     name[node_order] = np.arange(n_nodes)
     corners = [name[corner] for corner in elements.T]
-    lowest = np.minimum(np.minimum(corners[0], corners[1]), np.minimum(corners[2], corners[3]))
-    highest = np.maximum(np.maximum(corners[0], corners[1]), np.maximum(corners[2], corners[3]))
+    lowest, highest = (pick.reduce(corners) for pick in (np.minimum, np.maximum))
     return node_order, np.argsort(lowest * n_nodes + highest, kind="stable")

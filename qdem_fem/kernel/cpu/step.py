@@ -11,168 +11,50 @@ argument that is ``None`` (viscosity, gravity) takes its branch out of the compi
 from __future__ import annotations
 
 import os
-from functools import cache, partial
+from functools import cache
 from typing import Any
 
 import numpy as np
-from numba import config, njit, prange
+from numba import config, prange
 from numba.extending import overload
 
 from qdem_fem.element import MEASURES, stress
 from qdem_fem.kernel import digest_sources
-from qdem_fem.kernel.cpu import lanes
-from qdem_fem.kernel.cpu.lanes import (
-    align_stack,
-    clear_row,
-    count_lane,
-    gather_edges,
-    load_lanes,
-    load_row,
-    make_zero_lanes,
-    mark_not_positive,
-    scatter_pulls,
-    store_row,
-    sum_lanes,
-)
+from qdem_fem.kernel.cpu import lanes, linear, quadratic
+from qdem_fem.kernel.cpu.lanes import clear_row, load_row, store_row
+from qdem_fem.kernel.cpu.linear import add_chunk_forces, compiled
 
-MATHEMATICS: Any = {"error_model": "numpy", "fastmath": {"contract", "nsz", "arcp", "reassoc"}}
-"""Fused multiply-add and reassociation are allowed; NaN and infinity keep their meaning."""
-compiled: Any = partial(njit, **MATHEMATICS)
-inlined: Any = partial(njit, forceinline=True, **MATHEMATICS)
-INLINED: Any = {"forceinline": True, **MATHEMATICS}
+__all__ = [
+    "SOURCES",
+    "add_chunk_forces",
+    "add_element_forces",
+    "build_window",
+    "choose_window_kernel",
+]
+
+SOURCES = stress, lanes, linear, quadratic, *MEASURES.values()
+"""What a step is compiled from, beside this file."""
 
 if not {"NUMBA_THREADING_LAYER", "NUMBA_THREADING_LAYER_PRIORITY"} & set(os.environ):
     # numba's first choice, TBB, takes ten times longer to start a loop than OpenMP does
     settings: Any = config
     settings.THREADING_LAYER_PRIORITY = ["omp", "tbb", "workqueue"]
 
-ROWS_ELASTIC, ROWS_VISCOUS = 11, 13
-"""Numbers an element brings: nine gradients, lambda V, mu V; with viscosity also those of it."""
+
+def add_element_forces(law: Any, *chunk: Any) -> Any:
+    """`add_chunk_forces` of the elements that the type of ``law`` names."""
+    return choose_element(type(law))(law, *chunk)
 
 
-LAWS: dict[str, type] = {name: measure.MEASURE for name, measure in MEASURES.items()}
-BY_LAW = {measure.MEASURE: measure for measure in MEASURES.values()}
-compute_element_gradient = inlined(stress.compute_element_gradient)
-compute_element_pulls = inlined(stress.compute_element_pulls)
-find_matrix_product = inlined(stress.find_matrix_product)
+def choose_element(law: type) -> Any:
+    """The compiled forces of a chunk of elements."""
+    return quadratic.add_quadratic_forces if law is quadratic.Quadratic else add_chunk_forces
 
 
-def find_elastic_stress(law: Any, h: Any, lame_first: Any, lame_second: Any) -> Any:
-    """``(P V, J)`` of the strain measure that the type of ``law`` names."""
-    return BY_LAW[type(law)].find_stress_numbers(h, lame_first, lame_second, law.half)
-
-
-def compute_viscous_pulls(
-    law: Any, h: Any, w: Any, g: Any, lame_first: Any, lame_second: Any, first: Any, second: Any
-) -> Any:
-    """``(pulls, J, power)`` with viscosity, linear beside ``small``, else current (eq. 7).
-
-    The power is what viscosity takes of the motion [W].
-    """
-    measure = BY_LAW[type(law)]
-    if hasattr(measure, "find_fused_pulls"):
-        return measure.find_fused_pulls(h, w, g, lame_first, lame_second, first, second, law.half)
-    p, jacobian = find_elastic_stress(law, h, lame_first, lame_second)
-    rate = stress.compute_element_gradient(w, g)
-    q = measure.find_viscous_numbers(h, rate, first, second, law.half)
-    pulls = stress.compute_element_pulls(tuple(a + b for a, b in zip(p, q, strict=True)), g)
-    return pulls, jacobian, stress.find_matrix_product(q, rate)
-
-
-@overload(find_elastic_stress, strict=False, jit_options=INLINED)
-def _choose_elastic_stress(law: Any, h: Any, lame_first: Any, lame_second: Any) -> Any:
-    chosen = inlined(BY_LAW[law.instance_class].find_stress_numbers)
-    return lambda law, h, lame_first, lame_second: chosen(h, lame_first, lame_second, law.half)
-
-
-@overload(compute_viscous_pulls, strict=False, jit_options=INLINED)
-def _choose_viscous_pulls(
-    law: Any, h: Any, w: Any, g: Any, lame_first: Any, lame_second: Any, first: Any, second: Any
-) -> Any:
-    measure = BY_LAW[law.instance_class]
-    if hasattr(measure, "find_fused_pulls"):
-        fused = inlined(measure.find_fused_pulls)
-        return lambda law, h, w, g, lame_first, lame_second, first, second: fused(
-            h, w, g, lame_first, lame_second, first, second, law.half
-        )
-    elastic, viscous = (inlined(measure.find_stress_numbers), inlined(measure.find_viscous_numbers))
-
-    def compose_pulls(
-        law: Any, h: Any, w: Any, g: Any, lame_first: Any, lame_second: Any, first: Any,
-        second: Any,
-    ) -> Any:  # fmt: skip
-        p, jacobian = elastic(h, lame_first, lame_second, law.half)
-        rate = compute_element_gradient(w, g)
-        q = viscous(h, rate, first, second, law.half)
-        return compute_element_pulls(add(p, q), g), jacobian, find_matrix_product(q, rate)
-
-    return compose_pulls
-
-
-@inlined()
-def add(p: Any, q: Any) -> Any:
-    """Sum of two matrices in rows."""
-    return (
-        p[0] + q[0], p[1] + q[1], p[2] + q[2], p[3] + q[3], p[4] + q[4], p[5] + q[5],
-        p[6] + q[6], p[7] + q[7], p[8] + q[8],
-    )  # fmt: skip
-
-
-@compiled()
-def add_chunk_forces(
-    law: Any, viscous: Any, corners: Any, rows: Any, first_block: int, stop_block: int,
-    displacement: Any, velocity: Any, forces: Any, shift: int,
-) -> tuple[float, float]:  # fmt: skip
-    """Forces of the blocks of elements of one chunk (eqs 1-10), added to its window.
-
-    ``displacement`` [m], ``velocity`` [m/s], ``forces`` [N]: flat, four numbers a node.
-    Returns how many of its elements are inverted or not finite, and the power that viscosity
-    takes [W].
-    """
-    align_stack()
-    width = count_lanes_of(rows)
-    bad: Any = make_zero_lanes(rows)
-    taken: Any = make_zero_lanes(rows)
-    for block in range(first_block, stop_block):
-        at = block * count_block_rows(viscous) * width
-        g = (
-            load_lanes(rows, at), load_lanes(rows, at + width), load_lanes(rows, at + 2 * width),
-            load_lanes(rows, at + 3 * width), load_lanes(rows, at + 4 * width),
-            load_lanes(rows, at + 5 * width), load_lanes(rows, at + 6 * width),
-            load_lanes(rows, at + 7 * width), load_lanes(rows, at + 8 * width),
-        )  # fmt: skip
-        h = compute_element_gradient(gather_edges(displacement, corners, block), g)
-        first, second = load_lanes(rows, at + 9 * width), load_lanes(rows, at + 10 * width)
-        if viscous is None:
-            p, jacobian = find_elastic_stress(law, h, first, second)
-            pulls = compute_element_pulls(p, g)
-        else:
-            rate = gather_edges(velocity, corners, block)
-            pulls, jacobian, power = compute_viscous_pulls(
-                law, h, rate, g, first, second, load_lanes(rows, at + 11 * width),
-                load_lanes(rows, at + 12 * width),
-            )  # fmt: skip
-            taken = taken + power
-        bad = bad + mark_not_positive(jacobian)
-        scatter_pulls(forces, corners, block, shift, pulls, viscous)
-    return sum_lanes(bad), sum_lanes(taken)
-
-
-def count_lanes_of(rows: Any) -> int:
-    """Lanes of a block of this array."""
-    return count_lane(rows.dtype)
-
-
-@overload(count_lanes_of, strict=False)
-def _find_lane_count(rows: Any) -> Any:
-    width = count_lane(rows.dtype)
-    return lambda rows: width
-
-
-@inlined()
-def count_block_rows(viscous: Any) -> int:
-    """Rows of a block."""
-    return ROWS_ELASTIC if viscous is None else ROWS_VISCOUS
+@overload(add_element_forces, strict=False)
+def _choose_element_forces(law: Any, *chunk: Any) -> Any:
+    add_forces = choose_element(law.instance_class)
+    return lambda law, *chunk: add_forces(law, *chunk)
 
 
 @compiled()
@@ -261,7 +143,7 @@ def build_window(variant: str) -> Any:
     Its compiled form is kept on disk.  ``made_from`` is a part of its key there, so that a change
     of the stress or of the lanes, which are other files, is never answered by an old kernel.
     """
-    made_from = variant + digest_sources(stress, lanes, *MEASURES.values())
+    made_from = variant + digest_sources(*SOURCES)
 
     @compiled(parallel=variant == "threads", cache=True)
     def advance_window(
@@ -286,7 +168,7 @@ def build_window(variant: str) -> Any:
             apply_loads(loads, table[k], forces)
             work[0] += 0.5 * step * compute_loads_power(loads, table[k], velocity)
             for c in prange(chunk_shift.size):
-                bad[c], taken[c] = add_chunk_forces(
+                bad[c], taken[c] = add_element_forces(
                     law, viscous, corners, rows, chunk_block[c], chunk_block[c + 1], displacement,
                     velocity, forces, chunk_shift[c],
                 )  # fmt: skip
