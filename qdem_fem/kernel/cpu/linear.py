@@ -52,21 +52,16 @@ def compute_viscous_pulls(
     measure = BY_LAW[type(law)]
     if hasattr(measure, "find_fused_pulls"):
         return measure.find_fused_pulls(h, w, g, lame_first, lame_second, first, second, law.half)
-    rate = stress.compute_element_gradient(w, g)
-    p, jacobian, power = find_viscoelastic_stress(
-        law, h, rate, lame_first, lame_second, first, second
-    )
-    return stress.compute_element_pulls(p, g), jacobian, power
-
-
-def find_viscoelastic_stress(
-    law: Any, h: Any, rate: Any, lame_first: Any, lame_second: Any, first: Any, second: Any
-) -> Any:
-    """``(P V, J, power)`` with viscosity, at a ``rate`` of the displacement gradient [1/s]."""
     p, jacobian = find_elastic_stress(law, h, lame_first, lame_second)
-    q = BY_LAW[type(law)].find_viscous_numbers(h, rate, first, second, law.half)
-    total = tuple(a + b for a, b in zip(p, q, strict=True))
-    return total, jacobian, stress.find_matrix_product(q, rate)
+    rate = stress.compute_element_gradient(w, g)
+    q = find_viscous_stress(law, h, rate, first, second)
+    pulls = stress.compute_element_pulls(tuple(a + b for a, b in zip(p, q, strict=True)), g)
+    return pulls, jacobian, stress.find_matrix_product(q, rate)
+
+
+def find_viscous_stress(law: Any, h: Any, rate: Any, first: Any, second: Any) -> Any:
+    """``P V`` of viscosity at a ``rate`` of the displacement gradient [1/s]."""
+    return BY_LAW[type(law)].find_viscous_numbers(h, rate, first, second, law.half)
 
 
 @overload(find_elastic_stress, strict=False, jit_options=INLINED)
@@ -90,30 +85,18 @@ def _choose_viscous_pulls(
         law: Any, h: Any, w: Any, g: Any, lame_first: Any, lame_second: Any, first: Any,
         second: Any,
     ) -> Any:  # fmt: skip
+        p, jacobian = find_elastic_stress(law, h, lame_first, lame_second)
         rate = compute_element_gradient(w, g)
-        p, jacobian, power = find_viscoelastic_stress(
-            law, h, rate, lame_first, lame_second, first, second
-        )
-        return compute_element_pulls(p, g), jacobian, power
+        q = find_viscous_stress(law, h, rate, first, second)
+        return compute_element_pulls(add(p, q), g), jacobian, find_matrix_product(q, rate)
 
     return compose_pulls
 
 
-@overload(find_viscoelastic_stress, strict=False, jit_options=INLINED)
-def _choose_viscoelastic_stress(
-    law: Any, h: Any, rate: Any, lame_first: Any, lame_second: Any, first: Any, second: Any
-) -> Any:
-    measure = BY_LAW[law.instance_class]
-    elastic, viscous = (inlined(measure.find_stress_numbers), inlined(measure.find_viscous_numbers))
-
-    def compose_stress(
-        law: Any, h: Any, rate: Any, lame_first: Any, lame_second: Any, first: Any, second: Any
-    ) -> Any:
-        p, jacobian = elastic(h, lame_first, lame_second, law.half)
-        q = viscous(h, rate, first, second, law.half)
-        return add(p, q), jacobian, find_matrix_product(q, rate)
-
-    return compose_stress
+@overload(find_viscous_stress, strict=False, jit_options=INLINED)
+def _choose_viscous_stress(law: Any, h: Any, rate: Any, first: Any, second: Any) -> Any:
+    chosen = inlined(BY_LAW[law.instance_class].find_viscous_numbers)
+    return lambda law, h, rate, first, second: chosen(h, rate, first, second, law.half)
 
 
 @inlined()

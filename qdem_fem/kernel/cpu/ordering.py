@@ -14,8 +14,8 @@ def order_for_locality(elements: Integers, n_nodes: int) -> tuple[Integers, Inte
 
     ``elements`` (m, nodes of one).  Returns ``node_order`` (n,) and ``element_order`` (m,): old
     numbers in the new order, so that ``nodes[node_order]`` and ``elements[element_order]`` are the
-    arrays renumbered; nodes of no element come last.  The new name of old node ``node_order[k]`` is k,
-    which is also what the corners of the elements have to be replaced by.
+    arrays renumbered; nodes of no element come last.  The new name of old node ``node_order[k]``
+    is k, which is also what the corners of the elements have to be replaced by.
 
     A mesh generator's own order is about as good as a random one: half of the time of a step
     then goes to waiting for memory.  Not needed for bodies below some 50,000 elements, which

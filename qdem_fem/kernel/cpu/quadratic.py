@@ -33,7 +33,8 @@ from qdem_fem.kernel.cpu.linear import (
     count_block_rows,
     count_lanes_of,
     find_elastic_stress,
-    find_viscoelastic_stress,
+    find_matrix_product,
+    find_viscous_stress,
     inlined,
     load_gradients,
 )
@@ -122,6 +123,14 @@ def gather_groups(field: Any, corners: Any, block: int) -> Any:
     )  # fmt: skip
 
 
+@inlined()
+def find_point_stress(law: Any, h: Any, rate: Any, moduli: Any, viscosities: Any) -> Any:
+    """``(P V/4, J, power)`` of a point with viscosity."""
+    p, jacobian = find_elastic_stress(law, h, moduli[0], moduli[1])
+    q = find_viscous_stress(law, h, rate, viscosities[0], viscosities[1])
+    return add(p, q), jacobian, find_matrix_product(q, rate)
+
+
 @compiled()
 def add_quadratic_forces(
     law: Any, viscous: Any, corners: Any, rows: Any, first_block: int, stop_block: int,
@@ -135,27 +144,22 @@ def add_quadratic_forces(
     for block in range(first_block, stop_block):
         at = block * count_block_rows(viscous) * width
         g = load_gradients(rows, at, width)
-        first, second = load_lanes(rows, at + 9 * width), load_lanes(rows, at + 10 * width)
+        moduli = load_lanes(rows, at + 9 * width), load_lanes(rows, at + 10 * width)
         e, n, f = gather_groups(displacement, corners, block)
         h0, h1, h2, h3 = compute_point_gradients(e, n, f, g)
         if viscous is None:
-            p0, j0 = find_elastic_stress(law.measure, h0, first, second)
-            p1, j1 = find_elastic_stress(law.measure, h1, first, second)
-            p2, j2 = find_elastic_stress(law.measure, h2, first, second)
-            p3, j3 = find_elastic_stress(law.measure, h3, first, second)
+            p0, j0 = find_elastic_stress(law.measure, h0, *moduli)
+            p1, j1 = find_elastic_stress(law.measure, h1, *moduli)
+            p2, j2 = find_elastic_stress(law.measure, h2, *moduli)
+            p3, j3 = find_elastic_stress(law.measure, h3, *moduli)
         else:
-            moduli = (
-                first,
-                second,
-                load_lanes(rows, at + 11 * width),
-                load_lanes(rows, at + 12 * width),
-            )
+            other = load_lanes(rows, at + 11 * width), load_lanes(rows, at + 12 * width)
             e, n, f = gather_groups(velocity, corners, block)
             d0, d1, d2, d3 = compute_point_gradients(e, n, f, g)
-            p0, j0, w0 = find_viscoelastic_stress(law.measure, h0, d0, *moduli)
-            p1, j1, w1 = find_viscoelastic_stress(law.measure, h1, d1, *moduli)
-            p2, j2, w2 = find_viscoelastic_stress(law.measure, h2, d2, *moduli)
-            p3, j3, w3 = find_viscoelastic_stress(law.measure, h3, d3, *moduli)
+            p0, j0, w0 = find_point_stress(law.measure, h0, d0, moduli, other)
+            p1, j1, w1 = find_point_stress(law.measure, h1, d1, moduli, other)
+            p2, j2, w2 = find_point_stress(law.measure, h2, d2, moduli, other)
+            p3, j3, w3 = find_point_stress(law.measure, h3, d3, moduli, other)
             taken = taken + (w0 + w1 + w2 + w3)
         e, n, f = compute_point_pulls((p0, p1, p2, p3), g)
         scatter_pulls(forces, corners, 3 * block, shift, e, viscous)
