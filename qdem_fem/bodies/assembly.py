@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numba
@@ -22,7 +23,7 @@ from qdem_fem.kernel.cpu import (
     Fields,
     Loads,
     Probes,
-    Quadratic,
+    QuadraticLayout,
     build_layout,
     make_aligned_zeros,
 )
@@ -110,11 +111,12 @@ class Assembly:
             self.elements[:, GROUPS] if quadratic else self.elements, self.n_nodes, rows,
             self.dtype, np.flatnonzero(rigid),
         )  # fmt: skip
+        if quadratic:
+            self.packed = replace(self.packed, layout=QuadraticLayout(*self.packed.layout))
         self.place = self.packed.node_place[master]
         """The kernel's number of a node, (n,)."""
         self.viscous = True if viscous else None
-        law = LAWS[strain](kind.type(0.5))
-        self.law = Quadratic(law) if quadratic else law
+        self.law = LAWS[strain](kind.type(0.5))
         chunks = len(self.packed.layout.chunk_shift)
         most = threads or max(1, len(self.elements) // THREAD_ELEMENTS)
         self.threads = max(1, min(most, numba.get_num_threads(), chunks))

@@ -47,8 +47,12 @@ def estimate_discretisation(
     bodies: Iterable[tuple[Body, Floats, bool]], strain: Strain
 ) -> Discretisation | None:
     """`Discretisation` of deformable bodies, each with its displacement (n, 3) [m] and whether
-    nothing holds it; None: of bodies without strain nothing can be said."""
-    parts = [_integrate_means(*each, strain) for each in bodies if not each[0].rigid]
+    nothing holds it; None: of bodies without strain, or of quadratic elements, nothing can be
+    said."""
+    soft = [each for each in bodies if not each[0].rigid]
+    if any(body.ELEMENT != "linear" for body, _, _ in soft):
+        return None
+    parts = [_integrate_means(*each, strain) for each in soft]
     if not parts:
         return None
     energy, of_nodes, apart, lumped, consistent = np.sum(parts, axis=0)

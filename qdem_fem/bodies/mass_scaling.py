@@ -27,8 +27,8 @@ def find_element_step(body: Body, part: slice = slice(None)) -> Floats:
         for component, along in parts:
             strain[:, :, row, :, component] = every[..., along]
     strain /= np.sqrt(points * np.array(body.MASS_SHARES))[:, None]
-    strain = strain.reshape(count, 6 * points, 3 * nodes)
-    product = strain @ strain.transpose(0, 2, 1)
+    rows = strain.reshape(count, 6 * points, 3 * nodes)
+    product = rows @ rows.transpose(0, 2, 1)
     first, second, density = (
         np.asarray(each)[part]
         for each in (material.lame_first, material.lame_second, material.density)

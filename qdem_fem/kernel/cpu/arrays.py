@@ -23,6 +23,12 @@ class Layout(NamedTuple):
     window_shift: Any  # shifts of the windows that hold the piece's nodes
 
 
+class QuadraticLayout(Layout):
+    """`Layout` of quadratic elements; by the type of it their forces are chosen."""
+
+    __slots__ = ()
+
+
 class Fields(NamedTuple):
     """What moves: flat arrays of four numbers a node, in the kernel's precision."""
 

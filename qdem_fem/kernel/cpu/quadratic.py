@@ -12,7 +12,7 @@ Forces are the transpose of both, of the nominal stresses P(q) times V/4.
 from __future__ import annotations
 
 from math import sqrt
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -45,12 +45,6 @@ OWN, OTHER = (5 + 3 * sqrt(5)) / 20, (5 - sqrt(5)) / 20
 """Barycentric coordinates A, B of a point: that of its own corner, and of the others [-]."""
 SPREAD = OWN - OTHER
 POINTS = 4  # of integration, of weight V/4 each [-]
-
-
-class Quadratic(NamedTuple):
-    """That elements are quadratic, and their strain measure."""
-
-    measure: Any
 
 
 @inlined()
@@ -148,18 +142,18 @@ def add_quadratic_forces(
         e, n, f = gather_groups(displacement, corners, block)
         h0, h1, h2, h3 = compute_point_gradients(e, n, f, g)
         if viscous is None:
-            p0, j0 = find_elastic_stress(law.measure, h0, *moduli)
-            p1, j1 = find_elastic_stress(law.measure, h1, *moduli)
-            p2, j2 = find_elastic_stress(law.measure, h2, *moduli)
-            p3, j3 = find_elastic_stress(law.measure, h3, *moduli)
+            p0, j0 = find_elastic_stress(law, h0, *moduli)
+            p1, j1 = find_elastic_stress(law, h1, *moduli)
+            p2, j2 = find_elastic_stress(law, h2, *moduli)
+            p3, j3 = find_elastic_stress(law, h3, *moduli)
         else:
             other = load_lanes(rows, at + 11 * width), load_lanes(rows, at + 12 * width)
             e, n, f = gather_groups(velocity, corners, block)
             d0, d1, d2, d3 = compute_point_gradients(e, n, f, g)
-            p0, j0, w0 = find_point_stress(law.measure, h0, d0, moduli, other)
-            p1, j1, w1 = find_point_stress(law.measure, h1, d1, moduli, other)
-            p2, j2, w2 = find_point_stress(law.measure, h2, d2, moduli, other)
-            p3, j3, w3 = find_point_stress(law.measure, h3, d3, moduli, other)
+            p0, j0, w0 = find_point_stress(law, h0, d0, moduli, other)
+            p1, j1, w1 = find_point_stress(law, h1, d1, moduli, other)
+            p2, j2, w2 = find_point_stress(law, h2, d2, moduli, other)
+            p3, j3, w3 = find_point_stress(law, h3, d3, moduli, other)
             taken = taken + (w0 + w1 + w2 + w3)
         e, n, f = compute_point_pulls((p0, p1, p2, p3), g)
         scatter_pulls(forces, corners, 3 * block, shift, e, viscous)

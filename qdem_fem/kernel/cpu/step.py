@@ -21,8 +21,10 @@ from numba.extending import overload
 from qdem_fem.element import MEASURES, stress
 from qdem_fem.kernel import digest_sources
 from qdem_fem.kernel.cpu import lanes, linear, quadratic
+from qdem_fem.kernel.cpu.arrays import QuadraticLayout
 from qdem_fem.kernel.cpu.lanes import clear_row, load_row, store_row
 from qdem_fem.kernel.cpu.linear import add_chunk_forces, compiled
+from qdem_fem.kernel.cpu.quadratic import add_quadratic_forces
 
 __all__ = [
     "SOURCES",
@@ -41,20 +43,22 @@ if not {"NUMBA_THREADING_LAYER", "NUMBA_THREADING_LAYER_PRIORITY"} & set(os.envi
     settings.THREADING_LAYER_PRIORITY = ["omp", "tbb", "workqueue"]
 
 
-def add_element_forces(law: Any, *chunk: Any) -> Any:
-    """`add_chunk_forces` of the elements that the type of ``law`` names."""
-    return choose_element(type(law))(law, *chunk)
+def is_quadratic(layout: Any) -> bool | None:
+    """True for quadratic elements, else None: a branch that is not compiled."""
+    return True if isinstance(layout, QuadraticLayout) else None
 
 
-def choose_element(law: type) -> Any:
-    """The compiled forces of a chunk of elements."""
-    return quadratic.add_quadratic_forces if law is quadratic.Quadratic else add_chunk_forces
+@overload(is_quadratic, strict=False)
+def _is_quadratic(layout: Any) -> Any:
+    if layout.instance_class is QuadraticLayout:
+        return lambda layout: True
+    return lambda layout: None
 
 
-@overload(add_element_forces, strict=False)
-def _choose_element_forces(law: Any, *chunk: Any) -> Any:
-    add_forces = choose_element(law.instance_class)
-    return lambda law, *chunk: add_forces(law, *chunk)
+@compiled()
+def add_element_forces(quadratic: Any, *chunk: Any) -> tuple[float, float]:
+    """`add_chunk_forces` of linear or of quadratic elements."""
+    return add_chunk_forces(*chunk) if quadratic is None else add_quadratic_forces(*chunk)
 
 
 @compiled()
@@ -163,14 +167,14 @@ def build_window(variant: str) -> Any:
         piece_window, window_shift = layout[7], layout[8]
         displacement, velocity, forces, inverse_mass = state[0], state[1], state[2], state[3]
         bad, taken = np.zeros(chunk_shift.size), np.zeros(chunk_shift.size)
-        shared = chunk_piece[-1]
+        shared, kind = chunk_piece[-1], is_quadratic(layout)
         for k in range(steps):
             apply_loads(loads, table[k], forces)
             work[0] += 0.5 * step * compute_loads_power(loads, table[k], velocity)
             for c in prange(chunk_shift.size):
                 bad[c], taken[c] = add_element_forces(
-                    law, viscous, corners, rows, chunk_block[c], chunk_block[c + 1], displacement,
-                    velocity, forces, chunk_shift[c],
+                    kind, law, viscous, corners, rows, chunk_block[c], chunk_block[c + 1],
+                    displacement, velocity, forces, chunk_shift[c],
                 )  # fmt: skip
                 # no other chunk needs these nodes; while they are in the cache, they move
                 for p in range(chunk_piece[c], chunk_piece[c + 1]):

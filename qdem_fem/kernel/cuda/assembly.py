@@ -18,8 +18,15 @@ from numpy.typing import NDArray
 from qdem_fem.bodies import EVERY, Assembly, Body, Given
 from qdem_fem.element import Strain
 from qdem_fem.files import Floats, Integers, LibraryMissing
-from qdem_fem.kernel.cpu import Constraints, Fields, Loads, Probes, count_lane
-from qdem_fem.kernel.cpu import step as kernel
+from qdem_fem.kernel.cpu import (
+    ROWS_ELASTIC,
+    ROWS_VISCOUS,
+    Constraints,
+    Fields,
+    Loads,
+    Probes,
+    count_lane,
+)
 from qdem_fem.kernel.cuda import step as cuda_step
 from qdem_fem.kernel.cuda.step import NO_CUDA, cuda
 from qdem_fem.kernel.cuda.sums import sum_motion
@@ -120,7 +127,7 @@ class CudaAssembly(Assembly):
         super().__init__(bodies, master, strain, *more)
         layout = self.packed.layout
         lanes = count_lane(self.dtype)
-        width = kernel.ROWS_VISCOUS if self.viscous else kernel.ROWS_ELASTIC
+        width = ROWS_VISCOUS if self.viscous else ROWS_ELASTIC
         by_row = layout.rows.reshape(-1, width, lanes).transpose(1, 0, 2).reshape(width, -1)
         by_corner = layout.corners.reshape(-1, 4, lanes).transpose(1, 0, 2).reshape(4, -1)
         self._rows, self._corners = cuda.to_device(by_row), cuda.to_device(by_corner)
