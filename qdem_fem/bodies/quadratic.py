@@ -28,7 +28,8 @@ class QuadraticBody(Body):
     Masses are those of Hinton, Rock and Zienkiewicz (1976): in proportion to the diagonal of the
     consistent matrix, 1/36 of an element's at a corner, 4/27 amid an edge.  The critical step is
     a third of that of `Body` on the same mesh.  Results repeat to round-off, not always to the bit:
-    the order of sums within an element is the compiler's.  Not for short waves: `Body` is cheaper there.
+    the order of sums within an element is the compiler's.  Not for short waves: `Body` is
+    cheaper there.
     """
 
     ELEMENT = "quadratic"
