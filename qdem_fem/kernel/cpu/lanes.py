@@ -24,10 +24,6 @@ from numba.extending import lower_builtin, models, register_model
 
 intrinsic: Any = numba_intrinsic
 
-FLAGS = ("contract", "nsz", "arcp", "reassoc")
-"""Fused multiply-add and reassociation are allowed; NaN and infinity keep their meaning."""
-
-
 REGISTER_BITS = 512 if binding.get_host_cpu_features().get("avx512f", False) else 256
 
 
@@ -98,7 +94,7 @@ def _register_operator(symbol: Callable[..., Any], instruction: str) -> None:
             value if isinstance(kind, Lanes) else _broadcast(builder, value, sig.return_type)
             for value, kind in zip(args, sig.args, strict=True)
         )
-        return getattr(builder, instruction)(a, b, flags=FLAGS)
+        return getattr(builder, instruction)(a, b)
 
     for left, right in ((Lanes, Lanes), (Lanes, types.Float), (types.Float, Lanes)):
         lower_builtin(symbol, left, right)(lower)
@@ -284,7 +280,7 @@ def gather_edges(typingctx: Any, vectors: Any, corners: Any, block: Any) -> Any:
         ]
         out: list[Any] = []
         for corner in rows[1:]:
-            edge = [builder.fsub(a, b, flags=FLAGS) for a, b in zip(corner, rows[0], strict=True)]
+            edge = [builder.fsub(a, b) for a, b in zip(corner, rows[0], strict=True)]
             out += _transpose(builder, edge)[:3]
         return context.make_tuple(builder, sig.return_type, out)
 
@@ -312,10 +308,7 @@ def scatter_pulls(
         pull = cgutils.unpack_tuple(builder, args[4], 9)
         nought = ir.Constant(pull[0].type, None)
         rows = [_transpose(builder, [*pull[k : k + 3], nought]) for k in (0, 3, 6)]
-        sums = [
-            builder.fadd(builder.fadd(a, b, flags=FLAGS), c, flags=FLAGS)
-            for a, b, c in zip(*rows, strict=True)
-        ]
+        sums = [builder.fadd(builder.fadd(a, b), c) for a, b, c in zip(*rows, strict=True)]
         for lane in range(width):
             group = range(lane // 4 * 4, lane // 4 * 4 + 4)
             for corner, change in enumerate((sums, *rows)):
@@ -325,7 +318,7 @@ def scatter_pulls(
                 row = _shuffle(builder, change[lane % 4], change[lane % 4], group)
                 before = builder.load(vector, align=4 * size)
                 combine = builder.fsub if corner else builder.fadd
-                builder.store(combine(before, row, flags=FLAGS), vector, align=4 * size)
+                builder.store(combine(before, row), vector, align=4 * size)
         return context.get_dummy_value()
 
     kinds = (forces, corners, types.intp, types.intp, pulls, viscous)

@@ -37,9 +37,30 @@ compute_element_pulls = inlined(stress.compute_element_pulls)
 find_matrix_product = inlined(stress.find_matrix_product)
 
 
-def find_elastic_stress(law: Any, h: Any, lame_first: Any, lame_second: Any) -> Any:
-    """``(P V, J)`` of the strain measure that the type of ``law`` names."""
-    return BY_LAW[type(law)].find_stress_numbers(h, lame_first, lame_second, law.half)
+def choose_stress(options: dict[str, Any]) -> tuple[Any, Any]:
+    """Two functions, ``(P V, J)`` of elasticity and ``P V`` of viscosity at a ``rate`` of the
+    displacement gradient [1/s], of the strain measure that the type of ``law`` names."""
+
+    def find_elastic_stress(law: Any, h: Any, lame_first: Any, lame_second: Any) -> Any:
+        return BY_LAW[type(law)].find_stress_numbers(h, lame_first, lame_second, law.half)
+
+    def find_viscous_stress(law: Any, h: Any, rate: Any, first: Any, second: Any) -> Any:
+        return BY_LAW[type(law)].find_viscous_numbers(h, rate, first, second, law.half)
+
+    @overload(find_elastic_stress, strict=False, jit_options=options)
+    def _choose_elastic(law: Any, h: Any, lame_first: Any, lame_second: Any) -> Any:
+        chosen = njit(**options)(BY_LAW[law.instance_class].find_stress_numbers)
+        return lambda law, h, lame_first, lame_second: chosen(h, lame_first, lame_second, law.half)
+
+    @overload(find_viscous_stress, strict=False, jit_options=options)
+    def _choose_viscous(law: Any, h: Any, rate: Any, first: Any, second: Any) -> Any:
+        chosen = njit(**options)(BY_LAW[law.instance_class].find_viscous_numbers)
+        return lambda law, h, rate, first, second: chosen(h, rate, first, second, law.half)
+
+    return find_elastic_stress, find_viscous_stress
+
+
+find_elastic_stress, find_viscous_stress = choose_stress(INLINED)
 
 
 def compute_viscous_pulls(
@@ -57,17 +78,6 @@ def compute_viscous_pulls(
     q = find_viscous_stress(law, h, rate, first, second)
     pulls = stress.compute_element_pulls(tuple(a + b for a, b in zip(p, q, strict=True)), g)
     return pulls, jacobian, stress.find_matrix_product(q, rate)
-
-
-def find_viscous_stress(law: Any, h: Any, rate: Any, first: Any, second: Any) -> Any:
-    """``P V`` of viscosity at a ``rate`` of the displacement gradient [1/s]."""
-    return BY_LAW[type(law)].find_viscous_numbers(h, rate, first, second, law.half)
-
-
-@overload(find_elastic_stress, strict=False, jit_options=INLINED)
-def _choose_elastic_stress(law: Any, h: Any, lame_first: Any, lame_second: Any) -> Any:
-    chosen = inlined(BY_LAW[law.instance_class].find_stress_numbers)
-    return lambda law, h, lame_first, lame_second: chosen(h, lame_first, lame_second, law.half)
 
 
 @overload(compute_viscous_pulls, strict=False, jit_options=INLINED)
@@ -91,12 +101,6 @@ def _choose_viscous_pulls(
         return compute_element_pulls(add(p, q), g), jacobian, find_matrix_product(q, rate)
 
     return compose_pulls
-
-
-@overload(find_viscous_stress, strict=False, jit_options=INLINED)
-def _choose_viscous_stress(law: Any, h: Any, rate: Any, first: Any, second: Any) -> Any:
-    chosen = inlined(BY_LAW[law.instance_class].find_viscous_numbers)
-    return lambda law, h, rate, first, second: chosen(h, rate, first, second, law.half)
 
 
 @inlined()

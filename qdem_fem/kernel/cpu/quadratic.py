@@ -11,11 +11,14 @@ Forces are the transpose of both, of the nominal stresses P(q) times V/4.
 
 from __future__ import annotations
 
+from functools import partial
 from math import sqrt
 from typing import Any
 
 import numpy as np
+from numba import njit
 
+from qdem_fem.kernel.cpu import linear
 from qdem_fem.kernel.cpu.lanes import (
     align_stack,
     gather_edges,
@@ -26,18 +29,25 @@ from qdem_fem.kernel.cpu.lanes import (
     sum_lanes,
 )
 from qdem_fem.kernel.cpu.linear import (
-    add,
-    compiled,
-    compute_element_gradient,
-    compute_element_pulls,
+    INLINED,
+    choose_stress,
     count_block_rows,
     count_lanes_of,
-    find_elastic_stress,
-    find_matrix_product,
-    find_viscous_stress,
-    inlined,
     load_gradients,
 )
+
+ORDERED: Any = INLINED | {"fastmath": {"contract", "nsz", "arcp"}}
+"""Sums in the order they are written in: LLVM reassociates ones as long as these again each time
+that it links a function, so that bits would hang on threads and on what the disk holds."""
+inlined: Any = partial(njit, **ORDERED)
+add, compute_element_gradient, compute_element_pulls, find_matrix_product = (
+    inlined(one.py_func)
+    for one in (
+        linear.add, linear.compute_element_gradient, linear.compute_element_pulls,
+        linear.find_matrix_product,
+    )
+)  # fmt: skip
+find_elastic_stress, find_viscous_stress = choose_stress(ORDERED)
 
 GROUPS = np.array([0, 1, 2, 3, 0, 4, 5, 6, 0, 7, 8, 9])
 """Nodes as the kernel reads them: corner 0 before each three others, which are taken less it."""
@@ -125,7 +135,7 @@ def find_point_stress(law: Any, h: Any, rate: Any, moduli: Any, viscosities: Any
     return add(p, q), jacobian, find_matrix_product(q, rate)
 
 
-@compiled()
+@inlined()
 def add_quadratic_forces(
     law: Any, viscous: Any, corners: Any, rows: Any, first_block: int, stop_block: int,
     displacement: Any, velocity: Any, forces: Any, shift: int,

@@ -23,7 +23,7 @@ from qdem_fem.kernel import digest_sources
 from qdem_fem.kernel.cpu import lanes, linear, quadratic
 from qdem_fem.kernel.cpu.arrays import QuadraticLayout
 from qdem_fem.kernel.cpu.lanes import clear_row, load_row, store_row
-from qdem_fem.kernel.cpu.linear import add_chunk_forces, compiled
+from qdem_fem.kernel.cpu.linear import add_chunk_forces, compiled, inlined
 from qdem_fem.kernel.cpu.quadratic import add_quadratic_forces
 
 __all__ = [
@@ -55,7 +55,7 @@ def _is_quadratic(layout: Any) -> Any:
     return lambda layout: None
 
 
-@compiled()
+@inlined()
 def add_element_forces(quadratic: Any, *chunk: Any) -> tuple[float, float]:
     """`add_chunk_forces` of linear or of quadratic elements."""
     return add_chunk_forces(*chunk) if quadratic is None else add_quadratic_forces(*chunk)
