@@ -1,4 +1,4 @@
-"""QDEM: explicit dynamics of viscoelastic bodies made of linear tetrahedra.
+"""QDEM: explicit dynamics of viscoelastic bodies made of linear or quadratic tetrahedra.
 
 Method: Nishiura, Sakaguchi and Aikawa, Materials 10 (2017) 615.  Start with `Body`, `Material` and
 `Simulation`; errors a user can act on are in `qdem_fem.files.errors`.  A name is loaded when it is

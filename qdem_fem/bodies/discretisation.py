@@ -23,6 +23,8 @@ from qdem_fem.bodies.rigid_mass import make_cross_matrix
 from qdem_fem.element import MEASURES, Strain, apply_hooke, find_displacement_gradient
 from qdem_fem.files import Floats, Integers
 
+LOCKING = 0.49
+"""Poisson's ratio above which linear tetrahedra lock, and the estimate was seen to fail [-]."""
 MATERIALS = 10
 """Different materials of a body, most, of which each has means of its own: more are a gradient."""
 
@@ -47,10 +49,10 @@ def estimate_discretisation(
     bodies: Iterable[tuple[Body, Floats, bool]], strain: Strain
 ) -> Discretisation | None:
     """`Discretisation` of deformable bodies, each with its displacement (n, 3) [m] and whether
-    nothing holds it; None: of bodies without strain, or of quadratic elements, nothing can be
-    said."""
+    nothing holds it; None: of bodies without strain, of quadratic elements or of linear ones that
+    lock nothing can be said."""
     soft = [each for each in bodies if not each[0].rigid]
-    if any(body.ELEMENT != "linear" for body, _, _ in soft):
+    if any(body.ELEMENT != "linear" or is_locking(body) for body, _, _ in soft):
         return None
     parts = [_integrate_means(*each, strain) for each in soft]
     if not parts:
@@ -62,6 +64,12 @@ def estimate_discretisation(
     shortfall = max(0.0, (a + b / (1 + b)) / 2)
     ratio = (1 - shortfall) * lumped / consistent if consistent > 0 else 1.0
     return Discretisation(float(shortfall), float(1 - np.sqrt(ratio)))
+
+
+def is_locking(body: Body) -> bool:
+    """Whether a body is so near to incompressible that its elements, linear tetrahedra, lock."""
+    soft = body.ELEMENT == "linear" and not body.rigid
+    return soft and bool(np.max(body.material.poisson) > LOCKING)
 
 
 def estimate_bending(body: Body) -> float:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from qdem_fem import element
-from qdem_fem.bodies.deformable import Body
+from qdem_fem.bodies.deformable import Body, Rigid
 from qdem_fem.files import ConditionError, Floats, Integers
 from qdem_fem.kernel.cpu import OTHER, OWN
 from qdem_fem.mesh import EDGES, find_middles, split_faces
@@ -27,16 +27,21 @@ class QuadraticBody(Body):
 
     Masses are those of Hinton, Rock and Zienkiewicz (1976): in proportion to the diagonal of the
     consistent matrix, 1/36 of an element's at a corner, 4/27 amid an edge.  The critical step is
-    a third of that of `Body` on the same mesh.  Results repeat to round-off, not always to the bit:
-    the order of sums within an element is the compiler's.  Not for short waves: `Body` is
-    cheaper there.
+    a third of that of `Body` on the same mesh.  Not for short waves: `Body` is cheaper there.
     """
 
     ELEMENT = "quadratic"
     MASS_SHARES = (1 / 36,) * 4 + (4 / 27,) * 6
 
-    def __init__(self, mesh: Any, material: element.Material, name: str = "body") -> None:
-        super().__init__(mesh, material, name)
+    def __init__(
+        self, mesh: Any, material: element.Material, name: str = "body", *, rigid: Rigid = False
+    ) -> None:
+        super().__init__(mesh, material, name, rigid=rigid)
+        if rigid:
+            raise ConditionError(
+                f"{name} is rigid, and nothing within it deforms", where="element",
+                remedy="leave out element, or rigid",
+            )  # fmt: skip
         corners = self.mesh.nodes
         self._corners = len(corners)
         self._edges, self._ten = find_middles(self.elements, self._corners)

@@ -119,7 +119,8 @@ def _preview_run(prepared: Prepared) -> dict[str, Any]:
         if bed := preview_bed(prepared):  # what follows it is known when it stands
             return outlook | {"bed": bed}
     run, bodies = scene.make_simulation(prepared)
-    scene.warn_of_bending(bodies)
+    other = "track" not in prepared.text.data and prepared.scene.simulation.device == "cpu"
+    scene.warn_of_bending(bodies, others=other)
     outlook |= {
         "bodies": scene.list_body_facts(bodies),
         "critical_step": scene.describe_critical_step(run),
@@ -147,10 +148,13 @@ def _print(content: dict[str, Any], as_json: bool) -> None:
         return
     for name, body in content.get("bodies", {}).items():
         print(
-            f"{name}: {body['elements']} elements, {body['nodes']} nodes, smallest altitude "
+            f"{name}: {body['elements']} {body.get('element', 'linear')} elements, "
+            f"{body['nodes']} nodes, smallest altitude "
             f"{body['smallest_altitude']:.4g} m in element {body['thinnest_element']}, "
             f"{body['flipped']} turned right-handed, {body['unused_nodes']} unused nodes"
         )
+        if gain := body.get("gain"):  # results of earlier versions have none
+            print(f"{name}: {gain}")
     if critical := content.get("critical_step"):
         if critical["value"] is not None:
             print(f"critical step {critical['value']:.4g} s, governed by {critical['governor']}")

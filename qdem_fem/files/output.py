@@ -7,6 +7,7 @@ writer cut short is cut back to its last sound row (`Table.cut`).
 from __future__ import annotations
 
 import hashlib
+import itertools
 from collections.abc import Sequence, Set
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,9 @@ import numpy.typing as npt
 from qdem_fem.files.arrays import Floats
 from qdem_fem.files.errors import UsageError
 from trackbed.run_files import append_text, refuse_writing, replace_file, seal_file, write_whole
+
+CELLS = {4: ("tetra", [0, 1, 2, 3]), 10: ("tetra10", [0, 1, 2, 3, 4, 7, 5, 6, 8, 9])}
+"""VTK's name and order of the nodes of an element, by their number."""
 
 
 def write_bodies_vtu(path: Path, bodies: Sequence[Any]) -> None:
@@ -32,16 +36,23 @@ def write_bodies_vtu(path: Path, bodies: Sequence[Any]) -> None:
     first = np.concatenate([[0], np.cumsum(counts)[:-1]])
     run = bodies[0].mover  # finds the velocities of all its bodies at once
     velocity = [body.velocity for body in bodies] if run is None else [run.velocities(bodies)]
-    number = np.repeat(np.arange(len(bodies)), [len(body.elements) for body in bodies])
+    cells, stress, number = [], [], []  # of one kind of element after the other
+    counted = range(len(bodies))
+    for size, alike in itertools.groupby(counted, lambda i: bodies[i].element_nodes.shape[1]):
+        these, (name, order) = list(alike), CELLS[size]
+        cells.append(
+            (name, np.concatenate([bodies[i].element_nodes[:, order] + first[i] for i in these]))
+        )
+        stress.append(np.concatenate([bodies[i].von_mises() for i in these]))
+        number.append(np.repeat(these, [len(bodies[i].elements) for i in these]))
     mesh = meshio.Mesh(
-        np.concatenate([body.nodes for body in bodies]),
-        [("tetra", np.concatenate([b.elements + n for b, n in zip(bodies, first, strict=True)]))],
+        np.concatenate([body.nodes for body in bodies]), cells,
         {
             "displacement": np.concatenate([body.displacement for body in bodies]),
             "velocity": np.concatenate(velocity),
         },
-        {"von_mises": [np.concatenate([body.von_mises() for body in bodies])], "body": [number]},
-    )
+        {"von_mises": stress, "body": number},
+    )  # fmt: skip
     with replace_file(path) as temporary:
         mesh.write(temporary, file_format="vtu", compression=None)
 

@@ -127,6 +127,8 @@ def fingerprint_run(simulation: State) -> dict[str, str]:
         if simulation.contact.periodic is not None:
             marks["periodic width"] = repr(simulation.contact.periodic)
     for number, body in enumerate(simulation.bodies):
+        if body.ELEMENT != "linear":
+            marks[f"element of body {number}"] = body.ELEMENT
         marks[f"mesh of body {number}"] = _hash_part([body.nodes, body.elements])
         marks[f"material of body {number}"] = _hash_part(body.material)
         if body.rigid:

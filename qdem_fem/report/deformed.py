@@ -86,8 +86,9 @@ def average_stress(bodies: Sequence[Any]) -> Floats:
     their nodes', and of each node that of its elements."""
     stress = []
     for body in bodies:
-        node, count = body.elements.ravel(), len(body.nodes)
-        total = np.bincount(node, np.repeat(body.von_mises(), 4), count)
+        node, count = body.element_nodes.ravel(), len(body.nodes)
+        each = np.repeat(body.von_mises(), body.element_nodes.shape[1])
+        total = np.bincount(node, each, count)
         nodal = total / np.maximum(np.bincount(node, minlength=count), 1)
         stress.append(nodal[body.surface].mean(axis=1))
     return np.concatenate(stress)

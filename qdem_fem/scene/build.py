@@ -28,7 +28,7 @@ def make_simulation(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
     In a static scene each series gives its last value.  Raises `SceneError` with every condition
     that the simulation refuses.
     """
-    from qdem_fem.bodies import Body
+    from qdem_fem.bodies import Body, QuadraticBody
     from qdem_fem.march import Simulation, check_held
 
     warn_of_unused(prepared)
@@ -43,7 +43,8 @@ def make_simulation(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
     bodies = {}
     for body in scene.body:
         mesh = prepared.meshes[body.name]
-        bodies[body.name] = Body(mesh, _make_material(body, mesh), name=body.name, rigid=body.rigid)
+        kind = QuadraticBody if body.element == QuadraticBody.ELEMENT else Body
+        bodies[body.name] = kind(mesh, _make_material(body, mesh), body.name, rigid=body.rigid)
     warn_of_values(scene, bodies)
     options: dict[str, Any] = {name: getattr(table, name) for name in OPTIONS}
     run = Simulation(list(bodies.values()), contact=choose_contact(scene.contact), **options)

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from qdem_fem.bodies import estimate_bending
-from qdem_fem.element import MEASURES, find_displacement_gradient
+from qdem_fem.bodies import LOCKING, estimate_bending, is_locking
+from qdem_fem.element import MEASURES
 from qdem_fem.files import Floats, Series, warn_user
 from qdem_fem.march import split_motion
 from qdem_fem.tables import Prepared, Scene
@@ -21,7 +21,6 @@ class DoubtNumbers:
 
     bending: float = 0.1  # shortfall of a deflection, of which a dry run warns [-]
     turned: float = 0.05  # share of a small strain that may be due to turning [-]
-    poisson: float = 0.49  # ratio above which the estimate of a mesh's error was seen to fail [-]
     single: float = 2e-6
     """Strain that rounding leaves in turning bodies in single precision, measured 1 to 2e-6 [-]."""
 
@@ -52,15 +51,10 @@ def warn_of_values(scene: Scene, bodies: dict[str, Any]) -> None:
         warn_user(text)
     if locking := next(filter(is_locking, bodies.values()), None):
         warn_user(
-            f"linear tetrahedra lock at a Poisson's ratio above {DOUBT.poisson:g}, as that of "
+            f"linear tetrahedra lock at a Poisson's ratio above {LOCKING:g}, as that of "
             f"{locking.name}: displacements may be many times too small, and no error of the mesh "
-            f"is estimated; take {DOUBT.poisson:g}, or compare with a far finer mesh"
+            f"is estimated; take {LOCKING:g}, or compare with a far finer mesh"
         )
-
-
-def is_locking(body: Any) -> bool:
-    """Whether a body is so near to incompressible that linear tetrahedra lock."""
-    return not body.rigid and bool(np.max(body.material.poisson) > DOUBT.poisson)
 
 
 def warn_of_unused(prepared: Prepared) -> None:
@@ -87,16 +81,18 @@ def sort_by_kind(bodies: dict[str, Any]) -> dict[str, list[Any]]:
     return kinds
 
 
-def warn_of_bending(bodies: dict[str, Any]) -> None:
+def warn_of_bending(bodies: dict[str, Any], *, others: bool) -> None:
     """Warn of meshes too coarse for bending; of bodies that are named alike the first is looked at.
 
-    No load is looked at, and no answer needed: whether a body bends is for the user to know."""
+    No load is looked at, and no answer needed: whether a body bends is for the user to know.
+    ``others``: the scene can have other elements."""
+    remedy = "mesh it finer across" + ', or take element = "quadratic"' * others
     for alike in sort_by_kind(bodies).values():
         judged = not alike[0].rigid and not is_locking(alike[0])
         if judged and (short := estimate_bending(alike[0])) > DOUBT.bending:
             warn_user(
                 f"if {alike[0].name} bends, it bends about {100 * short:.0f} % too little: linear "
-                "tetrahedra are too stiff; mesh it finer across"
+                f"tetrahedra are too stiff; {remedy}"
             )
 
 
@@ -108,16 +104,17 @@ def warn_of_strain(run: Any, moved: Floats) -> None:
     for body, u, free in split_motion(run, moved):
         if body.rigid:
             continue
-        gradient = find_displacement_gradient(body.gradients[0], body.elements, u)
+        gradient = body.find_gradient(u)
         small, true = (MEASURES[name].compute_strain(gradient) for name in ("small", "svk"))
         volume = body.gradients[1]
-        wrong, whole = (volume @ (one**2).sum(axis=(1, 2)) for one in (small - true, true))
+        squares = ((one**2).sum(axis=(-2, -1)) for one in (small - true, true))
+        wrong, whole = (float(np.sum(square @ volume)) for square in squares)
         if not MEASURES[run.strain].OBJECTIVE and wrong > DOUBT.turned**2 * whole:
             warn_user(
                 f"{body.name} turns, and strain = {run.strain!r} takes a turn for strain: of it "
                 f'{100 * np.sqrt(wrong / whole):.0f} % is wrong; take "finger"'
             )
-        greatest = float(np.sqrt((true**2).sum(axis=(1, 2)).max()))
+        greatest = float(np.sqrt((true**2).sum(axis=(-2, -1)).max()))
         if run.precision == "float32" and free and greatest < DOUBT.single:
             warn_user(
                 f"the strain of {body.name}, {greatest:.2g} at most, is below what single "

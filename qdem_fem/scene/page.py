@@ -95,7 +95,8 @@ def _draw_pictures(
 def _format_claim(summary: dict[str, Any]) -> str:
     bodies = summary["bodies"].values()
     elements, nodes = (sum(body[key] for body in bodies) for key in ("elements", "nodes"))
-    mesh = f"{elements:,} linear tetrahedra with {nodes:,} nodes"
+    kinds = " and ".join(dict.fromkeys(body["element"] for body in bodies))
+    mesh = f"{elements:,} {kinds} tetrahedra with {nodes:,} nodes"
     if summary["method"] == "static":
         answer = summary["static"]
         text = (
@@ -157,18 +158,23 @@ def _format_modes(summary: dict[str, Any]) -> Iterator[str]:
 
 def _format_meshes(summary: dict[str, Any]) -> str:
     header = (
-        "body", "elements", "nodes", "surface faces", "turned right-handed", "unused nodes",
-        "smallest altitude (mm)", "in element", "mass (kg)",
+        "body", "element", "elements", "nodes", "surface faces", "turned right-handed",
+        "unused nodes", "smallest altitude (mm)", "in element", "mass (kg)",
     )  # fmt: skip
     rows = [
         (
-            name, f"{b['elements']:,}", f"{b['nodes']:,}", f"{b['surface_faces']:,}",
+            name, b["element"], f"{b['elements']:,}", f"{b['nodes']:,}", f"{b['surface_faces']:,}",
             str(b["flipped"]), str(b["unused_nodes"]), f"{1e3 * b['smallest_altitude']:.4g}",
             str(b["thinnest_element"]), f"{b['mass']:.6g}",
         )
         for name, b in summary["bodies"].items()
     ]  # fmt: skip
-    return make_section("Bodies and meshes", _format_table(header, rows))
+    gains = [
+        make_paragraph(f"{escape(name)}: {b['gain']}.")
+        for name, b in summary["bodies"].items()
+        if b["gain"]
+    ]
+    return make_section("Bodies and meshes", _format_table(header, rows), *gains)
 
 
 def _format_step(summary: dict[str, Any]) -> str:

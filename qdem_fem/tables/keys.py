@@ -75,6 +75,8 @@ class BodyTable(Table):
     material: MaterialTable
     rigid: Rigid = False
     """Six freedoms and no element work; with the inertia of the solid, or of masses at nodes."""
+    element: Literal["linear", "quadratic"] | None = None
+    """Tetrahedra of four nodes, as by default, or of ten, for bodies that bend."""
     regions: dict[str, Region] = Field(default_factory=dict)
     """Material keys that differ, by the name of an element set."""
     velocity: Vector | None = None  # of its centre of mass at the start [m/s]; at rest by default

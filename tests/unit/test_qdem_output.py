@@ -30,7 +30,8 @@ def body(shift: float = 0.0) -> Any:
     x = mesh.nodes
     stress = mesh.nodes[mesh.elements].mean(axis=1)[:, 0] * 1e5
     return SimpleNamespace(
-        nodes=x, elements=mesh.elements, surface=find_surface_faces(mesh.elements),
+        nodes=x, elements=mesh.elements, element_nodes=mesh.elements,
+        surface=find_surface_faces(mesh.elements),
         displacement=1e-4 * x[:, [1, 2, 0]], velocity=x**2, von_mises=lambda: stress,
         mover=None,
     )  # fmt: skip

@@ -22,9 +22,9 @@ from qdem_fem.kernel.cpu.lanes import (
 
 MATHEMATICS: Any = {"error_model": "numpy", "fastmath": {"contract", "nsz", "arcp", "reassoc"}}
 """Fused multiply-add and reassociation are allowed; NaN and infinity keep their meaning."""
-compiled: Any = partial(njit, **MATHEMATICS)
-inlined: Any = partial(njit, forceinline=True, **MATHEMATICS)
 INLINED: Any = {"forceinline": True, **MATHEMATICS}
+compiled: Any = partial(njit, **MATHEMATICS)
+inlined: Any = partial(njit, **INLINED)
 
 ROWS_ELASTIC, ROWS_VISCOUS = 11, 13
 """Numbers an element brings: nine gradients, lambda V, mu V; with viscosity also those of it."""
@@ -37,7 +37,7 @@ compute_element_pulls = inlined(stress.compute_element_pulls)
 find_matrix_product = inlined(stress.find_matrix_product)
 
 
-def choose_stress(options: dict[str, Any]) -> tuple[Any, Any]:
+def choose_stress(options: Any) -> tuple[Any, Any]:
     """Two functions, ``(P V, J)`` of elasticity and ``P V`` of viscosity at a ``rate`` of the
     displacement gradient [1/s], of the strain measure that the type of ``law`` names."""
 
