@@ -58,14 +58,16 @@ def answer_by(method: str, question: Question, setting: dict[str, Any]) -> Answe
 # --- QDEM -------------------------------------------------------------------------------------
 
 
-def solve_by_qdem(question: Question, cells: list[int], precision: Any = "float64") -> Answer:
+def solve_by_qdem(
+    question: Question, cells: list[int], precision: Any = "float64", kind: type[q.Body] = q.Body
+) -> Answer:
     """This package, at 0.9 of the critical step."""
     mesh, cost = mesh_bar(cells), Costs()
     material = q.Material(young=BEAM.young, poisson=BEAM.poisson, density=BEAM.density)
     with cost.time_part("assembly"):
-        body = q.Body(mesh, material)
+        body = kind(mesh, material)
         run = q.Simulation([body], precision=precision, threads=1, safety=SAFETY)
-        held, loaded = question.find_held(mesh.nodes), question.find_loaded(mesh.nodes)
+        held, loaded = question.find_held(body.nodes), question.find_loaded(body.nodes)
         times, factors = question.table()
         if held.any():
             run.fix(body, held)
@@ -77,7 +79,7 @@ def solve_by_qdem(question: Question, cells: list[int], precision: Any = "float6
     # every step is recorded where a wave passes in a few
     sampling = float(question.times[1]) if question.bends else step
     with cost.time_part("stepping"):
-        history = run.advance(question.end, {"end": find_end_middle(mesh.nodes)}, sampling)
+        history = run.advance(question.end, {"end": find_end_middle(body.nodes)}, sampling)
     moved = history["end"][:, question.component]
     return Answer(history.time, moved, len(mesh.elements), run.steps_done, step, cost)
 
