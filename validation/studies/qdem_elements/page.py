@@ -13,15 +13,14 @@ from validation.study import Row, format_checks, format_table
 
 STYLE = {"linear": "o-", "quadratic": "*-"}
 HEAD = ["", "element", "elements", "step (µs)", "error (%)", "cost (s)"]
+FIGURES = {"step_s": 1e6, "error": 100, "cost_s": 1}
 
 
 def describe(rows: Sequence[Row]) -> dict[str, str]:
     """The text for each mark of the page."""
     lines = [
-        [
-            row["part"], run["element"], f"{run['elements']:,}", f"{1e6 * run['step_s']:.3g}",
-            f"{100 * run['error']:.2g}", f"{run['cost_s']:.2g}",
-        ]
+        [row["part"], run["element"], f"{run['elements']:,}",
+         *(f"{factor * run[key]:.2g}" for key, factor in FIGURES.items())]
         for row in rows
         for run in row["runs"]
     ]  # fmt: skip
