@@ -11,7 +11,6 @@ from validation.figure import draw_figure
 from validation.studies.qdem_elements.bars import check_bars
 from validation.study import Row, format_checks, format_table
 
-STYLE = {"linear": "o-", "quadratic": "*-"}
 HEAD = ["", "element", "elements", "step (µs)", "error (%)", "cost (s)"]
 FIGURES = {"step_s": 1e6, "error": 100, "cost_s": 1}
 
@@ -36,11 +35,12 @@ def draw(rows: Sequence[Row], picture: Path) -> None:
 
     def draw_panels(figure: Any) -> None:
         for axes, row in zip(figure.subplots(1, 3), rows, strict=True):
-            for element, style in STYLE.items():
+            for element, style in (("linear", "o-"), ("quadratic", "*-")):
                 runs = [run for run in row["runs"] if run["element"] == element]
-                cost, error = ([abs(run[key]) for run in runs] for key in ("cost_s", "error"))
+                cost, error = ([run[key] for run in runs] for key in ("cost_s", "error"))
                 axes.loglog(cost, error, style, label=element)
             axes.set(title=row["part"], xlabel="processor time [s]", ylabel="error")
+            axes.xaxis.set_minor_formatter("")
             axes.grid(True, which="both", alpha=0.25)
         figure.axes[0].legend(fontsize=8)
 

@@ -1,8 +1,9 @@
 """The parts: bending, pulse, grain."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -11,65 +12,54 @@ import skfem
 import qdem_fem as q
 from qdem_fem.grains.hulls import make_flat_form, place_corners_apart
 from qdem_fem.grains.meshing import make_grain_tetrahedra
-from validation.bench.qdem.checks import check_below, make_row
+from validation.bench.qdem.checks import check_below, make_row, report
 from validation.studies.qdem_cost.methods import solve_by_qdem
 from validation.studies.qdem_cost.questions import QUESTIONS
 from validation.study import Row
 
-KINDS = {"linear": q.Body, "quadratic": q.QuadraticBody}
-REPEATS = 3
-BAR = {
-    "linear": ((22, 2, 2), (44, 4, 4), (88, 8, 8)),
-    "quadratic": ((11, 1, 1), (22, 2, 2), (44, 4, 4)),
-}
-"""Cells of the bar, five tetrahedra each."""
-GRAIN = {"linear": (0, 1, 2), "quadratic": (0, 1)}
+REPEATS = 3  # of which the median counts
+BAR = ((22, 2, 2), (44, 4, 4), (88, 8, 8)), ((11, 1, 1), (22, 2, 2), (44, 4, 4))
+"""Cells of the bar, five tetrahedra each, of linear and of quadratic elements."""
+GRAIN = (0, 1, 2), (0, 1)
 """How often each of the grain's 96 tetrahedra is cut into eight."""
 CORNERS, RADIUS = 8, 0.025  # of the grain; from its middle to a corner [m]
 ROCK = q.Material(young=50e9, poisson=0.2, density=2700.0)
 SQUEEZE, MARCH = 1e-6, 1e-3  # motion of one face towards the other [m]; time that is timed [s]
 
 
-def measure_meshes(
-    meshes: dict[str, Any], answer: Callable[[Any, Any], tuple[float, ...]]
-) -> list[Row]:
-    """Of each kind of element on each mesh the median of some runs by their cost: one compiles."""
-    names, runs = ("elements", "step_s", "error", "cost_s"), []
-    for element, kind in KINDS.items():
-        for mesh in meshes[element]:
-            found = sorted((answer(mesh, kind) for _ in range(REPEATS)), key=lambda one: one[-1])
-            runs.append({"element": element} | dict(zip(names, found[REPEATS // 2], strict=True)))
-    return runs
+def measure(name: str, share: float, meshes: Any, answer: Callable[[Any, Any], Row]) -> Row:
+    """All runs of a part, each the median of some by their cost, as one compiles; its bars.
 
-
-def compare(runs: Sequence[Row], name: str, share: float) -> Row:
-    """``share``: greatest of the error that quadratic elements may leave on a mesh of both."""
-    linear, quadratic = ([one for one in runs if one["element"] == kind] for kind in KINDS)
+    ``share``: greatest of the error that quadratic elements may leave on a mesh of both.
+    """
+    linear, quadratic = (
+        [
+            {"element": kind.ELEMENT}
+            | sorted((answer(mesh, kind) for _ in range(REPEATS)), key=itemgetter("cost_s"))[1]
+            for mesh in own
+        ]
+        for kind, own in zip((q.Body, q.QuadraticBody), meshes, strict=True)
+    )
     one, other = next((a, b) for a in linear for b in quadratic if a["elements"] == b["elements"])
-    asked = [("error", other, one, "on the same mesh", share)]
+    ratio = f"{name}: error, quadratic over linear, on the same mesh", other["error"] / one["error"]
+    checks = [report(*ratio) if share == np.inf else check_below(*ratio, share)]
     if name == "bending":
-        asked += [("error", quadratic[0], linear[-1], "coarsest over finest", 1.0),
-                  ("cost_s", quadratic[0], linear[-1], "coarsest over finest", 0.01)]  # fmt: skip
-    checks = [
-        check_below(f"{name}: {key}, quadratic over linear, {which}", a[key] / b[key], most)
-        for key, a, b, which, most in asked
-    ]
-    return make_row(checks, runs=runs)
+        for key, most in (("error", 1.0), ("cost_s", 0.01)):
+            text = f"bending: {key}, quadratic over linear, coarsest over finest"
+            checks.append(check_below(text, quadratic[0][key] / linear[-1][key], most))
+    return make_row(checks, runs=linear + quadratic)
 
 
-def ask(name: str, share: float) -> Row:
-    """A question of `validation.studies.qdem_cost` on all meshes."""
-
-    def answer(cells: tuple[int, ...], kind: type[q.Body]) -> tuple[float, ...]:
-        question, one = QUESTIONS[name], solve_by_qdem(QUESTIONS[name], list(cells), kind=kind)
-        error = question.error(one.times, one.displacement, question.reference()[0])
-        return one.elements, one.step, error, sum(one.cost.values())
-
-    return compare(measure_meshes(BAR, answer), name, share)
+def follow_bar(name: str, cells: tuple[int, ...], kind: type[q.Body]) -> Row:
+    """A question of `validation.studies.qdem_cost`."""
+    question, one = QUESTIONS[name], solve_by_qdem(QUESTIONS[name], list(cells), kind=kind)
+    error = question.error(one.times, one.displacement, question.reference()[0])
+    cost = sum(one.cost.values())
+    return {"elements": one.elements, "step_s": one.step, "error": error, "cost_s": cost}
 
 
-def squeeze_grain(level: int, kind: type[q.Body]) -> tuple[float, ...]:
-    """Elements, step [s], force at rest [N] of a grain of flat faces, and the cost of a march."""
+def squeeze_grain(force: float, level: int, kind: type[q.Body]) -> Row:
+    """A grain of flat faces; the error is that of its force at rest over ``force`` [N]."""
     form = make_flat_form(place_corners_apart(np.random.default_rng(1), CORNERS))
     coarse = make_grain_tetrahedra(RADIUS * form.nodes, form.corner_faces)
     body = kind(skfem.MeshTet(coarse.nodes.T.copy(), coarse.elements.T.copy()).refined(level), ROCK)
@@ -85,26 +75,22 @@ def squeeze_grain(level: int, kind: type[q.Body]) -> tuple[float, ...]:
     run.fix(body, high, "xy")
     run.prescribe(body, high, "z", -SQUEEZE)
     run.relax()
-    force = 2 * run.energy().elastic / SQUEEZE
+    found = 2 * run.energy().elastic / SQUEEZE
     run.advance(2 * run.step)  # compiles
     started = time.process_time()
     run.advance(MARCH)
-    return len(body.elements), run.step, force, time.process_time() - started
+    cost, error = time.process_time() - started, found / force - 1
+    return {"elements": len(body.elements), "step_s": run.step, "error": error, "cost_s": cost}
 
 
 def squeeze() -> Row:
     """The grain on all meshes."""
-    force = squeeze_grain(GRAIN["linear"][-1], q.QuadraticBody)[2]
-
-    def answer(level: int, kind: type[q.Body]) -> tuple[float, ...]:
-        elements, step, found, cost = squeeze_grain(level, kind)
-        return elements, step, found / force - 1, cost
-
-    return compare(measure_meshes(GRAIN, answer), "grain", 0.5)
+    force = 1 + squeeze_grain(1.0, GRAIN[0][-1], q.QuadraticBody)["error"]
+    return measure("grain", 0.5, GRAIN, partial(squeeze_grain, force))
 
 
 PARTS = {
-    "bending": partial(ask, "bending", 0.1),
-    "pulse": partial(ask, "pulse", np.inf),
+    "bending": lambda: measure("bending", 0.1, BAR, partial(follow_bar, "bending")),
+    "pulse": lambda: measure("pulse", np.inf, BAR, partial(follow_bar, "pulse")),
     "grain": squeeze,
 }
