@@ -30,12 +30,11 @@ SQUEEZE, MARCH = 1e-6, 1e-3  # motion of one face towards the other [m]; time th
 def measure(name: str, share: float, meshes: Any, answer: Callable[[Any, Any], Row]) -> Row:
     """All runs of a part, each the median of some by their cost, as one compiles; its bars.
 
-    ``share``: greatest of the error that quadratic elements may leave on a mesh of both.
-    """
+    ``share``: greatest of the error that quadratic elements may leave on a mesh of both."""
     linear, quadratic = (
         [
-            {"element": kind.ELEMENT}
-            | sorted((answer(mesh, kind) for _ in range(REPEATS)), key=itemgetter("cost_s"))[1]
+            sorted((answer(mesh, kind) for _ in range(REPEATS)), key=itemgetter("cost_s"))[1]
+            | {"element": kind.ELEMENT}
             for mesh in own
         ]
         for kind, own in zip((q.Body, q.QuadraticBody), meshes, strict=True)
