@@ -30,7 +30,7 @@ from qdem_fem.kernel.cpu import (
 from qdem_fem.kernel.cpu import step as kernel
 
 THREAD_ELEMENTS = 16_384
-"""Fewer elements than this for each thread lose more at barriers than they gain."""
+"""Fewer elements of four nodes than this for each thread lose more at barriers than they gain."""
 
 FIELDS = ("displacement", "velocity")
 FRAME_ARRAYS = ("rotation", "shift", "velocity")
@@ -118,7 +118,7 @@ class Assembly:
         self.viscous = True if viscous else None
         self.law = LAWS[strain](kind.type(0.5))
         chunks = len(self.packed.layout.chunk_shift)
-        most = threads or max(1, len(self.elements) // THREAD_ELEMENTS)
+        most = threads or max(1, self.elements.size // (4 * THREAD_ELEMENTS))
         self.threads = max(1, min(most, numba.get_num_threads(), chunks))
         inverse = np.zeros(self.n_nodes)
         used = self.mass > 0

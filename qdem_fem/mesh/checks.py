@@ -98,7 +98,7 @@ def convert_elements(raw: Any) -> tuple[Integers, list[Problem]]:
     if array.ndim != 2 or array.shape[1] != 4:
         hint = "give elements.T" if array.ndim == 2 and array.shape[0] == 4 else remedy
         if array.ndim == 2 and array.shape[1] == 10:
-            hint = "QDEM has linear tetrahedra only; elements[:, :4] keeps the corners"
+            hint = "QDEM's meshes are linear, of quadratic bodies too: take elements[:, :4]"
         return none, [Problem(f"the elements have the shape {array.shape}, not (m, 4)", hint)]
     if array.dtype.kind != "i":
         # Every index that a float or an unsigned integer may exceed is out of range anyway.

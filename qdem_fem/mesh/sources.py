@@ -72,7 +72,7 @@ def _read_skfem(mesh: Any, where: str) -> MeshParts:
         )
     if shape != "ElementTetP1":
         raise MeshError(
-            f"a {kind} is of higher order; QDEM has linear tetrahedra only",
+            f"a {kind} is of higher order; QDEM's meshes are linear, of quadratic bodies too",
             where=where, remedy="skfem.MeshTet.from_mesh(mesh) keeps the corners",
         )  # fmt: skip
     node_sets: dict[str, Any] = {}
@@ -103,7 +103,7 @@ def _read_meshio(mesh: Any, where: str) -> MeshParts:
     if curved:
         raise MeshError(
             f"the mesh holds elements of higher order ({', '.join(curved)}); "
-            "QDEM has linear tetrahedra only",
+            "QDEM's meshes are linear, of quadratic bodies too",
             where=where, remedy=_KEEP_CORNERS,
         )  # fmt: skip
     blocks = [block.data for block in mesh.cells if block.type == "tetra"]
