@@ -123,6 +123,8 @@ def test_what_can_not_be_computed_is_refused() -> None:
         q.Simulation([one, other])
     with pytest.raises(ConditionError, match="which the processor computes"):
         q.Simulation([one], device="cuda")
+    with pytest.raises(ConditionError, match="one is rigid, and nothing within it deforms"):
+        q.QuadraticBody(MESH, SOFT, "one", rigid=True)
     run = q.Simulation([one])
     with pytest.raises(ConditionError, match="no corner"):
         run.fix(one, len(MESH.nodes))
