@@ -148,7 +148,7 @@ def _print(content: dict[str, Any], as_json: bool) -> None:
         return
     for name, body in content.get("bodies", {}).items():
         print(
-            f"{name}: {body['elements']} {body.get('element', 'linear')} elements, "
+            f"{name}: {body['elements']} elements ({body.get('element', 'linear')}), "
             f"{body['nodes']} nodes, smallest altitude "
             f"{body['smallest_altitude']:.4g} m in element {body['thinnest_element']}, "
             f"{body['flipped']} turned right-handed, {body['unused_nodes']} unused nodes"

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import qdem_fem as q
+from qdem_fem.bodies import is_locking
 from qdem_fem.files.errors import CheckpointError, Interrupted
 from qdem_fem.files.output import write_bodies_vtu
 from qdem_fem.mesh import make_box_mesh
@@ -42,7 +43,7 @@ def test_a_run_says_its_element_and_what_it_gains(
     assert command(*BEAM, "--dry-run", "--set", 'body.0.element="linear"') == 0
     told = capsys.readouterr()
     assert 'or take element = "quadratic"' in told.err
-    assert "beam: 36 linear elements, 28 nodes" in told.out
+    assert "beam: 36 elements (linear), 28 nodes" in told.out
     assert command(*BEAM, "--run-folder", tmp_path / "run") == 0
     tip = float(capsys.readouterr().out.split("tip at the end (m): ")[1].split()[2])
     assert tip == pytest.approx(-92.65e-6, rel=0.02)  # qdem.md: 27,648 elements
@@ -134,7 +135,8 @@ def test_bodies_that_collide_keep_momentum_and_energy(contact: Any, gap: float) 
 
 
 def test_elements_that_lock_have_no_estimate() -> None:
-    """In Python as in a report: above a Poisson's ratio of 0.49."""
+    """In Python as in a report: above a Poisson's ratio of 0.49.  Quadratic ones do not lock."""
+    assert not is_locking(q.QuadraticBody(BLOCK, q.Material(1e7, 0.495, 1000.0)))
     for poisson, known in ((0.49, True), (0.495, False)):
         body = q.Body(make_box_mesh((1.0, 0.2, 0.2), (5, 1, 1)), q.Material(1e7, poisson, 1000.0))
         run = q.Simulation([body], threads=1)

@@ -41,6 +41,12 @@ def test_forces_are_those_of_the_twin(strain: Strain) -> None:
     assert abs(found - expected).max() < 1e-12 * abs(expected).max()
 
 
+def test_masses_are_in_proportion_to_the_consistent_diagonal() -> None:
+    basis = skfem.Basis(skfem.MeshTet(np.eye(3, 4, 1), np.arange(4)[:, None]), skfem.ElementTetP2())
+    diagonal = skfem.BilinearForm(lambda u, v, _: u * v).assemble(basis).diagonal()
+    assert pytest.approx(diagonal / diagonal.sum(), rel=1e-12) == q.QuadraticBody.MASS_SHARES
+
+
 def test_a_uniform_gradient_with_a_large_turn_is_exact() -> None:
     """No inner node is pulled, and a turn alone pulls none: round-off of strains of order one."""
     body = q.QuadraticBody(MESH, SOFT)
