@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 
 from qdem_fem import element
 from qdem_fem.bodies.rigid_mass import RigidMass, compute_rigid_mass
-from qdem_fem.files import ConditionError, Floats, Integers, MaterialError
+from qdem_fem.files import ConditionError, Floats, Integers, MaterialError, warn_user
 from qdem_fem.mesh import TetMesh, find_gradients, find_surface_faces, read_mesh
+from trackbed.plausible import describe_implausible
 
 Rigid = bool | Literal["lumped"]
 """Whether a body is rigid, and with which inertia; `Body` says what each means."""
@@ -26,7 +27,7 @@ class Body:
     ``rigid``: the body has six freedoms and no strain; of its material only density and Poisson's
     ratio (in contact) count.  ``"lumped"``: with the inertia of quarter masses at its nodes, which
     a deformable body of this mesh has, instead of the solid's (`qdem_fem.bodies.rigid_mass`).
-    Raises `MeshError`, `MaterialError`.
+    Raises `MeshError`, `MaterialError`; warns of a body above 100 m.
     """
 
     ELEMENT = "linear"
@@ -49,6 +50,9 @@ class Body:
             )
         self.name, self.rigid = name, rigid
         self.mesh = mesh if isinstance(mesh, TetMesh) else read_mesh(mesh, where=name)
+        size = float(np.ptp(self.mesh.nodes, axis=0).max())
+        if said := describe_implausible("body", size, f"body {name!r} (its mesh's scale)"):
+            warn_user(said)
         self.material = material.broadcast(len(self.mesh.elements))
         self._displacement = np.zeros_like(self.mesh.nodes)
         self._velocity = np.zeros_like(self.mesh.nodes)

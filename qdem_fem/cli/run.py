@@ -8,6 +8,7 @@ import sys
 import warnings
 from collections.abc import Iterable
 from functools import partial
+from math import floor, log10
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -172,19 +173,6 @@ def _print(content: dict[str, Any], as_json: bool) -> None:
     if "estimated_s" in content:
         print(f"estimated time {content['estimated_s']:.3g} s on this machine")
         print(f"{content['rows']} rows of probes, {content['vtu_files']} VTU files")
-    if found := content.get("discretisation"):
-        print(
-            f"errors of the mesh, estimated: {100 * found['displacement']:.2g} % of displacements "
-            f"missing, {100 * found['stress']:.2g} % of stresses wrong, "
-            f"{100 * found['frequency']:.2g} % of frequencies too much"
-        )
-    for name, probe in content.get("probes", {}).items():
-        print(f"{name} at the end (m): {' '.join(f'{value:.7g}' for value in probe['end'])}")
-    for name, modes in content.get("modes", {}).items():
-        found = [f"{mode['frequency']:.6g} Hz" for mode in modes]
-        print(f"{name}: {', '.join(found)}")
-    if words := content.get("bed", {}).get("words"):
-        print(f"the bed: {words}")
     print(f"not in this run: {'; '.join(content['left_out'])}")
     if "cost" in content:
         cost = content["cost"]
@@ -192,3 +180,23 @@ def _print(content: dict[str, Any], as_json: bool) -> None:
         rate = f", {speed:.3g} million element-steps per second" if speed else ""
         print(f"{cost['cpu_s']:.3g} s of CPU time{rate}")
         print(f"{content['folder']}/report.html")
+    if words := content.get("bed", {}).get("words"):
+        print(f"the bed: {words}")
+    if found := content.get("discretisation") or {}:
+        print(
+            f"errors of the mesh, estimated: {100 * found['displacement']:.2g} % of displacements "
+            f"missing, {100 * found['stress']:.2g} % of stresses wrong, "
+            f"{100 * found['frequency']:.2g} % of frequencies too much"
+        )
+    moved, turned = (count_digits(found.get(of)) for of in ("displacement", "frequency"))
+    for name, probe in content.get("probes", {}).items():
+        end = " ".join(f"{value:.{moved}g}" for value in probe["end"])
+        print(f"{name} at the end (m): {end}")
+    for name, modes in content.get("modes", {}).items():
+        frequencies = [f"{mode['frequency']:.{turned}g} Hz" for mode in modes]
+        print(f"{name}: {', '.join(frequencies)}")
+
+
+def count_digits(error: float | None) -> int:
+    """Digits of a figure that its mesh errs by, as a share; seven where no error is known."""
+    return 7 if not error else min(max(2, 1 - floor(log10(error))), 7)

@@ -31,12 +31,9 @@ TIMED = "duration step safety sampling energy_interval vtu_interval checkpoint_i
 
 
 def warn_of_values(scene: Scene, bodies: dict[str, Any]) -> None:
-    """Warn of moduli, densities, coefficients of friction and sizes that are hardly meant."""
+    """Warn of moduli, densities and coefficients of friction that are hardly meant."""
     values: list[tuple[Quantity, float, str]] = []
     for body in bodies.values():
-        size = float(np.ptp(body.nodes, axis=0).max())
-        mass = float(body.material.density @ body.gradients[1])
-        values.append(("body", size, f"body {body.name!r} of {mass:.3g} kg (key mesh.scale)"))
         given: tuple[Quantity, ...] = ("density",) if body.rigid else ("density", "young")
         for quantity in given:
             found = np.unique(getattr(body.material, quantity))

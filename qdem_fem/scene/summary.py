@@ -17,6 +17,7 @@ from qdem_fem.tables import Prepared
 MOVING = 1e-3  # share of the greatest displacement below which a component does not move [-]
 PERIODS = 2  # that a record holds at least of a mode: with fewer a drift fits as well [-]
 SAMPLED = 256  # elements of a body, most, whose own steps are compared [-]
+HOLDS = ("fix", "prescribe", "roller")  # conditions under which a body does not fly off
 FREE_SAMPLES = 50  # of free motion at least, for modes to be sought in it [-]
 
 
@@ -166,11 +167,14 @@ def find_modes(prepared: Prepared, rows: dict[str, Floats]) -> dict[str, list[Mo
     found: dict[str, list[Mode]] = {}
     if not count or free.sum() < FREE_SAMPLES:
         return found
-    for name in prepared.probes:
-        columns = [f"{name}_{axis}" for axis in "xyz"]
-        column = max(columns, key=lambda one: float(np.ptp(rows[one][free])))
-        time = rows["time"][free]
-        modes = find_peak_frequencies(time, rows[column][free], count)
+    time = rows["time"][free]
+    held = {step.body for step in prepared.conditions if step.verb in HOLDS}
+    for name, (body, _) in prepared.probes.items():
+        motion = {f"{name}_{axis}": rows[f"{name}_{axis}"][free] for axis in "xyz"}
+        if body not in held:  # that it flies or falls is no mode
+            motion = {one: values - find_drift(time, values) for one, values in motion.items()}
+        column = max(motion, key=lambda one: float(np.ptp(motion[one])))
+        modes = find_peak_frequencies(time, motion[column], count)
         span = float(time[-1] - time[0])
         short = [mode for mode in modes if mode.frequency * span < PERIODS]
         if short:
@@ -179,6 +183,13 @@ def find_modes(prepared: Prepared, rows: dict[str, Floats]) -> dict[str, list[Mo
                 f"{short[0].frequency:.3g} Hz, of which they hold {short[0].frequency * span:.2g} "
                 f"periods and need {PERIODS}; raise simulation.duration"
             )
+        elif not modes:
+            warn_user(f"{column}: no frequency stands out in {span:.3g} s of free motion")
         if modes := [mode for mode in modes if mode not in short]:
             found[column] = modes
     return found
+
+
+def find_drift(time: Floats, values: Floats) -> Floats:
+    """The parabola of a body that flies, falls or turns a little, through its record (k,)."""
+    return np.asarray(np.polynomial.Polynomial.fit(time, values, 2)(time))

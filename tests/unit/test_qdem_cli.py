@@ -434,3 +434,22 @@ def test_no_frequency_from_less_than_two_periods(scene: Path, capsys) -> None:
     assert any("too short for a frequency of" in one for one in said["warnings"])
     found = [mode["frequency"] for modes in said["modes"].values() for mode in modes]
     assert all(frequency > 2 / 0.003 for frequency in found)
+
+
+def test_a_bar_that_flies_off_has_its_own_frequency(scene: Path, capsys) -> None:
+    """Hit at one end it flies, which is no mode: c/2L = 1,250 Hz along it, as a rod's (nu = 0)."""
+    free = SCENE.replace('[[fix]]\nbody = "bar"\nnodes = { set = "x-min" }\n', "")
+    scene.write_text(free.replace("[0, 0, -1]", "[-1, 0, 0]"))
+    (scene.parent / "blow.csv").write_text("t,p\n0,0\n0.0001,10\n0.0002,0\n")
+    options = ["--json", "--no-pictures", "--run-folder", str(scene.parent / "out")]
+    assert command(scene, *options, "--set", "body.0.material.poisson=0.0") == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["probes"]["tip"]["end"][0] < -1e-6
+    assert not any("too short" in one for one in said["warnings"])
+    assert said["modes"]["tip_x"][0]["frequency"] == pytest.approx(1250, rel=0.02)
+
+
+@pytest.mark.parametrize(("error", "digits"), [(None, 7), (0.33, 2), (0.05, 3), (1e-9, 7)])
+def test_digits_of_a_figure_follow_the_error_of_its_mesh(error: float | None, digits: int) -> None:
+    """A third of it missing leaves two digits."""
+    assert cli.count_digits(error) == digits
