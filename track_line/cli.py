@@ -29,6 +29,9 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
         help="folder of a sweep, or a table of cycles and a column for each sleeper: law, scatter "
         "and persistence of these beds; beside SCENE they replace its own, before --set",
     )  # fmt: skip
+    parser.add_argument(
+        "--law", metavar="NAME", help="settlement law that --beds are fitted by (default: the best)"
+    )
     parser.set_defaults(command=run_line)
 
 
@@ -53,14 +56,17 @@ def run_line(arguments: argparse.Namespace) -> int:
 
 
 def _refuse_no_scene(arguments: argparse.Namespace) -> None:
-    """Raise `UsageError` where there is no scene, and beds alone are not all that is asked."""
+    """Raise `UsageError` where there is no scene, and beds alone are not all that is asked; or no
+    beds to fit a law to."""
     given = vars(arguments)
     names = ("run_folder", "overrides", "dry_run", "resume", "force", "no_pictures")
     if given["scene"] is None and (given["beds"] is None or any(given[name] for name in names)):
         raise UsageError(
             "no scene is given", remedy="trackbed new line my-line writes one; without a scene "
-            "there are --beds and --json alone",
+            "there are --beds, --law and --json alone",
         )  # fmt: skip
+    if given["law"] and given["beds"] is None:
+        raise UsageError("--law is of --beds", remedy="of a scene's own beds: --set law.name=...")
 
 
 def _fit_beds(arguments: argparse.Namespace) -> tuple[list[str], list[str]]:
@@ -68,7 +74,7 @@ def _fit_beds(arguments: argparse.Namespace) -> tuple[list[str], list[str]]:
     from track_line import measured
 
     ensemble = measured.read_beds(arguments.beds)
-    fit = measured.fit_beds(ensemble)
+    fit = measured.fit_beds(ensemble, arguments.law)
     settings, doubts = measured.format_settings(fit), list(measured.list_doubts(ensemble, fit))
     if arguments.scene is None:
         figures = measured.summarise_fit(ensemble, fit)
@@ -94,19 +100,14 @@ def _run(
     given = {"resume": arguments.resume, "force": arguments.force}
     if finished := folder.look_ahead(manifest, **given):
         return finished | {"folder": str(path)}
-    progress = Progress()
-
-    def show(now: float, end: float, blocks: int) -> None:
-        progress.report(now**0.2, end**0.2, f"{now:.3g} of {end:.3g} axles, {blocks} blocks")
-
     kept = "the last saved state is kept"
     with open_run(folder, manifest, file.text, arguments, kept) as goes_on:
-        records = run_scene(file, folder, resume=goes_on, progress=show)
-        summary = summarise_run(file, records)
+        records, error = run_scene(file, folder, resume=goes_on, progress=Progress().report)
+        summary = summarise_run(file, records, error)
         write_report(folder, records, manifest, summary, draw=not arguments.no_pictures)
         write_result(path, summary)
     if doubt := describe_implausible("settlement", summary["settlement_m"], "mean settlement"):
         print(f"warning: {doubt}", file=sys.stderr)
-    if (error := summary["error_of_blocks"]) > PLAN.doubtful:
+    if error > PLAN.doubtful:
         print(f"warning: D1 errs by about {100 * error:.2g} % by its blocks", file=sys.stderr)
     return summary | {"folder": str(path)}

@@ -184,15 +184,16 @@ def read_table(path: Path, wanted: Sequence[Collection[str]] = ()) -> Table:
 
 
 def read_columns(
-    path: Path, names: Sequence[str], quantities: Sequence[Collection[str]]
+    path: Path | Table, names: Sequence[str], quantities: Sequence[Collection[str]]
 ) -> tuple[Floats, list[int]]:
-    """Columns of a table in SI units, shape (columns, k), and the line of each row.
+    """Columns of a table, or its file, in SI units, shape (columns, k), and the line of each row.
 
     ``names``: of the columns, with or without the unit that stands behind them; ``quantities``:
     the units of `SI` that each may have.  Without a unit numbers are in SI units.  Raises
     `UsageError`.
     """
-    table = read_table(path, [(name.strip().lower(),) for name in names])
+    wanted = [(name.strip().lower(),) for name in names]
+    table = path if isinstance(path, Table) else read_table(path, wanted)
     places, factors = [], []
     for name, units in zip(names, quantities, strict=True):
         place = find_column(table, (name.strip().lower(),), units)
@@ -203,13 +204,14 @@ def read_columns(
         if unit and unit not in units:
             raise UsageError(
                 f"the column {table.header[place]} is in {unit}, which is not known here",
-                where=f"{path}:{table.header_line}",
+                where=f"{table.path}:{table.header_line}",
                 remedy=f"the units are {', '.join(units)}; without one numbers are in SI units",
             )
         places.append(place)
         factors.append(SI[unit] if unit else 1.0)
     if not table.rows:
-        raise UsageError("it has no rows", where=str(path), remedy="give a row for each instant")
+        remedy = "give a row for each instant"
+        raise UsageError("it has no rows", where=str(table.path), remedy=remedy)
     return table.read_numbers(places, names) * np.array(factors)[:, None], table.lines
 
 

@@ -49,7 +49,9 @@ def test_a_summary_is_of_the_last_record(words):
     line = build_line(file)
     last, finer = ([one for _, one in march_line(line, start_line(line), 1e4, finer=f)][-1]
                    for f in (1.0, 2.0))  # fmt: skip
-    found = run.summarise_run(file, [one for _, one in march_line(line, start_line(line), 1e4)])
+    error = run.estimate_error(file, last, lambda _: None)
+    records = [one for _, one in march_line(line, start_line(line), 1e4)]
+    found = run.summarise_run(file, records, error)
     band = [found[f"d1_{name}_m"] for name in ("low", "median", "high")]
     assert band == pytest.approx(np.quantile(last.deviation, (0.05, 0.5, 0.95)), rel=1e-12)
     assert found["tonnage_mgt"] == pytest.approx(1e4 * 200e3 / 9.81 / 1e9)

@@ -12,7 +12,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from track_line.arrays import Floats
+from track_line.arrays import Floats, Numbers
 
 SEAT_AREA = 0.325
 """Of half a sleeper on its bed, 0.26 m by 1.25 m [m^2]."""
@@ -36,13 +36,22 @@ class Law(ABC):
     source: ClassVar[str]  # where the form and the defaults are from, and which of the two is not
     validity: ClassVar[str]  # what it was measured on, and what it is not for
 
+    terms: ClassVar[tuple[str, ...]] = ()
+    """Parameters each of which is a factor of a part of the settlement from rest: what a fit to
+    measured beds finds, none below zero.  Without any the law is not fitted."""
+    shape: ClassVar[tuple[str, float, float] | None] = None
+    """Parameter that bends the curve, and between which numbers above zero a fit looks for it."""
+    exponent: ClassVar[tuple[str, float] | None] = None
+    """Parameter of which the exponent of the force is the sum with this number."""
+
     @abstractmethod
     def rate(self, load: BedLoad, settled: Floats, cycle: float) -> Floats:
         """ds/dN [m] at the settlement s = ``settled`` [m] behind N = ``cycle`` axles."""
 
     @abstractmethod
-    def advance(self, load: BedLoad, settled: Floats, cycle: float, cycles: float) -> Floats:
-        """The integral of `rate` over ``cycles`` further axles at constant load [m]."""
+    def advance(self, load: BedLoad, settled: Floats, cycle: float, cycles: Numbers) -> Floats:
+        """The integral of `rate` over ``cycles`` further axles, one number or an array that fits
+        the others, at constant load [m]."""
 
     def advance_mixed(
         self, load: BedLoad, shares: Floats, settled: Floats, cycle: float, cycles: float

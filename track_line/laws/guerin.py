@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from track_line.arrays import Floats
+from track_line.arrays import Floats, Numbers
 from track_line.laws.contract import BedLoad, Law
 
 
@@ -20,11 +20,12 @@ class Guerin(Law):
     formula = "ds/dN = alpha (F/k_b/1 mm)^beta"
     source = "Guerin 1996 (thesis, ENPC), as quoted in reviews; numbers from memory"
     validity = "a scale model behind its first cycles; no seating, rate for ever"
+    terms, exponent = ("alpha",), ("beta", 0.0)
 
     def rate(self, load: BedLoad, settled: Floats, cycle: float) -> Floats:
         return np.asarray(self.alpha * (load.force / load.bed / 1e-3) ** self.beta)
 
-    def advance(self, load: BedLoad, settled: Floats, cycle: float, cycles: float) -> Floats:
+    def advance(self, load: BedLoad, settled: Floats, cycle: float, cycles: Numbers) -> Floats:
         return cycles * self.rate(load, settled, cycle)
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from track_line.arrays import Floats
+from track_line.arrays import Floats, Numbers
 from track_line.laws.contract import SEAT_AREA, BedLoad, Law
 
 
@@ -30,6 +30,7 @@ class LiSelig(Law):
     formula = "s = H a (sigma_d/sigma_s)^m N^b"
     source = "Li and Selig 1996 (J. Geotech. Eng. 122); a, m, b as in PlatypusBytes/ROSE (BSD-3)"
     validity = "saturated silt and clay at stresses below failure; not for ballast"
+    terms, shape, exponent = ("a",), ("b", 0.01, 1.0), ("m", 0.0)
 
     def _first(self, load: BedLoad) -> Floats:
         ratio = self.spread * load.force / self.area / self.strength
@@ -38,7 +39,7 @@ class LiSelig(Law):
     def rate(self, load: BedLoad, settled: Floats, cycle: float) -> Floats:
         return self._first(load) * self.b * cycle ** (self.b - 1)
 
-    def advance(self, load: BedLoad, settled: Floats, cycle: float, cycles: float) -> Floats:
+    def advance(self, load: BedLoad, settled: Floats, cycle: float, cycles: Numbers) -> Floats:
         return self._first(load) * ((cycle + cycles) ** self.b - cycle**self.b)
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from track_line.arrays import Floats
+from track_line.arrays import Floats, Numbers
 from track_line.laws.contract import BedLoad, Law
 
 
@@ -15,7 +15,7 @@ class Power(Law):
     """s = a (F/F0)^m N^b at constant force; ds/dN = b u^(1/b) s^(1 - 1/b), u = a (F/F0)^m.
 
     A bed that was loaded less goes on where a bed of its settlement would be: the rate forgets how
-    it came there.  a, b: of ``trackbed fit --law power`` to a sweep's mean, without its c.
+    it came there.
     """
 
     a: float = 0.7e-3  # settlement by the first axle [m]
@@ -29,6 +29,7 @@ class Power(Law):
         "a scene gives no fit"
     )
     validity = "the cycles and the ballast it was fitted to; no collapse, no threshold"
+    terms, shape, exponent = ("a",), ("b", 0.01, 1.0), ("m", 0.0)
 
     def _first(self, load: BedLoad) -> Floats:
         """u: settlement by one axle of this load [m]."""
@@ -38,7 +39,7 @@ class Power(Law):
         first = self._first(load)
         return np.asarray(self.b * first ** (1 / self.b) * settled ** (1 - 1 / self.b))
 
-    def advance(self, load: BedLoad, settled: Floats, cycle: float, cycles: float) -> Floats:
+    def advance(self, load: BedLoad, settled: Floats, cycle: float, cycles: Numbers) -> Floats:
         return self._grow(self._first(load), settled, cycles)
 
     def advance_mixed(
@@ -52,7 +53,7 @@ class Power(Law):
         mean = np.tensordot(shares, ratio ** (1 / self.b), 1) ** self.b
         return self._grow(greatest * mean, settled, cycles)
 
-    def _grow(self, first: Floats, settled: Floats, cycles: float) -> Floats:
+    def _grow(self, first: Floats, settled: Floats, cycles: Numbers) -> Floats:
         """Settlement by further axles, of which the ``first`` ever would settle u [m]."""
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             further = cycles * (first / settled) ** (1 / self.b)  # over the axles that it had

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from track_line.arrays import Floats
+from track_line.arrays import Floats, Numbers
 from track_line.laws.contract import SEAT_AREA, BedLoad, Law
 
 
@@ -26,6 +26,7 @@ class Sato(Law):
     formula = "s = gamma (1 - e^(-alpha N)) + a (p - p0)^2 N"
     source = "form: Sato 1995 (Vehicle System Dynamics 24); the numbers are an example"
     validity = "Japanese lines of high speed; of the load only the linear term depends"
+    terms, shape = ("gamma", "growth"), ("alpha", 1e-9, 1.0)
 
     def _rate_for_ever(self, load: BedLoad) -> Floats:
         above = np.maximum(load.force / self.area - self.threshold, 0.0)
@@ -35,7 +36,7 @@ class Sato(Law):
         seating = self.gamma * self.alpha * np.exp(-self.alpha * cycle) * (load.force > 0)
         return np.asarray(seating + self._rate_for_ever(load))
 
-    def advance(self, load: BedLoad, settled: Floats, cycle: float, cycles: float) -> Floats:
+    def advance(self, load: BedLoad, settled: Floats, cycle: float, cycles: Numbers) -> Floats:
         seating = -self.gamma * np.exp(-self.alpha * cycle) * np.expm1(-self.alpha * cycles)
         return np.asarray(seating * (load.force > 0) + cycles * self._rate_for_ever(load))
 

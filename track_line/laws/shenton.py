@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from track_line.arrays import Floats
+from track_line.arrays import Floats, Numbers
 from track_line.laws.contract import BedLoad, Law
 
 
@@ -32,12 +32,13 @@ class Shenton(Law):
         "British main lines up to some 1e7 axles; Shenton takes mixed axles by their fifth-power "
         "mean, here each counts by its own force"
     )
+    terms = ("seating", "linear")
 
     def rate(self, load: BedLoad, settled: Floats, cycle: float) -> Floats:
         seating = self.b * (self.seating + 0.028 * self.lift) * cycle ** (self.b - 1)
         return np.asarray(self.quality * load.force / self.force * (seating + self.linear))
 
-    def advance(self, load: BedLoad, settled: Floats, cycle: float, cycles: float) -> Floats:
+    def advance(self, load: BedLoad, settled: Floats, cycle: float, cycles: Numbers) -> Floats:
         powers = (cycle + cycles) ** self.b - cycle**self.b
         grown = (self.seating + 0.028 * self.lift) * powers + self.linear * cycles
         return np.asarray(self.quality * load.force / self.force * grown)

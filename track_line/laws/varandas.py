@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import boxcox
 
-from track_line.arrays import Floats
+from track_line.arrays import Floats, Numbers
 from track_line.laws.contract import BedLoad, Law
 
 SHIFT = 100.0
@@ -17,8 +18,9 @@ SHIFT = 100.0
 class Varandas(Law):
     """s = gamma (F/F0)^(alpha + 1) H(N)/H(N0 - 1), H(n) = sum of k^-beta for k = 1 .. n.
 
-    Between whole axles H is its analytic continuation, so that a rate is there.  The axles are
-    counted whatever they weigh; Varandas counts those that were heavier, in a histogram.
+    With beta = 1 it is a logarithm.  Between whole axles H is its analytic continuation, so that a
+    rate is there.  The axles are counted whatever they weigh; Varandas counts those that were
+    heavier, in a histogram.
     """
 
     gamma: float = 10e-3  # settlement by N0 axles of the force F0 [m]
@@ -30,18 +32,19 @@ class Varandas(Law):
     formula = "s = gamma (F/F0)^(alpha + 1) H(N)/H(N0 - 1)"
     source = "Varandas et al. 2013; parameters of a test of PlatypusBytes/ROSE (BSD-3)"
     validity = "ballast near bridges and culverts; no linear term: N^0.18 for many axles"
+    terms, shape, exponent = ("gamma",), ("beta", 0.02, 2.0), ("alpha", 1.0)
 
-    def _sum(self, number: float) -> float:
+    def _sum(self, number: Numbers) -> Floats:
         """H [-]."""
-        places = np.arange(1, int(SHIFT) + 1)
-        first = ((number + places) ** -self.beta - places**-self.beta).sum()
-        ends = [self._smooth(SHIFT + one) for one in (number, 0.0)]
-        return float(ends[0] - ends[1] - first)
+        places = np.arange(1.0, SHIFT + 1)
+        above = np.asarray(number)[..., None] + places
+        first = (above**-self.beta - places**-self.beta).sum(axis=-1)
+        return np.asarray(self._smooth(SHIFT + number) - self._smooth(SHIFT) - first)
 
-    def _smooth(self, n: float) -> float:
+    def _smooth(self, n: Numbers) -> Floats:
         """H(n) up to a constant, for large n (Euler and Maclaurin)."""
         tail = n**-self.beta / 2 - self.beta * n ** (-self.beta - 1) / 12
-        return float(n ** (1 - self.beta) / (1 - self.beta) + tail)
+        return np.asarray(boxcox(n, 1 - self.beta) + tail)
 
     def _slope(self, number: float) -> float:
         """dH/dn [-]."""
@@ -56,7 +59,7 @@ class Varandas(Law):
     def rate(self, load: BedLoad, settled: Floats, cycle: float) -> Floats:
         return self._scale(load) * self._slope(cycle)
 
-    def advance(self, load: BedLoad, settled: Floats, cycle: float, cycles: float) -> Floats:
+    def advance(self, load: BedLoad, settled: Floats, cycle: float, cycles: Numbers) -> Floats:
         return self._scale(load) * (self._sum(cycle + cycles) - self._sum(cycle))
 
 

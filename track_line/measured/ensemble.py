@@ -18,6 +18,8 @@ A_DECADE = 20
 BLOCK = 0.1
 """Share of the cycles up to N over which a settlement is averaged [-]: a bed springs at the end of
 a cycle, and what it springs is no memory of it."""
+READ = 0.9
+"""Share of the beds that are read where all count as read [-]: some readings of some fail."""
 FEWEST = 3
 """Beds, below which there is no scatter to speak of."""
 SHORTEST = 10.0
@@ -29,10 +31,12 @@ class Ensemble:
     """n beds at k cycles, evenly spaced in ln N from first to last."""
 
     cycle: Floats  # N, shape (k,) [-]
-    settled: Floats  # shape (n, k) [m]
+    settled: Floats  # mean over a `BLOCK` of cycles up to N, shape (n, k) [m]
+    middle: Floats  # mean cycle of that block, where a law would settle so far, shape (k,)
     read: Bools
-    """Cycles that all beds were read at, within half a step, shape (k,); between readings a
-    straight line in ln N is taken, which knows nothing of a bed."""
+    """Cycles that `READ` of the beds were read at, within half a step, shape (k,); between readings
+    a straight line in ln N is taken, which knows nothing of a bed."""
+    names: list[str]  # of the beds, n
     packing: NDArray[np.int64]
     """Which rain of grains, or place in the track, each bed is, shape (n,)."""
     pressure: Floats
@@ -69,8 +73,9 @@ def align_beds(
         notes = [*notes, "readings at cycle 0 are left out: windows are of the logarithm of cycles"]
     if len(curves) < FEWEST:
         raise UsageError(
-            f"{len(curves)} beds show no scatter", where=where,
-            remedy=f"give {FEWEST} at least, and thirty to know whether a bad bed stays one",
+            f"{len(curves)} bed{'s show' if len(curves) != 1 else ' shows'} no scatter",
+            where=where, remedy=f"give {FEWEST} at least, and thirty to know whether a bad bed "
+            "stays one; a law alone is what trackbed fit finds",
         )  # fmt: skip
     first = max(max(float(cycle[cycle > 0].min(initial=cycle[-1])), 1.0) for cycle, _ in curves)
     last = min(float(cycle[-1]) for cycle, _ in curves)
@@ -83,11 +88,13 @@ def align_beds(
         )  # fmt: skip
     cycle = np.geomspace(first, last, int(A_DECADE * np.log10(last / first) + 1e-9) + 1)
     half = np.log(cycle[1] / cycle[0]) / 2
-    near = np.log(np.maximum(cycle[:, None] * np.linspace(1 - BLOCK, 1, 10), first))
+    near = np.maximum(cycle[:, None] * np.linspace(1 - BLOCK, 1, 10), first)
     logs = [np.log(np.maximum(one, np.finfo(float).tiny)) for one, _ in curves]
+    near_one = [find_distance(np.log(cycle), x) <= half for x in logs]
+    read = np.mean(near_one, axis=0) >= READ
+    middle, near = near.mean(axis=1), np.log(near)
     settled = [np.interp(near, x, s).mean(axis=1) for x, (_, s) in zip(logs, curves, strict=True)]
-    read = np.all([find_distance(near[:, -1], x) <= half for x in logs], axis=0)
-    return Ensemble(cycle, np.array(settled), read, notes=tuple(notes), **others)
+    return Ensemble(cycle, np.array(settled), middle, read, notes=tuple(notes), **others)
 
 
 def find_distance(places: Floats, readings: Floats) -> Floats:

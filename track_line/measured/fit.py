@@ -8,29 +8,23 @@ logarithms; a packing that was loaded several times counts once in them.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import compress, pairwise
 from math import isfinite
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import brentq
 from scipy.stats import chi2, norm, t
 
 from track_line.arrays import Floats
 from track_line.beam import Track
 from track_line.beds import SHORTEST_MEMORY
 from track_line.laws import SEAT_AREA
+from track_line.measured.choice import LEVEL, Estimate, LawFit, average, choose_law, fit_laws
 from track_line.measured.ensemble import A_DECADE, Ensemble
 from trackbed.errors import UsageError
 
-LEVEL = 0.9
-"""Probability that an interval holds what it is of [-]."""
-EXPONENTS = (0.01, 1.0)
-"""Between which b is looked for: about a logarithm, a constant rate [-]."""
-
-SLOWEST, FASTEST = 0.0101, 0.9999
-"""b at an end of `EXPONENTS`: where N^b has no curve so flat, and `a` means nothing, or is straight
-where beds quicken; the scatter of a b that is held shows nothing."""
+NAMED = 5  # beds that a sentence names at most
 ONE = 1 - 1e-12
 """Greatest correlation that has an interval [-]."""
 SMALL = 1e-6
@@ -38,23 +32,14 @@ SMALL = 1e-6
 
 
 @dataclass(frozen=True)
-class Estimate:
-    """A value with its interval; nan for what is not known."""
-
-    value: float = np.nan
-    low: float = np.nan
-    high: float = np.nan
-
-
-@dataclass(frozen=True)
 class BedFit:
-    """The law s = c + a (F/F0)^m N^b of a mean bed, and how beds scatter about it."""
+    """The law of a mean bed, and how beds scatter about it."""
 
-    force: float  # F0, on half a sleeper: the pressure under most beds times `SEAT_AREA` [N]
-    a: float  # [m]
-    b: Estimate  # [-]
-    m: Estimate  # [-]
-    seated: float  # c, which is no part of the law of a line [m]
+    force: float  # on half a sleeper: the pressure under most beds times `SEAT_AREA` [N]
+    laws: dict[str, LawFit]  # all that the readings can carry, by name
+    law: LawFit | None  # the one that was asked for, or describes the beds best
+    reference: Floats  # misfit of each bed of these by the mean of the others, shape (n,) [-]
+    m: Estimate  # exponent of the force [-]
     bed: float  # mean stiffness under half a sleeper [N/m]
     stiffness: Estimate  # its coefficient of variation [-]
     total: Estimate  # coefficient of variation of the gain over all cycles [-]
@@ -62,7 +47,7 @@ class BedFit:
     window: float  # last cycle of a window over its first: a decade, or half of less than two [-]
     persistence: tuple[Estimate, ...]
     """Correlation of the gains in two windows that follow one another, the latest first [-]."""
-    rose: int  # beds that rose in a window, and are in no correlation of it
+    rose: list[str]  # names of beds that rose in a window, and are in no correlation of it
     memory: Estimate
     """Mean settlement after which scatter is forgotten by e [m], by the latest persistence."""
     settlement: float  # coefficient of variation of ds/dN [-], of which ``total`` is what lasts
@@ -71,17 +56,18 @@ class BedFit:
     unseen: float  # constant rate that would make the whole of the last window's gain [m a cycle]
 
 
-def fit_beds(ensemble: Ensemble) -> BedFit:
-    """Law, scatter and persistence of an ensemble; raises `UsageError` for beds that rise."""
+def fit_beds(ensemble: Ensemble, law: str | None = None) -> BedFit:
+    """Law, scatter and persistence of an ensemble; ``law``: the one to take, where it is not the
+    best of all.  Raises `UsageError` for beds that rise, and a law that they can not carry."""
     cycle, settled, load = ensemble.cycle, ensemble.settled, ensemble.load
     gain, n = settled[:, -1] - settled[:, 0], ensemble.packings
-    if (rising := np.count_nonzero(~(gain > 0))) > 0:
+    if rising := list(compress(ensemble.names, gain <= 0)):
         raise UsageError(
-            f"{rising} of {len(gain)} beds rise from cycle {cycle[0]:.3g} to {cycle[-1]:.3g}",
+            f"{len(rising)} of {len(gain)} beds rise from cycle {cycle[0]:.3g} to {cycle[-1]:.3g}: "
+            f"{', '.join(rising[:NAMED])}",
             remedy="settlement is positive downwards; leave out beds whose readings are wrong",
         )
     here = load == max(load, key=lambda one: (np.count_nonzero(load == one), one))
-    read = ensemble.read
     ends = find_ends(ensemble)
     gains = -np.diff(settled[:, ends], axis=1).T
     late, early = (means := gains[:, here].mean(axis=1))[:2]
@@ -91,12 +77,13 @@ def fit_beds(ensemble: Ensemble) -> BedFit:
             f"the mean bed rises from cycle {cycle[ends[rise + 1]]:.3g} to {cycle[ends[rise]]:.3g}",
             remedy="give the readings between one tamping and the next alone",
         )
-    seated, a, b = fit_power(cycle[read], settled[here][:, read].mean(axis=0))
-    interval = bound_exponent(cycle[read], settled[here][:, read], b)
-    if b < SLOWEST:
-        seated, a, b, interval = np.nan, np.nan, np.nan, (np.nan, np.nan)
-    elif b > FASTEST:
-        interval = np.nan, np.nan
+    m = fit_load(ensemble, gain)
+    laws, reference = fit_laws(ensemble, here, m)
+    if law is not None and law not in laws:
+        raise UsageError(
+            f"the law {law} hangs on load or stiffness, which these beds do not say",
+            remedy=f"take one of {', '.join(laws)}",
+        )
     stiff, uneven = (centre(np.log(of), load) for of in (ensemble.bedding, gain))
 
     logs = [centre(np.log(np.where(one > 0, one, np.nan)), load) for one in gains]
@@ -105,11 +92,12 @@ def fit_beds(ensemble: Ensemble) -> BedFit:
     total = estimate_variation(uneven, load, n)
     neighbours = find_likeness(uneven) if ensemble.in_order else Estimate()
     return BedFit(
-        force=float(ensemble.force[here][0]), a=a, m=fit_load(ensemble, gain),
-        b=Estimate(b, *interval), seated=seated, bed=average(ensemble.bedding[here]) * SEAT_AREA,
+        force=float(ensemble.force[here][0]), laws=laws,
+        law=laws[law] if law else choose_law(laws, reference), reference=reference, m=m,
+        bed=average(ensemble.bedding[here]) * SEAT_AREA,
         stiffness=estimate_variation(stiff, load, n), total=total,
         together=find_correlation(stiff, uneven, n), window=float(cycle[ends[0]] / cycle[ends[1]]),
-        persistence=persistence, rose=int(np.count_nonzero(~(gains > 0).all(axis=0))),
+        persistence=persistence, rose=list(compress(ensemble.names, gains.min(axis=0) <= 0)),
         memory=memory, settlement=total.value / share_kept(gain[here].mean(), memory.value),
         length=Estimate(*map(find_length, vars(neighbours).values())),
         unseen=float(late / (cycle[ends[0]] - cycle[ends[1]])),
@@ -135,12 +123,6 @@ def find_ends(ensemble: Ensemble) -> NDArray[np.int64]:
     return np.asarray(ends)
 
 
-def average(values: Floats) -> float:
-    """Mean of the numbers that are known; nan where none is."""
-    known = values[np.isfinite(values)]
-    return float(known.mean()) if known.size else np.nan
-
-
 def centre(logs: Floats, group: NDArray[np.int64]) -> Floats:
     """Logarithms (n,) less the mean of those known of their ``group`` (n,)."""
     centred = np.where(np.isfinite(logs), logs, np.nan)
@@ -148,30 +130,6 @@ def centre(logs: Floats, group: NDArray[np.int64]) -> Floats:
         mine = (group == one) & np.isfinite(centred)
         centred[mine] -= centred[mine].mean() if mine.any() else 0.0
     return centred
-
-
-def fit_power(cycle: Floats, settled: Floats) -> tuple[float, float, float]:
-    """c [m], a [m] and b [-] of s = c + a N^b, by least squares over all cycles (k,)."""
-
-    def find_slope(b: float) -> tuple[float, float]:
-        x, y = cycle**b, settled - settled.mean()
-        x -= x.mean()
-        a = float(x @ y / (x @ x))
-        return a, float(((y - a * x) ** 2).sum())
-
-    found = minimize_scalar(lambda b: find_slope(b)[1], bounds=EXPONENTS, method="bounded",
-                            options={"xatol": 1e-6})  # fmt: skip
-    b = float(found.x)
-    a = find_slope(b)[0]
-    return float(settled.mean() - a * (cycle**b).mean()), a, b
-
-
-def bound_exponent(cycle: Floats, settled: Floats, b: float) -> tuple[float, float]:
-    """Interval of ``b``, by leaving out each of the beds (n, k) in turn (jackknife)."""
-    n = len(settled)
-    left = np.array([fit_power(cycle, np.delete(settled, i, 0).mean(axis=0))[2] for i in range(n)])
-    half = t.ppf((1 + LEVEL) / 2, n - 1) * np.sqrt((n - 1) * left.var())
-    return b - half, b + half
 
 
 def fit_load(ensemble: Ensemble, gain: Floats) -> Estimate:

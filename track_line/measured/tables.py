@@ -20,6 +20,8 @@ SEED = "sample.seed"
 LENGTHS = ("m", "mm", "cm", "um", "µm")
 CYCLES = ("cycle", "cycles", "n", "axle", "axles")
 """Names of the column of cycles."""
+GAPS = ("", "-", "nan")
+"""Cells of a sleeper that was not read."""
 LATE = 10.0
 """The elastic deflection is the mean over cycles from the last one over this."""
 CURVE = ("cycle", "loaded_body_settlement", "elastic_deflection")
@@ -35,11 +37,19 @@ def read_beds(path: Path) -> Ensemble:
 
 def _read_sleepers(path: Path) -> Ensemble:
     """Settlements [m, or the unit behind a column's name] of sleepers as they lie in a track."""
-    table = read_table(path, [CYCLES])
-    place = find_column(table, CYCLES, ("-", "1"))  # tonnes or days in its place are no cycles
+    try:
+        table = read_table(path, [CYCLES])
+        place = find_column(table, CYCLES, ("-", "1"))
+    except UsageError as error:
+        remedy = f"call it {', '.join(CYCLES)}; tonnes over those of an axle are cycles, days none"
+        raise UsageError(error.what, where=error.where, remedy=remedy) from None
     others = [at for at in range(len(table.header)) if at != place]
     names = [table.header[at] for at in (place, *others)]
-    (cycle, *settled), _ = read_columns(path, names, [("-", "1"), *[LENGTHS] * len(others)])
+    gap = np.array([[row[at].strip().lower() in GAPS for row in table.rows] for at in others])
+    filled = [["0" if at != place and cell.strip().lower() in GAPS else cell
+               for at, cell in enumerate(row)] for row in table.rows]  # fmt: skip
+    units = [("-", "1"), *[LENGTHS] * len(others)]
+    (cycle, *settled), _ = read_columns(replace(table, rows=filled), names, units)
     if len({table.split_title(at, LENGTHS)[1] for at in others}) > 1:
         raise UsageError(
             "only some columns have this unit", where=f"{path}:{table.header_line}",
@@ -49,10 +59,14 @@ def _read_sleepers(path: Path) -> Ensemble:
         raise UsageError(
             "cycles do not ascend", where=str(path), remedy="give each reading once, in order"
         )
-    unknown = np.full(len(settled), np.nan)
+    curves = {name: (cycle[~none], one[~none])
+              for name, one, none in zip(names[1:], settled, gap, strict=True)
+              if not none.all()}  # fmt: skip
+    unknown = np.full(len(curves), np.nan)
+    notes = [f"{gap.sum()} cells without a number are no readings"] if gap.any() else []
     return align_beds(
-        [(cycle, one) for one in settled], str(path), packing=np.arange(len(settled)),
-        pressure=unknown, bedding=unknown, in_order=True,
+        list(curves.values()), str(path), names=list(curves), packing=np.arange(len(curves)),
+        pressure=unknown, bedding=unknown, in_order=True, notes=notes,
     )  # fmt: skip
 
 
@@ -72,7 +86,7 @@ def _read_sweep(folder: Path) -> Ensemble:
         ) from None  # fmt: skip
     _refuse_other_keys(members, folder)
     whose, kinds = np.array(_take(rows, "member")), np.array(_take(rows, "kind"))
-    curves, found, notes = [], [], []
+    curves, found, taken, notes = [], [], [], []
     for name, state, run, seed in zip(names, states, runs, seeds, strict=True):
         mine = np.flatnonzero((whose == name) & (kinds == "computed"))
         if state != "finished" or not mine.size:
@@ -87,11 +101,12 @@ def _read_sweep(folder: Path) -> Ensemble:
         late = late[late > 0]
         if not np.isfinite(greatest):
             notes.append(f"{name}: its load is not known, nor its stiffness")
+        taken.append(name)
         found.append((int(seed), greatest, swing / late.mean() if late.size else np.nan))
     packing, pressure, bedding = np.array(found, float).reshape(-1, 3).T
     return align_beds(
-        curves, str(folder), packing=packing.astype(int), pressure=pressure, bedding=bedding,
-        in_order=False, notes=notes,
+        curves, str(folder), names=taken, packing=packing.astype(int), pressure=pressure,
+        bedding=bedding, in_order=False, notes=notes,
     )  # fmt: skip
 
 

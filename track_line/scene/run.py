@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from contextlib import suppress
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -12,7 +13,8 @@ import numpy as np
 
 from track_line.arrays import Floats
 from track_line.scene.file import LEFT_OUT, SceneFile, build_line
-from track_line.settling import BLOCKS, Line, Record, State, find_crossings, march_line, start_line
+from track_line.settling import Line, Record, State, find_crossings, march_line, start_line
+from trackbed.errors import NotConverged
 from trackbed.memory import read_arrays
 from trackbed.run_files import RESULT, open_unlinked, replace_file
 from trackbed.run_files import folder as run_folder
@@ -32,6 +34,8 @@ class RunPlan:
     """Error of the last D1 by its blocks, over itself, from which a run warns [-]."""
     band: tuple[float, float, float] = (0.05, 0.5, 0.95)
     """Shares of all sections of all lines that lie below low, median and high [-]."""
+    short: float = 60.0
+    """Length of the line that says beforehand which blocks a run will take [m]."""
 
 
 PLAN = RunPlan()
@@ -47,6 +51,18 @@ class RunFolder(run_folder.RunFolder):
     states = STATE
     compared = ("scene", "rolling_speed")
     free = ("scene.title", "scene.line.limit", "scene.line.speed")
+
+
+def predict_blocks(file: SceneFile) -> Floats:
+    """Axles before each block of a run and at its end, about, shape (k + 1,): those of one short
+    line of the same beds; which of stability and smoothness decides them is the law's."""
+    table, found = file.tables.line, []
+    own = table.model_copy(update={"length": PLAN.short, "realisations": 1})
+    tables = file.tables.model_copy(update={"line": own, "zone": []})
+    line = build_line(replace(file, tables=tables))
+    with suppress(NotConverged):  # the run will say so
+        found = [state.cycle for state, _ in march_line(line, start_line(line), table.axles)]
+    return np.array(found or [0.0, table.axles])
 
 
 def collect_records(records: Sequence[Record], name: str) -> Floats:
@@ -79,52 +95,67 @@ def read_state(path: Path, line: Line) -> tuple[State, list[Record]] | None:
 
 def run_scene(
     file: SceneFile, folder: RunFolder, *, resume: bool,
-    progress: Callable[[float, float, int], None],
-) -> list[Record]:  # fmt: skip
-    """Compute block after block, from the last state on if ``resume``, and call ``progress`` with
-    axles so far, axles in all, and blocks.  Raises `NotConverged`."""
-    line, end = build_line(file), file.tables.line.axles
+    progress: Callable[[float, float, str], None],
+) -> tuple[list[Record], float]:  # fmt: skip
+    """Records of block after block, from the last state on if ``resume``, and the error of the last
+    D1; calls ``progress`` with blocks of all lines so far, in all, and words.  Raises
+    `NotConverged`."""
+    line, end, ahead = build_line(file), file.tables.line.axles, predict_blocks(file)
+    blocks, again = len(ahead) - 1, find_share_checked(file)
+
+    def show(cycle: float, before: int, cost: float, words: str) -> None:
+        done = before + cost * float(np.interp(cycle, ahead, np.arange(blocks + 1)))
+        progress(done, blocks * (1 + again), f"{cycle:.3g} of {end:.3g} axles, {words}")
+
     there = read_state(folder.path / STATE, line) if resume else None
     state, records = there or (start_line(line), [])
     written = time.monotonic()
     for now, record in march_line(line, state, end):
         records.append(record)
-        progress(now.cycle, end, len(records) - 1)
+        show(now.cycle, 0, 1.0, f"{len(records) - 1} blocks")
         if now.cycle >= end or time.monotonic() > written + PLAN.apart:
             write_state(folder, now, records)
             written = time.monotonic()
-    return records
+    return records, estimate_error(
+        file, records[-1], lambda cycle: show(cycle, blocks, again, "again by half the blocks")
+    )
 
 
-def estimate_error(file: SceneFile, last: Record) -> float:
+def find_share_checked(file: SceneFile) -> float:
+    """What `estimate_error` costs, over the run itself [-]."""
+    return 2 * min(PLAN.checked / file.tables.line.realisations, 1.0)
+
+
+def estimate_error(file: SceneFile, last: Record, progress: Callable[[float], None]) -> float:
     """Of the last D1, by blocks, over itself [-]: twice the difference to half the blocks, as the
     error is of first order."""
-    line = build_line(file, min(PLAN.checked, file.tables.line.realisations))
-    *_, (_, finer) = march_line(line, start_line(line), file.tables.line.axles, finer=2.0)
-    same = last.deviation[: len(finer.deviation)]
-    coarse, fine = (float(np.sqrt((one**2).mean())) for one in (same, finer.deviation))
+    line, finer = build_line(file, min(PLAN.checked, file.tables.line.realisations)), np.zeros(0)
+    for state, record in march_line(line, start_line(line), file.tables.line.axles, finer=2.0):
+        finer = record.deviation
+        progress(state.cycle)
+    same = last.deviation[: len(finer)]
+    coarse, fine = (float(np.sqrt((one**2).mean())) for one in (same, finer))
     return 2 * abs(coarse - fine) / fine if fine > 0 else 0.0
 
 
 def preview_run(file: SceneFile) -> dict[str, Any]:
     """What a run would be, and about what it costs: its first block is computed."""
     line, table = build_line(file), file.tables.line
-    march = march_line(line, start_line(line), table.axles)
-    next(march)  # compiles
-    begun = time.perf_counter()
+    blocks, begun = len(predict_blocks(file)) - 1, time.perf_counter()  # and compiles
+    next(march := march_line(line, start_line(line), table.axles))
     next(march)
     return {
         "title": file.tables.title, "law": file.tables.law.name, "formula": line.law.formula,
         "source": line.law.source, "validity": line.law.validity,
         "sleepers": len(line.beds.place), "realisations": table.realisations,
         "tonnage_mgt": float(line.find_tonnage(np.array(table.axles))),
-        "limit_m": file.limit, "blocks_at_least": BLOCKS.fewest,
-        "estimated_s": (time.perf_counter() - begun) * BLOCKS.fewest,
+        "limit_m": file.limit, "blocks_about": blocks,
+        "estimated_s": (time.perf_counter() - begun) / 2 * blocks * (1 + find_share_checked(file)),
         "left_out": "; ".join(LEFT_OUT),
     }  # fmt: skip
 
 
-def summarise_run(file: SceneFile, records: Sequence[Record]) -> dict[str, Any]:
+def summarise_run(file: SceneFile, records: Sequence[Record], error: float) -> dict[str, Any]:
     """What a run came to, for people and for ``--json``; lengths in m, tonnage in MGT.
 
     A limit that is not reached has no tonnage: None.
@@ -143,7 +174,7 @@ def summarise_run(file: SceneFile, records: Sequence[Record]) -> dict[str, Any]:
         "share_over_limit": float(np.isfinite(crossings).mean()),
         "hanging_over_0.1_mm": float(last.voids[0].mean()),
         "hanging_over_1_mm": float(last.voids[1].mean()),
-        "deepest_void_m": float(last.deepest.max()), "error_of_blocks": estimate_error(file, last),
+        "deepest_void_m": float(last.deepest.max()), "error_of_blocks": error,
     }  # fmt: skip
     named = list(zip(("low", "median", "high"), d1.tolist(), tamping.tolist(), strict=True))
     summary |= {f"d1_{name}_m": value for name, value, _ in named}

@@ -17,6 +17,7 @@ from track_line.settling.level import BANDS, smooth_level
 from track_line.settling.line import Line
 from track_line.settling.march import Record, State, march_line, start_line
 from trackbed.scenes import find_scene_file
+from validation.studies.track_geometry.grading import GRADINGS, measure_grading
 
 Row = dict[str, Any]
 EARLY, AXLES = 20.0, 5e6
@@ -158,4 +159,5 @@ PARTS: dict[str, Callable[[], Row]] = {
        for law in ("shenton", "varandas", "guerin")},
     **{f"cost, {law}": partial(measure_cost, law) for law in ("shenton", "power")},
     "cost, lines": measure_lines, "rose": measure_rose,
+    **{f"grading, {name}": partial(measure_grading, name) for name in GRADINGS},
 }  # fmt: skip
