@@ -63,9 +63,10 @@ def summarise_fit(ensemble: Ensemble, fit: BedFit) -> dict[str, Any]:
         "variation_of_stiffness": fit.stiffness, "variation_of_gain": fit.total,
         "variation_of_rate": fit.settlement, "gain_with_stiffness": fit.together,
         "window": fit.window,
-        **{f"persistence_{back}": one for back, one in enumerate(fit.persistence, 1)},
-        "memory_m": fit.memory, "length_m": fit.length,
     }  # fmt: skip
+    for back, one in enumerate(fit.persistence):
+        figures[f"persistence_{back + 1}"] = one
+    figures |= {"memory_m": fit.memory, "length_m": fit.length}
     plain: dict[str, Any] = {}
     for name, value in figures.items():
         if isinstance(value, Estimate):
