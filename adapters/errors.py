@@ -1,7 +1,5 @@
 """Errors of settlement runs: those of every story (`trackbed.errors`), and their own."""
 
-from __future__ import annotations
-
 from trackbed.errors import (
     Interrupted,
     NotConverged,

@@ -1,7 +1,5 @@
 """Errors of rigid runs: those of every story (`trackbed.errors`), and their own."""
 
-from __future__ import annotations
-
 from trackbed.errors import (
     LibraryMissing,
     NotConverged,

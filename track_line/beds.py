@@ -1,7 +1,5 @@
 """Beds along a line: lognormal, alike within a length, and zones with a quality of their own."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated

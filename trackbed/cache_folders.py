@@ -1,7 +1,5 @@
 """A folder for what numba and matplotlib keep, on a machine where they find none to write to."""
 
-from __future__ import annotations
-
 import atexit
 import os
 import shutil

@@ -6,8 +6,6 @@ underscores.
 Names are read without importing the files.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from difflib import get_close_matches

@@ -1,7 +1,5 @@
 """The command ``trackbed``: names the verbs and hands each to its package, loaded only then."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

@@ -1,7 +1,5 @@
 """Errors a user can act on: each says what happened, where and what to do, and has an exit code."""
 
-from __future__ import annotations
-
 from errno import EDQUOT, EFBIG, ENOSPC
 from typing import Self
 

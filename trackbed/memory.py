@@ -1,7 +1,5 @@
 """How much memory there is, and what would need more: refused before it is taken."""
 
-from __future__ import annotations
-
 import os
 import resource
 import zipfile

@@ -3,8 +3,6 @@
 meshio is loaded only to read a file.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import os

@@ -1,7 +1,5 @@
 """Values that no ballast, track or body has: mostly numbers in another unit than SI."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import radians, tan
 from typing import Literal

@@ -4,8 +4,6 @@ A settlement run is its story's; of the others, which are gone on with by the co
 started them, the same verbs say here how far they are and what to do.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

@@ -6,8 +6,6 @@ a column's name or in a row below it.  Text is UTF-8, UTF-16 with its mark, or W
 lines that begin with # are comments.  Of an .xlsx file the first sheet is read.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import re

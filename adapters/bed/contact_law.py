@@ -16,8 +16,6 @@ in x = delta^(5/4) the damped Hertz contact is a linear oscillator of damping ra
 docs/contact-law.md compares the engines' laws term by term.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import exp, inf, log, pi, sqrt
 

@@ -1,7 +1,5 @@
 """The container of a sample: its walls as planes and one cylinder, and its horizontal section."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import ceil, pi, sqrt

@@ -6,8 +6,6 @@ last.  ``normal[c]`` is a unit vector that points at the first grain; ``overlap[
 positive in contact.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba import njit
 

@@ -1,7 +1,5 @@
 """Which grains overlap with which, and with which wall; coordination number and penetration."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Radii of the grains: three distributions or a grading, bounds and moments, seeded samples."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import erf, exp, pi, sqrt
 

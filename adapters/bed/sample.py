@@ -6,8 +6,6 @@ normal radii.  Our scene's 1,085, which follow from the volume of the mean radiu
 4.25 N (17.0 N the whole) and stand 64 mm high.  The 13.6 N of Fig. 3a follow from none of these.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import pi
 

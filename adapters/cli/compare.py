@@ -1,7 +1,5 @@
 """The verbs ``compare`` and ``plot``: runs of one kind side by side, in numbers or curves."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator, Sequence
 from dataclasses import replace

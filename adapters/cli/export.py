@@ -1,7 +1,5 @@
 """The verb ``trackbed export``."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

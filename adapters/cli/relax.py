@@ -1,7 +1,5 @@
 """The verb ``relax``: a state at rest."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

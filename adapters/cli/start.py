@@ -1,7 +1,5 @@
 """The verbs ``doctor``, ``new`` and ``cite``."""
 
-from __future__ import annotations
-
 import argparse
 import shlex
 from pathlib import Path

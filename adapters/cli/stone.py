@@ -1,7 +1,5 @@
 """The verb ``stone``: a form for stones from a mesh, by spheres packed into it."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The verb ``trackbed sweep``; what it computes with is loaded when it runs."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A user's deck made one that trackbed can run: a marked copy and a scene; his is not touched."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from pathlib import Path

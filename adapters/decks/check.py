@@ -4,8 +4,6 @@ Engines that go on from a restart file with the same grains in the same order gi
 part by round-off; more than that is a thing that the cut lost.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ Every one was measured, on decks that others wrote: a window that misses it comp
 none.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterator, Sequence
 

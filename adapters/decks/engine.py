@@ -1,7 +1,5 @@
 """Decks in folders of their own: what they read is lent, what they write stays."""
 
-from __future__ import annotations
-
 import glob
 import re
 import shutil

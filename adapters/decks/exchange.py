@@ -1,7 +1,5 @@
 """Grains that a deck's own cycles delete, make and wear: counted; and those that are lost."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from pathlib import Path

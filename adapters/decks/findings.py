@@ -1,7 +1,5 @@
 """What is found in a deck: what it has, and what stands in the way of windows."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass

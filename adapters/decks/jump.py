@@ -1,7 +1,5 @@
 """A jump over load cycles of any grains: places at cycle ends in, places h cycles later out."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree

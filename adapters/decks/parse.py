@@ -3,8 +3,6 @@
 A mark is a comment line: ``# trackbed: cycle`` above the cycle, ``# trackbed: end`` below it.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The run of a deck as runs of scenes are read: for status, report and export."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any

@@ -5,8 +5,6 @@ own has: a container, a piston's record, contacts.  Of a deck's walls nothing is
 bed is not relaxed: its healing cycles bring the overlaps back.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

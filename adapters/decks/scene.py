@@ -1,7 +1,5 @@
 """The scene of an adopted deck: the deck, its engine, its loaded body, and the procedure."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal

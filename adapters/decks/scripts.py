@@ -5,8 +5,6 @@ cycle, loads the saved scene with the values of the variables, and repeats the s
 the marks.  So a script needs no more marks than a deck of another engine.
 """
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Iterator, Sequence

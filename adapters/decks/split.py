@@ -4,8 +4,6 @@ Of what stands above the cycle a window repeats what the restart file does not h
 computes, variables, regions, contact laws, settings, those not undone, each in its place.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 
 from adapters.decks.parse import Command, Deck

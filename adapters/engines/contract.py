@@ -12,8 +12,6 @@ load cycles     ``states.dump``, ``contacts.dump``, ``piston.txt``, ``end.restar
 Its exit code proves nothing: `adapters.procedure.checks` judges what it left.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass

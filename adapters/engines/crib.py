@@ -5,8 +5,6 @@ one constant force on each grain of the surface.  Strength of that ballast, and 
 the block's sides, are left out.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

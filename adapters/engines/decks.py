@@ -6,8 +6,6 @@ walls), ``dump_states.in`` (columns), ``grains.data`` and the load samples; the 
 `liggghts_decks` and `lammps_decks`.  A deck holds only what its scene names.
 """
 
-from __future__ import annotations
-
 import hashlib
 import re
 import shutil

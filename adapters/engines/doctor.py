@@ -1,7 +1,5 @@
 """What this machine has for trackbed: engines, libraries, versions, and how to get the rest."""
 
-from __future__ import annotations
-
 import platform
 from dataclasses import dataclass
 from importlib import metadata

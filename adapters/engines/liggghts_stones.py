@@ -4,8 +4,6 @@ What reads dumps into a running LIGGGHTS is undone at its first step there, so a
 bodies, and the piston's mesh, in the restart file itself: every contact keeps its spring.
 """
 
-from __future__ import annotations
-
 from itertools import count
 from math import isqrt
 from pathlib import Path

@@ -1,7 +1,5 @@
 """How long a bed settles and how a piston is seated: the same on every engine."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import ceil, sqrt
 

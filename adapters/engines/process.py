@@ -3,8 +3,6 @@
 A deck says ``COMPLETE step N`` when it is through: no exit code proves that.
 """
 
-from __future__ import annotations
-
 import ctypes
 import os
 import re

@@ -4,8 +4,6 @@ As a jolting apparatus does (ISO 787-11), and alike on every engine: a tap is a 
 starts from the lifted bed, at rest, in place of the rain.
 """
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """YADE (Debian's 2023.02a) as an engine: static scripts, one JSON file, fresh processes."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

@@ -1,7 +1,5 @@
 """Text dumps of LIGGGHTS and LAMMPS: a frame of named columns, written without loss."""
 
-from __future__ import annotations
-
 import bz2
 import gzip
 import lzma

@@ -1,7 +1,5 @@
 """Compiled reading of the numbers of a text dump: rows of decimal tokens to exact float64 bits."""
 
-from __future__ import annotations
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray

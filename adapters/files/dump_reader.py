@@ -1,7 +1,5 @@
 """Reading of text dumps: header, rows and grains of one frame after the other, each checked."""
 
-from __future__ import annotations
-
 import re
 import zlib
 from collections import deque

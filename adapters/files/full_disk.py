@@ -1,7 +1,5 @@
 """A full disk under a run: the sentence that says what is safe."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager

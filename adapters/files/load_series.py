@@ -1,7 +1,5 @@
 """One period of a measured load: a CSV file with the columns time (s) and stress (Pa)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

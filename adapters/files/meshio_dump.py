@@ -7,8 +7,6 @@ Names that end in one of `EXTENSIONS` are known by it; for others, such as ``dum
 ``meshio.read(path, file_format="lammps-dump")``.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from itertools import groupby

@@ -5,8 +5,6 @@ LAMMPS.  What a fix of LIGGGHTS keeps is a record of doubles behind its name and
 3.8.0: ``fix_multisphere.cpp``, ``multi_node_mesh_I.h``).
 """
 
-from __future__ import annotations
-
 import struct
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A settlement series, one value a cycle, read from a table, a run folder or dumps."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """States in files: ``.npz`` of trackbed, ``.vtkhdf`` of ON-DEM, a text dump of an engine, a run."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Stones from the dumps of an engine that writes their spheres, and the bodies beside them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What one window of load cycles leaves: the state at every cycle end and the piston's record."""
 
-from __future__ import annotations
-
 from collections import deque
 from dataclasses import dataclass, fields
 from itertools import pairwise

@@ -16,8 +16,6 @@ other run's scatter it is for the mean of many.  It is no band for what no check
 see: a bed that keeps settling in its own, wrong way.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import hypot, sqrt

@@ -1,7 +1,5 @@
 """Whether a jump is kept: what it gained beside the rates computed behind it, and what follows."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import hypot, inf, log, sqrt

@@ -17,8 +17,6 @@ the bed itself, and what it is ahead of them by, all earlier jumps and the cycle
 together, is taken off the next jump with what the bed will settle more behind that one.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import exp, inf

@@ -6,8 +6,6 @@ is fitted to the gains of the computed blocks and weighed; so jumped cycles, whi
 not enter.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import log
 

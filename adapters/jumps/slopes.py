@@ -15,8 +15,6 @@ number for a run, 0 with standard deviation `SLOPES.reseating` before any cycle 
 behind jumps show it, since 1 / n falls much faster than 1 / N.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise

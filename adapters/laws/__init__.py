@@ -1,7 +1,5 @@
 """Laws of residual displacement: each is a file here with an object ``LAW``."""
 
-from __future__ import annotations
-
 from adapters.laws.form import Law
 from trackbed.choices import find_choice, find_choices
 

@@ -1,7 +1,5 @@
 """Hyperbolic law: settlement that ends, half of it within tau cycles."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from adapters.bed import FloatArray

@@ -1,7 +1,5 @@
 """Inverse logarithm (the Chicago group): the slowest of the laws that end."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from adapters.bed import FloatArray

@@ -1,7 +1,5 @@
 """The logarithmic estimation of Karrech et al. (2007) as printed, kept for comparison only."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from adapters.bed import FloatArray

@@ -1,7 +1,5 @@
 """Linear law: every cycle to come moves as the mean cycle of the window did."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from adapters.bed import FloatArray

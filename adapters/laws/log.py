@@ -1,7 +1,5 @@
 """Logarithmic law, the default: equal displacement for every equal factor in cycles."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from adapters.bed import FloatArray

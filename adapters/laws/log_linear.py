@@ -1,7 +1,5 @@
 """Logarithmic and linear law: slowing settlement over a constant rate (ratcheting)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from adapters.bed import FloatArray

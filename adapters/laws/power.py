@@ -1,7 +1,5 @@
 """Power law: settlement grows as N^b, slower than in proportion, without an end."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from adapters.bed import FloatArray

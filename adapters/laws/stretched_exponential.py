@@ -1,7 +1,5 @@
 """Stretched exponential (Kohlrausch, Williams and Watts): relaxation over many time scales."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from adapters.bed import FloatArray

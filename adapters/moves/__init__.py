@@ -1,7 +1,5 @@
 """What a jump moves: each way is a file here with an object ``MOVE``."""
 
-from __future__ import annotations
-
 from adapters.moves.contract import Jump, Move
 from trackbed.choices import find_choice, find_choices
 

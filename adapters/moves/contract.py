@@ -1,7 +1,5 @@
 """What a way to move grains in a jump is, and what several of them ask of a window of cycles."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Every grain by its own law, cut at the 95th percentile and smoothed over its neighbours."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial import cKDTree
 

@@ -1,7 +1,5 @@
 """Nothing moves: the null hypothesis beside which every other way is shown."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from adapters.bed import FloatArray

@@ -1,7 +1,5 @@
 """Validators: whether what an engine left is credible.  An exit code proves nothing."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass, fields
 from math import nan, pi, sqrt
 

@@ -5,8 +5,6 @@ computed (`adapters.jumps.slopes`).  A jump that fails is tried again: shorter, 
 cycles with a share of the move, whose rest the next jump is asked for.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -5,8 +5,6 @@ forecast from its own cycles, with its own debts: lowered by the mean grain's st
 behind.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from math import inf, log

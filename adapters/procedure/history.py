@@ -1,7 +1,5 @@
 """A run as a table of its cycles with their cost, from its stages; and what failed jumps lost."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from datetime import datetime

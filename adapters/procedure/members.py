@@ -4,8 +4,6 @@ A bed of grains is chaotic, so that one run is one draw of many.  Members go on 
 k_i cycles, the m-th with its first grain moved by m times 1e-10 m: what they differ by is chaos.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import isfinite, nan, sqrt

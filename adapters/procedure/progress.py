@@ -3,8 +3,6 @@
 Progress is one line rewritten on a terminal, plain lines elsewhere; always on stderr.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Where moved grains find room, and the piston on top of them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from adapters.bed import FloatArray, State, find_top_under

@@ -1,7 +1,5 @@
 """The settlement procedure of Karrech et al. (2007), Fig. 10, and the runs made of it."""
 
-from __future__ import annotations
-
 import json
 import os
 import shlex

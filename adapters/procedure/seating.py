@@ -10,8 +10,6 @@ count from the last one in which the piston hung, and so do the cycles N by whic
 forecast: from there on the bed takes the load for the first time.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -3,8 +3,6 @@
 Each is done once: a finished stage is read back, an unfinished one is done again from its start.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """How far a run is, from its folder."""
 
-from __future__ import annotations
-
 import shlex
 from dataclasses import dataclass
 from pathlib import Path

@@ -4,8 +4,6 @@ Moving the first grain of row c by dx changes its overlap by -normal.dx, moving 
 +normal.dx: these are the rows of the matrix J below.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba import njit
 

@@ -14,8 +14,6 @@ the overlaps that the fixed grains were estimated with (Fig. 9 ends at 6e-5 m fo
 and with free grains the bed flows, as nothing replaces friction: docs/jumps.md.
 """
 
-from __future__ import annotations
-
 import time
 
 import numpy as np

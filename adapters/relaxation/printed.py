@@ -8,8 +8,6 @@ pair counts once, so that - grad psi is the force of eq. 5 (the printed double s
 twice).  Friction is absent: with gravity a bed that friction holds flows, without it contacts open.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.optimize import minimize
 

@@ -16,8 +16,6 @@ place, and the overlap, of a member that is torn (mu < 0), the most pressed for 
 So the number of contacts and the distribution of overlaps are those of before.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -5,8 +5,6 @@ radius R the unknowns are u and R omega; n . (u_i + omega_i x r_i - u_j - omega_
 is a row a contact.  Their least squares are found by LSMR, again and again as normals turn.
 """
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The section of a report on jump control: every decision, why this length, what came of it."""
 
-from __future__ import annotations
-
 from html import escape
 
 from adapters.jumps import BAND_PROBABILITY

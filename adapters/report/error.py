@@ -6,8 +6,6 @@ counted from the start of loading unless "with preparation" is said.  The paper 
 S - 1, so that its "180 %" is S = 2.8, and defines them nowhere.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import nan
 

@@ -1,7 +1,5 @@
 """The section of a report on jumps: what each did, and where the bed or its piston held it up."""
 
-from __future__ import annotations
-
 from math import isnan
 
 from adapters.procedure import SEATING, Record, find_hung_cycles, format_spans

@@ -1,7 +1,5 @@
 """The numbers of a report: what ``report.json`` holds and ``report.html`` shows."""
 
-from __future__ import annotations
-
 import json
 import shlex
 from contextlib import suppress

@@ -4,8 +4,6 @@ The page is one file that loads nothing.  It begins with one claim and where it 
 error beside the cost it saved (`adapters.report.error` defines both), then jumps and failures.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from html import escape
 from math import nan

@@ -1,7 +1,5 @@
 """What a run cost, by purpose, and the sentences on where its claim fails."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from math import nan
 from typing import Any

@@ -1,7 +1,5 @@
 """What scenes for ballast name: a grading of the grains, a saved bed, stages of the load."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Whether a bed is borne, and bears its walls and its piston."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from math import inf, pi, sqrt
 

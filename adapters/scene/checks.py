@@ -4,8 +4,6 @@ A check reads the scene as dotted keys.  It is skipped when a key it asks for is
 itself, so that one wrong key never hides what is wrong elsewhere.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from functools import partial

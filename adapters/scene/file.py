@@ -1,7 +1,5 @@
 """Settlement scene files: TOML to `Scene`, with every problem at once."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path

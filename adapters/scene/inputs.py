@@ -1,7 +1,5 @@
 """Files that a scene names, as a run folder keeps them."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Iterator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Materials of grains and walls."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from pydantic import Field

@@ -1,7 +1,5 @@
 """Whether the numbers of a scene make mechanical sense; each check is a few lines of mechanics."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial

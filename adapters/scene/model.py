@@ -1,7 +1,5 @@
 """What a scene's model leaves out, in sentences, derived from the scene."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from adapters.bed import DAMPING_FACTOR, find_literal_restitution, solve_collision

@@ -1,7 +1,5 @@
 """Porosity of a bed, without what its walls and its surface add."""
 
-from __future__ import annotations
-
 from math import nan, pi, sqrt
 
 import numpy as np

@@ -16,8 +16,6 @@ of the settlement, when least of the bed is known; jumps whose ends are evenly s
 each asked for about as much.  docs/jumps.md.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass

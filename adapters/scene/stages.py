@@ -1,7 +1,5 @@
 """The bed before it rains, the scene while it does, and of each stage of its load."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 from adapters.bed import FloatArray, draw_radii, draw_sample_start

@@ -1,7 +1,5 @@
 """The keys of a scene by name, as its checks read them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """All bodies of a simulation in the kernel's arrays, and the state that moves in them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """Boundary conditions and loads: what the user asked for, and the lists the kernel walks."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """A body: its mesh, its material, and its state as the user sees it."""
 
-from __future__ import annotations
-
 from functools import cached_property
 from typing import Any, Literal
 

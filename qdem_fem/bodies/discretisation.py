@@ -11,8 +11,6 @@ random tetrahedra.  Not for an error below 1e-3, nor for what a support or a loa
 does, which has no limit.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 

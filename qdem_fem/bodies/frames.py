@@ -10,8 +10,6 @@ Bodies with held nodes, rollers or periodic faces stay in the frame of the labor
 law of small strain, which a rotation strains, is not turned.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

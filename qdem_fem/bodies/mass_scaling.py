@@ -1,7 +1,5 @@
 """Mass scaling: heavier small elements for a longer step."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A body of quadratic tetrahedra: ten nodes an element, on the user's linear mesh."""
 
-from __future__ import annotations
-
 from functools import cached_property
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Mass, centre and inertia of a rigid body from its tetrahedra, and which motions are rigid."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

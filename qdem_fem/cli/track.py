@@ -1,7 +1,5 @@
 """The verbs ``trackbed grains`` and ``trackbed train``: parts of a track, written as files."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 from typing import Any

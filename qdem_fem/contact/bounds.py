@@ -25,8 +25,6 @@ list is renewed.  With rigid bodies, whose vertices have no mass of their own, i
 elements with `bound_spring_network` of the springs near: lower, by no iterations.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import inf, sqrt
 

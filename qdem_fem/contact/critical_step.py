@@ -1,7 +1,5 @@
 """The largest stable time step, from the highest frequency of the mesh as it is held."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial

@@ -1,7 +1,5 @@
 """The contacts of a simulation, whatever their model: their place in a march."""
 
-from __future__ import annotations
-
 import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """The contacts of surfaces: their arrays, bounds, energies."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -5,8 +5,6 @@ what a scene without both runs is not touched.  Contact forces of a displacement
 displacement is, and wait for the next step; so the springs and the fields are of one time.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numba

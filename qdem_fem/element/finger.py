@@ -4,8 +4,6 @@ Objective.  It derives from a potential only for lambda = mu (nu = 0.25); else a
 strains of size a returns with work of the order of a times the stored energy.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

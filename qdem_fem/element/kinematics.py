@@ -5,8 +5,6 @@ arrays.  All is written in the displacement gradient H = F - I, so that stresses
 precision down to the smallest displacements.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

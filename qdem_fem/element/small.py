@@ -3,8 +3,6 @@
 Not objective: do not use it on bodies that turn.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 from numpy.typing import ArrayLike

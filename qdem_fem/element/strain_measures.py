@@ -7,8 +7,6 @@ arrays, lanes and GPU; ``find_viscous_numbers`` what viscosity adds to it, and w
 on arrays.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal
 

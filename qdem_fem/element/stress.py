@@ -10,8 +10,6 @@ All are in displacement form: a strain of 1e-9 keeps its full relative precision
 subtracted from the identity.  Tests compare with readable twins and the paper's own construction.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 Nine = tuple[Any, Any, Any, Any, Any, Any, Any, Any, Any]

@@ -3,8 +3,6 @@
 Objective, derives from a potential; softens under compression.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 from numpy.typing import ArrayLike

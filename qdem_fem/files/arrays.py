@@ -1,7 +1,5 @@
 """Names for arrays of numbers, in signatures."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

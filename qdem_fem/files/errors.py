@@ -1,7 +1,5 @@
 """Errors of QDEM runs: those of every story (`trackbed.errors`), and their own."""
 
-from __future__ import annotations
-
 import warnings
 
 from trackbed.errors import (

@@ -4,8 +4,6 @@ Nothing is ever half-written: whole files go to a temporary name first, and a ta
 writer cut short is cut back to its last sound row (`Table.cut`).
 """
 
-from __future__ import annotations
-
 import hashlib
 import itertools
 from collections.abc import Sequence, Set

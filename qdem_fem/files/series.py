@@ -1,7 +1,5 @@
 """Values that change with time: constants, tables with linear interpolation, functions."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import isfinite
 from numbers import Real

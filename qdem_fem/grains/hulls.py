@@ -6,8 +6,6 @@ middle, which is lifted from the flat faces (lift 0: a polyhedron of flat faces)
 A stretch is affine and moves no node across a plane of others: what is convex stays convex.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

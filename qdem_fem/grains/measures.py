@@ -4,8 +4,6 @@
 Volume and centroid are exact for the polyhedron, to rounding.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -6,8 +6,6 @@ inside, and one in the middle of each spoke from the apex to a corner: 5 M - 5 n
 tetrahedra fill the polyhedron of the surface and nothing else.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from qdem_fem.files import Floats, Integers, MeshError

@@ -3,8 +3,6 @@
 trackbed grains --count 5700 --seed 1 --out grains.npz
 """
 
-from __future__ import annotations
-
 import os
 import zipfile
 from collections.abc import Callable

@@ -4,8 +4,6 @@ Here is how functions outside of the elements are compiled, what their files are
 vectors that they compute with: tuples of three numbers.
 """
 
-from __future__ import annotations
-
 import hashlib
 from pathlib import Path
 from types import ModuleType

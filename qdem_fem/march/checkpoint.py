@@ -5,8 +5,6 @@ bytes before it, so that damage anywhere is seen before anything is believed.  F
 user's order of nodes and in the kernel's precision.
 """
 
-from __future__ import annotations
-
 import hashlib
 import io
 import json

@@ -1,7 +1,5 @@
 """Bodies and the conditions that a user gives them."""
 
-from __future__ import annotations
-
 from typing import Any, TypeVar
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Energies of a simulation now, and what its meshes make of its motion."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -5,8 +5,6 @@ user sets and sees is ``v(k)``; `stagger_velocities` and `level_velocities` go f
 other.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from qdem_fem.bodies import Given

@@ -1,7 +1,5 @@
 """What the options of a simulation may be."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Whether every part of every body is held against all six rigid motions."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

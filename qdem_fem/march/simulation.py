@@ -1,7 +1,5 @@
 """A simulation: bodies, conditions and the march in time (eq. 11 and Newton's second law)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil, nan

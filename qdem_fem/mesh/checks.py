@@ -5,8 +5,6 @@ All problems of a mesh are collected before one error names them, so that a user
 once.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Boxes cut into tetrahedra."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

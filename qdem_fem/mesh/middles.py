@@ -1,7 +1,5 @@
 """Nodes amid the edges of a mesh of tetrahedra, for quadratic elements."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from qdem_fem.files import Integers

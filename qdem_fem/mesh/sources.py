@@ -4,8 +4,6 @@ Neither scikit-fem nor meshio is imported: their meshes are known by what they h
 is loaded only to read a file.
 """
 
-from __future__ import annotations
-
 import os
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,7 +1,5 @@
 """The surface of a mesh: its outward triangles, their areas, and what pressure does to them."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from qdem_fem.files import Floats, Integers, MeshError

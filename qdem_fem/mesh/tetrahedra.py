@@ -1,7 +1,5 @@
 """Tetrahedral meshes: read and checked once, then gradients and volumes."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import dataclass, field
 from typing import Any

@@ -7,8 +7,6 @@ Fourier spectrum    X(f) = dt sum x_k exp(-2 pi i f t_k)         [unit s]; the p
 amplitude spectrum  2 |sum w_k x_k exp(...)| / sum w_k           [unit]; the amplitude of a cosine
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import pi
 

@@ -8,8 +8,6 @@ as short.  Neither has a zero below half the rate of samples, where round-off wo
 it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

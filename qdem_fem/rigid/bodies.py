@@ -1,7 +1,5 @@
 """The rigid bodies of a simulation: what a user sets and sees, and their place in a march."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """What a simulation's conditions are to its rigid bodies: loads, and freedoms that are held."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -11,8 +11,6 @@ times ``L_i/I_i`` (Dullweber, Leimkuhler and McLachlan, J. Chem. Phys. 107 (1997
 explicit, of second order, reversible and symplectic, and leaves L as it is, to the bit.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

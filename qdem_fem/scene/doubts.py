@@ -1,7 +1,5 @@
 """What a scene can be computed with, but hardly means: a warning each, with place and number."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The account of energies of a run: what is stored, taken and put in, and what is missing."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

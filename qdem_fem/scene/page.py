@@ -1,7 +1,5 @@
 """The report of a run: one page, ``report.html``, that loads nothing, and its pictures as PNG."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Iterator, Sequence
 from html import escape

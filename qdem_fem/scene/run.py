@@ -1,7 +1,5 @@
 """The run of a scene: advance, record, save; goes on after a kill to the same bits."""
 
-from __future__ import annotations
-
 import io
 import json
 import time

@@ -1,7 +1,5 @@
 """What a run came to, in figures: the content of ``result.json`` and of the report."""
 
-from __future__ import annotations
-
 from math import isfinite
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The table ``[contact]`` of a scene: how bodies touch."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal
 

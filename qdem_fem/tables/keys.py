@@ -3,8 +3,6 @@
 `qdem_fem.scene.load_scene` reads a scene; ``cantilever.toml`` explains every key.
 """
 
-from __future__ import annotations
-
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, Tag

@@ -1,7 +1,5 @@
 """A scene read and checked, and the checks that scenes of bodies and of a track share."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path

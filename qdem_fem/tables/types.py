@@ -1,7 +1,5 @@
 """Types of the values in a scene file: their bounds, and which of several types a value is."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from pydantic import BaseModel, Discriminator, Field, Tag

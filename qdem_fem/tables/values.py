@@ -3,8 +3,6 @@
 Ramps, tables and CSV columns become instants and values.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

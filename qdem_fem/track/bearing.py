@@ -5,8 +5,6 @@ its sleeper is loaded and let go.  Slow pulses of the greatest force on a rail s
 friction of the run, find this (`press_sleeper`) and run the bed in, as trains do (`run_in`).
 """
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any

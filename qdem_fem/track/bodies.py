@@ -5,8 +5,6 @@ two planes across the sleeper, which are planes of symmetry of the model: smooth
 no displacement along x for the sleeper's ends.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

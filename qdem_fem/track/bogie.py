@@ -1,8 +1,6 @@
 """The load of one bogie on the rail seat of a slice, from `qdem_fem.track.loads.train`, or a
 record."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

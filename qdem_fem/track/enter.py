@@ -4,8 +4,6 @@
 prepares the bed, or takes it from its file, and gives the simulation that begins there.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Iterator

@@ -5,8 +5,6 @@ and the shoulder of ballast at low x, the plane of symmetry at the middle of the
 There, as at the ends of a slice, meshes stop a radius before the plane, which their spheres touch.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf

@@ -3,8 +3,6 @@
 `qdem_fem.track.bed` prepares the bed; its file is that of one recipe.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace

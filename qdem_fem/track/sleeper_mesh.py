@@ -1,7 +1,5 @@
 """A mono-block sleeper of trapezoidal section as a mesh."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -3,8 +3,6 @@
 ``trackbed/scenes/track-small.toml`` explains every key.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated

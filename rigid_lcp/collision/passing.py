@@ -20,8 +20,6 @@ has left goes in its end: there ``lossy_rounds`` and ``lossy_work`` bound the wo
 approaches is closed without restitution.  `Impulses.cut_off` tells where either bound was met.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 

@@ -11,8 +11,6 @@ the step.  Without restitution that is at most ``sum M (h f / M)^2 / 8`` of the 
 each other: what loads f give within a step to bodies that come to rest in it.  So much is allowed.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from rigid_lcp.arrays import Bools, Floats

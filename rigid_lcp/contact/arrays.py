@@ -1,7 +1,5 @@
 """Contacts between bodies: where, along which normal, how far apart, and what they carry."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 from typing import Self
 

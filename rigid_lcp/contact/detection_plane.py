@@ -5,8 +5,6 @@ centre) of another.  Two faces that lie upon each other make two of them, at the
 they share (Fig. 2, right); a vertex on a half-space is one each.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

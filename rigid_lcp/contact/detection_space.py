@@ -4,8 +4,6 @@ Polyhedra: corners on faces and crossing edges, else on edges and corners, of ea
 ones (`rigid_lcp.contact.solids`); spheres: the nearest point of the other body, in closed form.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba import njit
 

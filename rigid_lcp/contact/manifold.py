@@ -5,8 +5,6 @@ the other, or crossings of their edges; each is a contact with the normal and th
 two features (eq. 9), also while the faces are slightly tilted.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba import njit
 

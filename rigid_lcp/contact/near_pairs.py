@@ -3,8 +3,6 @@
 Boxes are rows of their lower, then their upper corner: (x0, y0, x1, y1), (x0, y0, z0, x1, y1, z1).
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba import njit
 

@@ -15,8 +15,6 @@ near, rule 2 is a guess to the first order in the step: bodies that would pass w
 step may touch, and those that touch may slide past.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba import njit
 

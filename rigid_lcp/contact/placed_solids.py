@@ -1,7 +1,5 @@
 """Shapes of all bodies in space as flat arrays, in their body frames and placed in the world."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ features are corners (Gregorius, The separating axis test, GDC 2013).  The axes 
 eq. 9 wants them, so normals and gaps are exact to round-off, which those of GJK and EPA are not.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 

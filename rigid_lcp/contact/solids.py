@@ -11,8 +11,6 @@ the normal is that of the face that keeps the bodies farthest apart, which it al
 overlap: the gap is continuous there; a normal, as that of the distance to a point, can not be.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba import njit
 

@@ -1,7 +1,5 @@
 """Contact forces at acceleration level, of contacts that slide already and of others (eq. 27)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

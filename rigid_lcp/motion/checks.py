@@ -1,7 +1,5 @@
 """What a scene and its run may be given: numbers, spans of time, loads, numbers of bodies."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import inf, nan

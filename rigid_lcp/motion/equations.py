@@ -5,8 +5,6 @@ With the rows of J along n, t (n, t1, t2) of every contact, ``u = J v`` are the 
 offset (eqs 17, 24).  Bodies that can not move have no columns.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.sparse as sp
 from numba import njit

@@ -5,8 +5,6 @@ floating-point number holds.  A step that ends so is not made; the sentence name
 goes fastest, or is pushed most, and by what.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -4,8 +4,6 @@
 spin w in the world frame.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike

@@ -3,8 +3,6 @@
 Lengths are measured by the size of the smallest movable body, velocities by ``sqrt(g size)``.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

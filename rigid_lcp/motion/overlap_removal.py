@@ -20,8 +20,6 @@ less of it acts among the bodies that push each other as makes the energy that o
 keeps momentum, and lets no pair approach that would not without restitution.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 

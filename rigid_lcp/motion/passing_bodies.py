@@ -5,8 +5,6 @@ Once one is in the other by more than half the thickness of the thinner one, tha
 far side.  So a pair that may meet within a step moves by no more than a share of that thickness.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import ceil
 

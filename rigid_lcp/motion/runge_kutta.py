@@ -21,8 +21,6 @@ Use it for few bodies and where order counts; where forces do not exist (Painlev
 `NoSolution`, and velocity-level time stepping goes on.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

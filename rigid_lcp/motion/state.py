@@ -4,8 +4,6 @@ Generalised velocities are one vector, body after body: (x, y, phi) in 2D, (x, y
 in the world frame) in 3D.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The friction problem of a time step by its parts: to look at, to share, to solve elsewhere."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -12,8 +12,6 @@ A body of mass m_a at speed v leaves one at rest, of mass m_b, at most with
 factors is at most 1 (each is at most ``m_a / sqrt(m_a m_b)``), so speeds passed on come to an end.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from rigid_lcp.arrays import Bools, Floats, Ints

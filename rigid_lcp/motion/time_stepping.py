@@ -22,8 +22,6 @@ Use it where forces do not exist (Painleve) or where events are too many to be m
 is of first order in h where contacts open and close, of second order in between.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial

@@ -1,7 +1,5 @@
 """The report of a run: one page, ``report.html``, that loads nothing, its pictures and a movie."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

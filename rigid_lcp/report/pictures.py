@@ -1,7 +1,5 @@
 """Pictures of a run: bodies with force chains, histories, a movie of the frames."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path

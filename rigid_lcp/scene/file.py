@@ -1,7 +1,5 @@
 """Rigid scene files: TOML to a `Scene`, with every problem at once, each with its line and key."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace

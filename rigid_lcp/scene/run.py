@@ -6,8 +6,6 @@ run has changed, worn or broken, are arrays of its frames; a run whose bodies ar
 file has none.
 """
 
-from __future__ import annotations
-
 import io
 import time
 from collections.abc import Callable

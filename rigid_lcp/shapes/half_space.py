@@ -1,7 +1,5 @@
 """Half-spaces: floors and walls, in the plane and in space."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import inf
 

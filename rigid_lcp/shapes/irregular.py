@@ -1,7 +1,5 @@
 """Irregular stones: random convex polygons and polyhedra inscribed in ellipses and ellipsoids."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.random import Generator
 

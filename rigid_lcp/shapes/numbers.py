@@ -1,7 +1,5 @@
 """Numbers that shapes and places are made of: finite, and lengths that can be computed with."""
 
-from __future__ import annotations
-
 from sys import float_info
 
 import numpy as np

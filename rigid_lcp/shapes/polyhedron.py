@@ -4,8 +4,6 @@ A shape lives in its body frame, whose origin is the centre of mass; where a bod
 is turned is the state's business.
 """
 
-from __future__ import annotations
-
 from copy import copy
 from functools import cached_property
 from typing import Self

@@ -6,8 +6,6 @@ and `rotate_back` take angles (..., 1) [rad] too, and turn vectors (..., 2) of t
 Formulas: Shuster, J. Astronaut. Sci. 41 (1993) 439.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

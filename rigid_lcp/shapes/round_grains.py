@@ -1,7 +1,5 @@
 """Round grains: discs in the plane and spheres in space."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import pi
 

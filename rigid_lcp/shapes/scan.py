@@ -4,8 +4,6 @@ Contact is between convex bodies, so a scan's hollows are filled, and a step cos
 corners a stone has.  What both change is measured: volume, centre of mass, moments of inertia.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

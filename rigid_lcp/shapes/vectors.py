@@ -5,8 +5,6 @@ A vector of the plane is one of space with z = 0, so that one kernel serves both
 order of their sums are those of `rigid_lcp.shapes.rotations`.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba import njit
 

@@ -5,8 +5,6 @@ J is kept as one (dim, size) block for each body that a contact moves: those of 
 (`split_csr`) are compiled: scipy's spend more on small ones in calls.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -11,8 +11,6 @@ All matrices lie by rows in flat arrays: ``..._at`` says where one begins, ``...
 its rows are apart.  A is given transposed, (depth, 4): the factors keep both sides by the pivot.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from llvmlite import ir

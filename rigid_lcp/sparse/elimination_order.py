@@ -8,8 +8,6 @@ postorder each subtree is a run of columns.  `rigid_lcp.sparse.elimination_tree`
 it.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

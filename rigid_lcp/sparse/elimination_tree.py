@@ -8,8 +8,6 @@ merged where one larger front costs less than two, empty places included (`find_
 those of more than `FRONT_COLUMNS` split.  All of it depends on the pattern alone and is found once.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -16,8 +16,6 @@ L or U, loses digits as stiff and soft directions meet in one body (1e-9 shift: 
 the sides are found by substitution.  Nearly all the work is in products of dense matrices.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray

@@ -34,8 +34,6 @@ A time step has any of the impulses that fit.  What hangs on single forces (forc
 that break) wants those that elastic contacts would choose at that moment (`find_unique_forces`).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -11,8 +11,6 @@ problem with a softer W (`ElasticNetwork.find_friction_step`), for which there a
 on where Newton's method stops; its end is left to Newton's method, for the last digits.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

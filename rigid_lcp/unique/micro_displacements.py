@@ -29,8 +29,6 @@ What the paper leaves open, and what is done here:
 - The last line of eq. 27 lacks ``a_T f_T <= 0``: friction opposes sliding.  The residual has it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

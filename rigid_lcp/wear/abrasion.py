@@ -10,8 +10,6 @@ What stays goes on as part of the rigid motion of the whole; what is worn off ta
 and energy away.  Faces, discs, spheres, half-spaces and fixed bodies keep their shape.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from sys import float_info

@@ -25,8 +25,6 @@ In 3D: ``F / d^2`` of the greatest pair of opposite forces (Jaeger, Int. J. Rock
 (1967) 219; the usual measure of the strength of ballast stones).
 """
 
-from __future__ import annotations
-
 from contextlib import suppress
 from dataclasses import dataclass
 from sys import float_info

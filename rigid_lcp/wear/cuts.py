@@ -6,8 +6,6 @@ shrink.  The volume beyond a plane is the integral of the cross-section, a quadr
 corners: the depth of a cut is the root of a cubic.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from sys import float_info

@@ -5,8 +5,6 @@ momentum, angular momentum and kinetic energy are those of the whole to round-of
 touch along the cut at zero gap and zero gap rate: "the system remains always stable".
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -10,8 +10,6 @@ springs of two branches; the set of those that bear is found by solving and choo
 last few turns one at a time, the least index first, which ends for every such problem (Murty 1974).
 """
 
-from __future__ import annotations
-
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from math import ceil

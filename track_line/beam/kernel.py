@@ -1,7 +1,5 @@
 """The compiled solution of one line: block elimination, and which sleepers bear."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The rail as an Euler-Bernoulli beam of Hermite elements, one a bay: exact between the seats."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated
 

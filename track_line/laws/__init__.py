@@ -1,7 +1,5 @@
 """Settlement of a bed by load and history: each law is a file here with a class ``LAW``."""
 
-from __future__ import annotations
-
 from track_line.laws.contract import SEAT_AREA, BedLoad, Law
 from trackbed.choices import find_choice, find_choices
 

@@ -4,8 +4,6 @@ A law is a frozen dataclass whose fields are its parameters in SI units, with de
 of a bed of mean quality; that others settle more is the scatter's (`track_line.beds`).
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar

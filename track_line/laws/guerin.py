@@ -1,7 +1,5 @@
 """Guerin's law: a constant rate by a power of the elastic deflection of the bed."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Li and Selig's law of fine-grained ground below the ballast."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

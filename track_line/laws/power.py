@@ -1,7 +1,5 @@
 """Power law with strain hardening: what an ensemble of grain beds, or a test, is fitted by."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Sato's law: seating that ends, and a rate for ever that grows with the square of the pressure."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

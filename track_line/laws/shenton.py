@@ -1,7 +1,5 @@
 """Shenton's law of ballast behind tamping: a power of the axles and a term in proportion."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

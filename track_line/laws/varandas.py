@@ -1,7 +1,5 @@
 """Varandas' law of ballast in transition zones, as the open program ROSE computes it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

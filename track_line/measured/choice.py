@@ -4,8 +4,6 @@ A law that was fitted to the others, with a start and a factor of its own, leave
 variance of each bed's readings: its misfit, 1 - r^2.  Intervals leave out each bed (jackknife).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from itertools import combinations

@@ -1,7 +1,5 @@
 """Settlements of many beds at the same cycles."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -5,8 +5,6 @@ of gain and stiffness, less the mean of the beds under the same load.  Intervals
 logarithms; a packing that was loaded several times counts once in them.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import compress, pairwise
 from math import isfinite

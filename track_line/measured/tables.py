@@ -1,7 +1,5 @@
 """Tables of beds: those of ``trackbed sweep``, or one with a column for each sleeper."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """A fit of beds as keys of a scene, as figures, and what it can not know."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from math import isfinite, isnan
 from typing import Any

@@ -1,7 +1,5 @@
 """A scene of a line run to its last axle, and what came out of it."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress

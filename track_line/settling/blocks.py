@@ -6,8 +6,6 @@ its settlement there.  For k_s ds/dF > 2 the error grows from block to block, fr
 sleeper with another sign; for ds ~ F^m that is ds > 2 F/(m k_s).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

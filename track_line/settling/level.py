@@ -5,8 +5,6 @@ its phase: filtering there and back, as is common, has the square of it, and fin
 The numbers of the standard are from memory; check them in yours.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

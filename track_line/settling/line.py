@@ -1,7 +1,5 @@
 """A line with its axles: everything that does not change while it settles."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """From block to block: axles roll by, beds settle, the level is taken."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 

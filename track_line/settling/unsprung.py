@@ -10,8 +10,6 @@ wheel; k = (64 E I u^3)^(1/4) is that of a beam on a continuous bed u.  The leve
 block of axles, so that unevenness feeds its own growth.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from track_line.arrays import Floats

@@ -1,7 +1,5 @@
 """Pieces of a report's page: well-formed HTML, self-contained, readable on paper."""
 
-from __future__ import annotations
-
 import base64
 import json
 from collections.abc import Iterable, Sequence

@@ -1,8 +1,6 @@
 """What verbs share that run a scene to its end in a folder: their arguments, the cost that a dry
 run states, and lines on the way."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 import time

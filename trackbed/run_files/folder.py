@@ -4,8 +4,6 @@ A run folder may come from anyone, so nothing in it is followed out of it: a sym
 refused, and so is what has no end.  Files that are no run's are left alone.
 """
 
-from __future__ import annotations
-
 import fcntl
 import json
 import os

@@ -1,7 +1,5 @@
 """Where a result comes from: commit, versions, machine, command and time."""
 
-from __future__ import annotations
-
 import os
 import platform
 import shlex

@@ -1,7 +1,5 @@
 """Ctrl-C and SIGTERM end a run with a sentence that says what is kept."""
 
-from __future__ import annotations
-
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence

@@ -1,7 +1,5 @@
 """Files that are written whole or not at all, and through no symbolic link."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -1,7 +1,5 @@
 """Where the keys of a scene file stand: line numbers by dotted key."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Iterator
 from typing import Any

@@ -4,8 +4,6 @@ A story gives its model (pydantic, with tables of `trackbed.scene_files.Table`) 
 to its example; `read_scene` reads the text and `SceneText.check` the tables.
 """
 
-from __future__ import annotations
-
 import re
 import shlex
 import tomllib

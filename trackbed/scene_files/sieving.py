@@ -1,7 +1,5 @@
 """Sizes of stones: the smallest square hole that each passes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 

@@ -1,7 +1,5 @@
 """Types of the values in a scene file, with their bounds, for the models of every story."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal, get_args
 

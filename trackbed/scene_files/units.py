@@ -4,8 +4,6 @@ The unit of a key is the one that its model says in brackets; the reference of a
 there too.  Values are exact: ``"3.3 mm"`` is the float that 0.0033 is.
 """
 
-from __future__ import annotations
-
 import ast
 import inspect
 import math

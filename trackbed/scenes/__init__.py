@@ -1,7 +1,5 @@
 """Scenes to copy and edit: ``list_scenes`` lists them, ``read_template`` is the text of one."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from importlib.resources import files

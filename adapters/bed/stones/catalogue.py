@@ -5,8 +5,6 @@ EN 933-3 and -4 sort by); concave ones interlock.  Their proportions are chosen 
 on a quarry's stone: for that, pack spheres into a scan.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from itertools import product
 

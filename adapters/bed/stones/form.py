@@ -1,7 +1,5 @@
 """The form of a stone, and stones of one form as a bed has them: spheres, contacts, energies."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

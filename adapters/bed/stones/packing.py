@@ -5,8 +5,6 @@ as any.  What such spheres leave out at edges and corners is then laid on all ra
 their union has the volume of the mesh.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -7,8 +7,6 @@ By the divergence theorem a function f of degree d has, over a solid with the su
 so that 1, x_i and x_i x_j need points on the surface alone.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A form as a file: what ``trackbed stone`` writes of a mesh, and anyone may write by hand."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 from typing import Annotated

@@ -4,8 +4,6 @@ Sources: github.com/ON-DEM/ON-DEM-WG3-FileFormat; docs.vtk.org, "VTKHDF format s
 ``/VTKHDF`` is what ParaView reads, a point a body; ``/ONDEM`` has scene, materials and contacts.
 """
 
-from __future__ import annotations
-
 import struct
 from mmap import ACCESS_READ, mmap
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A state of spheres as an ON-DEM VTKHDF file."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

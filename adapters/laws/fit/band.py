@@ -1,7 +1,5 @@
 """How far the prediction of one law can be off: the law may not go on, and the fit is uncertain."""
 
-from __future__ import annotations
-
 from math import isfinite, log, sqrt
 
 import numpy as np

@@ -3,8 +3,6 @@
 All functions take n series at once: displacements (k, n) at ascending cycles > 0, (k,).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

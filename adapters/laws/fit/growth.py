@@ -1,7 +1,5 @@
 """What no slow law goes through: a rate that grows again, and a settlement that falls."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

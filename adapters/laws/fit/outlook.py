@@ -1,7 +1,5 @@
 """Prediction of a series without a law named: regime, median of the slow laws, band, agreement."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import isfinite, log
 

@@ -1,7 +1,5 @@
 """What is known before the readings: how settlement ends, and at which cycles ballast moves."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """When a prediction of the slow laws together is refused, and the words for it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

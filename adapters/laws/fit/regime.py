@@ -4,8 +4,6 @@ From the rate of the rate.  With v = du/dN, q = d ln v / d ln N is -1 for the lo
 a constant rate; beta = q + 1 is the exponent of the tail u = c + a (N^beta - 1) / beta.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from math import sqrt
 from typing import Any

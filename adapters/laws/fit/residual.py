@@ -1,7 +1,5 @@
 """How well an estimate meets computed positions: E_r of eq. 22 of Karrech et al. (2007)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from adapters.bed import FloatArray

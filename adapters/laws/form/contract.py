@@ -1,7 +1,5 @@
 """What a law of residual displacement is, and the checks that all laws make of their data."""
 
-from __future__ import annotations
-
 from typing import Protocol
 
 import numpy as np

@@ -5,8 +5,6 @@ are known in closed form, so only one or two shape parameters are searched, for 
 A grid over their whole range finds the basin, damped Gauss-Newton steps the bottom of it.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Where the members of a sweep run: threads here, a Dask cluster that is there, or SLURM jobs."""
 
-from __future__ import annotations
-
 import os
 import tomllib
 from collections.abc import Iterator

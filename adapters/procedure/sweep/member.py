@@ -5,8 +5,6 @@ be its own.  When a worker dies its members die with it; a run that is killed ke
 window, and the scheduler hands it to another worker, which goes on with it.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

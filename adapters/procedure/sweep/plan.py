@@ -4,8 +4,6 @@ A member is known by its settings: its folder is named after them, so that the s
 with what it finds, and one with more values or seeds adds to it.
 """
 
-from __future__ import annotations
-
 import hashlib
 import itertools
 import re

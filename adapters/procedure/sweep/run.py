@@ -1,7 +1,5 @@
 """Running a sweep: what is finished is left alone, the rest goes to a Dask cluster."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from concurrent.futures import Executor, Future, as_completed, wait

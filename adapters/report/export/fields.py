@@ -1,7 +1,5 @@
 """What other tools get of grains and contacts: only what the scene names, in SI units."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 
 import numpy as np

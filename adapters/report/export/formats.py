@@ -4,8 +4,6 @@ A file holds what the scene names: without friction there is no tangential force
 cycles no displacement and no piston.  Cycles inside a jump have no state, only its end has.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The instants of a run that other tools are given: the bed before loading, every cycle end."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path

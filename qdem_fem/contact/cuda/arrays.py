@@ -4,8 +4,6 @@ Arrays are those of `qdem_fem.contact.spheres.law.Contact`, and stay on the GPU:
 a look for pairs moves one to the host, which reads counts and greatest values alone.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -9,8 +9,6 @@ A periodic width: sphere i, and its image beyond the upper side as entry c + i, 
 where there is no such image the entry is empty.
 """
 
-from __future__ import annotations
-
 from math import floor
 from typing import Any, NamedTuple
 

@@ -8,8 +8,6 @@ ends the window (`AGAIN`) before any force of its step is computed; pairs are lo
 that one step is computed (`qdem_fem.contact.cuda.arrays`).  Contact is in double precision.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from math import sqrt
 from typing import Any

@@ -8,8 +8,6 @@ in whatever order a bucket was filled (`qdem_fem.contact.cuda.cells`); so is the
 The host reads three counts, to make arrays, and nothing else.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

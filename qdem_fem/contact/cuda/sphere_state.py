@@ -5,8 +5,6 @@ and the host reads counts, greatest values, and what the last step said.  Who as
 copy of them as they are.
 """
 
-from __future__ import annotations
-
 from functools import cached_property
 from typing import Any
 

@@ -3,8 +3,6 @@
 Greatest values are taken by atomics, which no order changes; the sums of springs are in no order.
 """
 
-from __future__ import annotations
-
 from math import isinf, isnan, sqrt
 from typing import Any
 

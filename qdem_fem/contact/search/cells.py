@@ -8,8 +8,6 @@ every list, from where the spheres are; their cells are hashed, so that memory g
 of spheres and not with the room they are in.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

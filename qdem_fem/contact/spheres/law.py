@@ -6,8 +6,6 @@ threads, and what a pair does to one sphere it does to the other with the opposi
 No fast mathematics here: a force and its reaction are the same number.
 """
 
-from __future__ import annotations
-
 from math import sqrt
 from typing import Any, NamedTuple
 

@@ -19,8 +19,6 @@ What follows from spheres at vertices, which have no spin (`docs/qdem-contact.md
 * a smooth face is bumpy: vertices slide over each other's spheres.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal

@@ -3,8 +3,6 @@
 See `qdem_fem.contact.surface.options` for the law.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 

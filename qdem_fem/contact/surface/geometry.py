@@ -3,8 +3,6 @@
 Vectors are tuples of three numbers.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -3,8 +3,6 @@
 One thread; sums in the order of the lists.  See `qdem_fem.contact.surface.options` for the law.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

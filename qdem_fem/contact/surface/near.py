@@ -4,8 +4,6 @@ The lists are good until a vertex has moved half the skin.  They stand in the or
 points and faces, whatever moved before.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

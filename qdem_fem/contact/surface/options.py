@@ -20,8 +20,6 @@ by a couple on the face's nodes.
 Not for bodies or faces narrower than ``depth``, or faces that bend back on themselves within it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar

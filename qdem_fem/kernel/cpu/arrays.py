@@ -1,7 +1,5 @@
 """The arrays that the compiled time step reads and writes: layout, state, loads, constraints."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 

@@ -9,8 +9,6 @@ source serves vectors, plain numbers and, in `qdem_fem.kernel.cuda.step`, the th
 Nodal arrays hold four numbers a node (x, y, z and an unused one), so that a node is one load.
 """
 
-from __future__ import annotations
-
 import operator
 from collections.abc import Callable, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """From a mesh to the kernel's arrays: order, chunks, windows of forces, pieces of the motion."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

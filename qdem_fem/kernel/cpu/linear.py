@@ -1,7 +1,5 @@
 """Forces of linear tetrahedra (eqs 1-10), one strain measure by the type of ``law``."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

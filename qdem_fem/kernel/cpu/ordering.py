@@ -1,7 +1,5 @@
 """Numbering of nodes and elements by which neighbours in space are neighbours in memory."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import reverse_cuthill_mckee

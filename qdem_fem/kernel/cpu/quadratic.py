@@ -9,8 +9,6 @@ functions, and nodes m_vw amid the edges, the displacement gradient at the corne
 Forces are the transpose of both, of the nominal stresses P(q) times V/4.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from math import sqrt
 from typing import Any

@@ -8,8 +8,6 @@ A scene pays for what it names: the strain measure is chosen by the type of ``la
 argument that is ``None`` (viscosity, gravity) takes its branch out of the compiled code.
 """
 
-from __future__ import annotations
-
 import os
 from functools import cache
 from typing import Any

@@ -7,8 +7,6 @@ count of bad elements, the samples of the probes and the work of the few nodes w
 constraints.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

@@ -19,8 +19,6 @@ Without fast mathematics: it takes NaN for impossible, and NaN is what the count
 must see.  Fused multiply-add is on all the same.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from importlib import import_module
 from typing import Any

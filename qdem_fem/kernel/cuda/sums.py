@@ -10,8 +10,6 @@ from what stands before it.  No memory shared by a block and no barrier: a look 
 than this does, and seldom is there one.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

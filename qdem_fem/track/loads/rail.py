@@ -1,7 +1,5 @@
 """A rail as an infinite beam on a Winkler foundation, and what of a wheel load a seat takes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 from math import isfinite
 from typing import Any

@@ -16,8 +16,6 @@ some 2 kHz: the wheel's modes, shear in the rail and the distance of sleepers ar
 roughness at which a wheel leaves the rail, which is refused.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import pi

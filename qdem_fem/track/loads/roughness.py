@@ -5,8 +5,6 @@ Levels: Directive (EU) 2015/996, Annex, Appendix G, table G-1, as replaced by De
 makes a force of it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf, pi

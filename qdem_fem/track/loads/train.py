@@ -9,8 +9,6 @@ a `qdem_fem.track.loads.roughness.Roughness` names.
     trackbed train --flat 0 60e3 2e-3 --out train.csv
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass

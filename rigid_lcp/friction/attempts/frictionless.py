@@ -13,8 +13,6 @@ ends for every positive definite A (Murty).  Redundant contacts make A singular;
 regular, and proximal steps with the same factor take it out.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

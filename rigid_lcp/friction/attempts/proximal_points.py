@@ -26,8 +26,6 @@ With Coulomb's law nothing is proved, as W + alpha is monotone but the law is no
 kept.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

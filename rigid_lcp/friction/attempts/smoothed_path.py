@@ -27,8 +27,6 @@ folds elsewhere, from a sigma some times as great.  When none leads on the best 
 from which `rigid_lcp.friction.attempts.proximal_points` often ends.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -20,8 +20,6 @@ round-off.  What round-off is: forces of ``F`` leave ``1e-16 F / m`` of the acce
 between them, no matter how they are found.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -8,8 +8,6 @@ Islands come in the order of their smallest contact, and their contacts in the o
 problem, so that nothing depends on how bodies were numbered.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Attempts by factorisations: what sticks, Newton's method, and paths of the interior point."""
 
-from __future__ import annotations
-
 from copy import copy
 from dataclasses import dataclass
 

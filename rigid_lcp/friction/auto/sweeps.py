@@ -7,8 +7,6 @@ not from its best point: the residual does not show the way made, and sweeps tha
 the best point stop at 1e-4 to 1e-6 where in one run they end below 1e-9.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

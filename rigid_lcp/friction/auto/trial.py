@@ -1,7 +1,5 @@
 """One attempt at a friction problem: the best point so far, and the methods that better it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property

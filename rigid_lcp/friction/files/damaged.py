@@ -1,7 +1,5 @@
 """What reading a damaged file raises, and errors that name the file and a part of it."""
 
-from __future__ import annotations
-
 import lzma
 import struct
 import tokenize

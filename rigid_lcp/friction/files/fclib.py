@@ -11,8 +11,6 @@ Order of contacts and signs are ours.  Rolling friction (spacedim 5) and equalit
 (V, R; G) are refused.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path

@@ -12,8 +12,6 @@ Files that end in ``.hdf5`` or ``.h5`` are read by `rigid_lcp.friction.files.fcl
 ``.dat`` by `rigid_lcp.friction.files.siconos`.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable
 from os import PathLike

@@ -13,8 +13,6 @@ Problems by masses (GFC3D) and with rolling (RFC3D) have other layouts and are r
 numbers are not those of a dim of 2 or 3 and of a W that fits.
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

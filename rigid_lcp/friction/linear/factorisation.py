@@ -15,8 +15,6 @@ The pattern, its order of elimination and where each number goes are found once
 (`rigid_lcp.sparse.multifrontal`).
 """
 
-from __future__ import annotations
-
 import weakref
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ x, s inside the cone onto one point, ``W x = W^-1 s``.  After Vandenberghe, The 
 quadratic cone program solvers (2010), sections 2 and 4.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba import njit
 

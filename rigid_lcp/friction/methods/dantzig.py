@@ -24,8 +24,6 @@ A and a perturbation of b, in the range of A, prevent that, and are driven out a
 O(k^3).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

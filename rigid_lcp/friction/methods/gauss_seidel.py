@@ -15,8 +15,6 @@ watched and the best point kept.  Where a bed yields slowly the sweeps drift at 
 thousands: Newton's method (`rigid_lcp.friction.methods.newton`) goes on from there.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from rigid_lcp.arrays import Floats

@@ -11,8 +11,6 @@ W is singular there; W is shifted by ``shift / rho``, which is one proximal-poin
 limit has no error from it, unlike Tikhonov's.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

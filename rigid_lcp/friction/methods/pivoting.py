@@ -24,8 +24,6 @@ are left.  There d need not be inside K*, so a ray or a detour can end the path.
 pivoting method can only replace by a polygon (an error of ``1 - cos(pi / k)`` for k edges).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,8 +1,6 @@
 """Paths of pivots (`rigid_lcp.friction.methods.pivoting`): where each begins, and its covering
 vector d."""
 
-from __future__ import annotations
-
 import numpy as np
 from numba import njit
 

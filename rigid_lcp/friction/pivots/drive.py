@@ -6,8 +6,6 @@ the driven
 quantity alone does to the accelerations for s = 1.  Between two events everything is linear in s.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba import njit
 

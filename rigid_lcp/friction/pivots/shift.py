@@ -10,8 +10,6 @@ knows no shift (Rockafellar, SIAM J. Control Optim. 14 (1976) 877, for monotone 
 friction it is judged by its residual).  The shift falls as long as that takes few pivots.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

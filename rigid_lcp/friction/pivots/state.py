@@ -4,8 +4,6 @@ That there is no solution is shown by a proof, a linear programme, not by forces
 can have a small residual, as that is relative to them.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -10,8 +10,6 @@ O(k^3).  Errors grow with every update, so `refresh_reduced` inverts afresh.
 All functions change their arrays in place.  The inverse is dense: k^2 numbers.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

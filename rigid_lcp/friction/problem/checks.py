@@ -1,7 +1,5 @@
 """What a friction problem may be made of: numbers and matrices as a caller has them."""
 
-from __future__ import annotations
-
 from numbers import Integral
 from typing import Any
 

@@ -9,8 +9,6 @@ every ``rho > 0``, and by how much it is not is the error of a solution.
 Arrays are contact after contact, (nc, dim) with columns n, t in 2D and n, t1, t2 in 3D.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba import njit
 

@@ -8,8 +8,6 @@ is known to three digits can: forces of a wedged packing that balance each other
 and what an error in W makes of that may have any sign.  Nothing promises a solution there.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import product
 from time import perf_counter

@@ -6,8 +6,6 @@ Scaled so, a body's velocities ``w = L^-1 v`` take up an impulse r as ``w += B^T
 left to multiply with.  Where only W is known its rows in dim x dim blocks do.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba import njit
 

@@ -12,8 +12,6 @@ slides in the plane has one sign only: with ``mu |W_NT| < W_NN`` the contact alo
 left to `rigid_lcp.friction.sweeps.local_contact`.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba import njit
 

@@ -6,8 +6,6 @@ momentum (`rigid_lcp.friction.methods.gauss_seidel` says why) without a return t
 over a hundred contacts costs a few microseconds.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 

@@ -16,8 +16,6 @@ W need be neither symmetric nor regular.  Where several answers exist (a strong 
 the order is open, stick, slide; where none exists (Painleve) the status says so.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

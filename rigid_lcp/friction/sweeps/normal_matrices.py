@@ -3,8 +3,6 @@
 Matrices by rows, as scipy's CSR: ``start`` (rows + 1,), ``index`` and ``value`` (entries,).
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
