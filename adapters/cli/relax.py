@@ -6,6 +6,7 @@ from pathlib import Path
 
 from adapters.cli.arguments import add_json, print_json
 from adapters.errors import UsageError
+from trackbed.plausible import describe_implausible
 
 
 def register(verb: str, parser: argparse.ArgumentParser) -> None:
@@ -74,9 +75,11 @@ def run_relax(arguments: argparse.Namespace) -> int:
     density = scene.material.grain.density
     state = read_state_file(arguments.state, density)
     walls = scene.walls(state.piston_height)
-    for judge in (judge_state, judge_bed):
-        if doubt := judge(state, walls, str(arguments.state)):
-            print(f"warning: {doubt}", file=sys.stderr)
+    doubts = [judge(state, walls, str(arguments.state)) for judge in (judge_state, judge_bed)]
+    for radius in (state.radius.min(initial=0.01), state.radius.max(initial=0.01)):
+        doubts.append(describe_implausible("grain", 2 * float(radius), str(arguments.state)))
+    for doubt in dict.fromkeys(filter(None, doubts)):
+        print(f"warning: {doubt}", file=sys.stderr)
     if arguments.before is None:
         load = float(scene.stress_at(0.0)) * scene.loaded_area
         if len(state.radius):

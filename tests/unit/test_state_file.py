@@ -183,3 +183,18 @@ def test_a_state_of_another_scene_is_not_relaxed(
     code = main([*words, "--out", str(tmp_path / "out.npz")])
     assert (code == 2) is ("outside" in said or "60 of 60" in said)
     assert re.search(said, capsys.readouterr().err)
+
+
+@pytest.mark.parametrize(("scale", "doubts"), [(1.0, 0), (1e-3, 1)])
+def test_grains_of_another_unit_are_named_by_relax(
+    scale: float, doubts: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Grains of some micrometres rest as well as others; nobody has such ballast."""
+    assert main(["new", "karrech-coarse", str(tmp_path)]) == 0
+    radius = 3.2e-3 * scale
+    rows = np.array([[1, 0.01, 0.01, radius, radius], [2, 0.01 + 2 * radius, 0.01, radius, radius]])
+    path, columns = tmp_path / "a.dump", ("id", "x", "y", "z", "radius")
+    write_dump(path, [Frame(0, columns, rows)])
+    words = ["--out", str(tmp_path / "b.dump"), "--scene", str(tmp_path / "scene.toml")]
+    assert main(["relax", str(path), *words]) == 0
+    assert capsys.readouterr().err.count("a.dump: a grain of 6.4e-06 m is below") == doubts
