@@ -93,7 +93,7 @@ def test_value_is_the_dense_one(seed: int, precision: Any) -> None:
     assert (1 - BELOW) * expected <= found <= (1 + above) * expected
 
 
-@pytest.mark.parametrize("size", [1e-3, 1.0, 100.0])
+@pytest.mark.parametrize("size", [1e-3, 1.0, 50.0])
 def test_value_of_a_periodic_body(size: float) -> None:
     """Joined nodes count once, whatever the scale of the masses is."""
     mesh = make_box_mesh((2.0, 1.0, 1.0), (4, 2, 2))

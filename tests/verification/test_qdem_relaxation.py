@@ -202,6 +202,7 @@ def test_two_bodies_and_periodic_partners() -> None:
     assert abs(stiff).max() == pytest.approx(abs(soft).max() / 1000, rel=0.2)
 
 
+@pytest.mark.filterwarnings("ignore:.*a body of 500 m is above 100")
 def test_unit_invariance() -> None:
     """Lengths in mm, forces in mN, E in kPa: the same motion in the new unit, in as many steps."""
     found = []

@@ -274,7 +274,7 @@ def test_residual_is_judged(monkeypatch: pytest.MonkeyPatch) -> None:
     """Forces that were not found stop the run, with their residual."""
     import rigid_lcp.motion.acceleration_forces as integrator
 
-    right = integrator.solve_friction
+    right = integrator.solve_problem
 
     def wrong(*args: object, **keys: object) -> object:
         from dataclasses import replace
@@ -282,7 +282,7 @@ def test_residual_is_judged(monkeypatch: pytest.MonkeyPatch) -> None:
         found = right(*args, **keys)  # type: ignore[arg-type]
         return replace(found, residual=1e-3, status="not converged", message="stopped")
 
-    monkeypatch.setattr(integrator, "solve_friction", wrong)
+    monkeypatch.setattr(integrator, "solve_problem", wrong)
     monkeypatch.setattr(integrator, "try_lasting_forces", lambda *_: None)
     run = tilt_block(0.1, 0.5, method="acceleration")
     with pytest.raises(NotConverged, match="residual"):
