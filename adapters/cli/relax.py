@@ -75,9 +75,9 @@ def run_relax(arguments: argparse.Namespace) -> int:
     density = scene.material.grain.density
     state = read_state_file(arguments.state, density)
     walls = scene.walls(state.piston_height)
-    doubts = [judge(state, walls, str(arguments.state)) for judge in (judge_state, judge_bed)]
-    for radius in (state.radius.min(initial=0.01), state.radius.max(initial=0.01)):
-        doubts.append(describe_implausible("grain", 2 * float(radius), str(arguments.state)))
+    where, sizes = str(arguments.state), 2 * np.append(state.radius, 0.01)
+    doubts: list[str | None] = [judge(state, walls, where) for judge in (judge_state, judge_bed)]
+    doubts += [describe_implausible("grain", float(d), where) for d in (sizes.min(), sizes.max())]
     for doubt in dict.fromkeys(filter(None, doubts)):
         print(f"warning: {doubt}", file=sys.stderr)
     if arguments.before is None:
