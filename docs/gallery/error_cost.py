@@ -19,11 +19,11 @@ pyplot.rcParams.update(STYLE)
 record = Path(__file__).parents[2] / "validation" / "studies" / "settlement" / "record.jsonl"
 rows = [json.loads(line) for line in record.read_text().splitlines()]
 kind = KINDS["coarse"]
-COLOURS = "#0072B2", "#56B4E9", "#E69F00", "#000000", "#009E73", "#D55E00", "#CC79A7"
+COLOURS = ["#0072B2", "#56B4E9", "#999999", "#E69F00", "#000000", "#009E73", "#D55E00", "#CC79A7"]
 
 figure, axes = pyplot.subplots(figsize=(7.2, 4))
 axes.axhline(0, color="0.5", lw=0.8)
-for method, colour, mark in zip(list_methods(kind), COLOURS, "osD^vPX", strict=True):
+for method, colour, mark in zip(list_methods(kind), COLOURS, "oshD^vPX", strict=True):
     errors = 100 * find_errors(rows, kind, method.name, "loaded_body")
     if len(errors) > 1:
         mean, half = estimate_mean(errors, LEVEL)

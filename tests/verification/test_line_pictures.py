@@ -88,7 +88,7 @@ def test_another_limit_needs_no_other_run(tmp_path, capsys, monkeypatch):
 
     monkeypatch.setattr(run, "march_line", march)
     assert main([*words, "--resume", "--set", "line.limit=1e-6"]) == 0
-    assert begins[0] == 1e3
+    assert begins == [0, 1e3, 0]  # what is ahead, by a short line; the run; its check
     assert json.loads((folder / "result.json").read_text())["share_over_limit"] == 1
     assert json.loads((folder / "manifest.json").read_text())["scene"]["line"]["limit"] == 1e-6
     assert main([*words, "--resume", "--set", "line.seed=2"]) == 2
