@@ -8,7 +8,7 @@ from typing import Any
 
 from adapters.cli.arguments import add_json, print_json
 from adapters.errors import UsageError
-from trackbed.run_files import MANIFEST, RESULT, SEAL, read_object, refuse_links
+from trackbed.run_files import MANIFEST, PLOT, RESULT, SEAL, read_object, refuse_links
 from trackbed.run_verbs import describe_run, find_kind, refuse_no_run
 
 NO_RESULTS = ("run_folder", "next", "digests", SEAL)
@@ -60,7 +60,7 @@ def run_plot(arguments: argparse.Namespace) -> int:
 
     file, titles = CURVES[find_one_kind(arguments.runs)]
     tables = [read_table(path / file) for path in arguments.runs]
-    print(save_figure(lambda: draw_curves(tables, titles), arguments.runs[0] / "plot.png"))
+    print(save_figure(lambda: draw_curves(tables, titles), arguments.runs[0] / PLOT))
     return 0
 
 

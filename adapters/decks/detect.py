@@ -241,13 +241,15 @@ def find_losses(deck: Deck, engine: str) -> Iterator[Finding]:
 
 
 def find_missing(deck: Deck, engine: str) -> Iterator[Finding]:
-    """Beds and meshes that are read from files which are not there."""
+    """Beds and meshes that are read from files which are not there and no other command names."""
+    readers = ("read_data", "fix")
+    made = {word for one in deck.commands if one.name not in readers for word in one.words[1:]}
     for one in deck.commands:
         named = one.words[1:2] if one.name == "read_data" else []
         if one.name == "fix" and one.word(3).startswith("mesh/") and "file" in one.words[:-1]:
             named = [one.words[one.words.index("file") + 1]]
         for name in named:
-            if "$" not in name and not (deck.path.parent / name).exists():
+            if "$" not in name and name not in made and not (deck.path.parent / name).exists():
                 yield stop(one, f"there is no file {name}", "put it there, as seen from the deck")
 
 

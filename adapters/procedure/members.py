@@ -64,7 +64,7 @@ class Settled:
         full = "full run" if self.pairs == 1 else "full runs"
         if isfinite(self.stiffness.value):
             said += f"; stiffness {1e-6 * self.stiffness.value:.3g} kN/mm"
-            if isfinite(self.full_stiffness.value):
+            if isfinite(self.full_stiffness.value) and self.compared_at == self.cycle:
                 said += f" ({full}: {1e-6 * self.full_stiffness.value:.3g})"
         if isfinite(self.speed_up):
             dearer = self.speed_up < 1

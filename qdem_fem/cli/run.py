@@ -188,12 +188,14 @@ def _print(content: dict[str, Any], as_json: bool) -> None:
             f"missing, {100 * found['stress']:.2g} % of stresses wrong, "
             f"{100 * found['frequency']:.2g} % of frequencies too much"
         )
-    moved, turned = (count_digits(found.get(of)) for of in ("displacement", "frequency"))
+    of_lengths, of_frequencies = (
+        count_digits(found.get(of)) for of in ("displacement", "frequency")
+    )
     for name, probe in content.get("probes", {}).items():
-        end = " ".join(f"{value:.{moved}g}" for value in probe["end"])
+        end = " ".join(f"{value:.{of_lengths}g}" for value in probe["end"])
         print(f"{name} at the end (m): {end}")
     for name, modes in content.get("modes", {}).items():
-        frequencies = [f"{mode['frequency']:.{turned}g} Hz" for mode in modes]
+        frequencies = [f"{mode['frequency']:.{of_frequencies}g} Hz" for mode in modes]
         print(f"{name}: {', '.join(frequencies)}")
 
 

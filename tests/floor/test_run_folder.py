@@ -256,6 +256,16 @@ def test_a_folder_of_others_is_never_taken(tmp_path: Path) -> None:
     assert tree(tmp_path) == {"thesis.tex": b"mine"}
 
 
+@pytest.mark.parametrize("force", [True, False])
+def test_a_picture_of_curves_goes_with_the_run_that_it_shows(force: bool, tmp_path: Path) -> None:
+    """Where a run begins again or has other free keys; alone it keeps nobody from the folder."""
+    (tmp_path / "plot.png").write_bytes(b"of no run")
+    assert not Folder(tmp_path).prepare(manifest(), "text", resume=False, force=False)
+    (tmp_path / "plot.png").write_bytes(b"of the first")
+    Folder(tmp_path).prepare(manifest(title="b"), "text", resume=not force, force=force)
+    assert not (tmp_path / "plot.png").exists()
+
+
 def test_a_folder_that_was_replaced_is_noticed(tmp_path: Path) -> None:
     """Removed and made again by another while we hold the lock."""
     folder = Folder(tmp_path / "run")

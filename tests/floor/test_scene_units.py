@@ -105,7 +105,9 @@ def test_a_number_with_a_prefix_is_the_float_that_its_digits_are(number: Decimal
     ("text", "unit", "value"),
     [("300 km/h", "m/s", 300 / 3.6), ("20 kN/mm", "N/m", 2e7), ("2.6 t/m³", "kg/m^3", 2600.0),
      ("180 deg", "rad", 3.141592653589793), ("1.5e-3 Pa·s", "Pa s", 1.5e-3),
-     ("9.81 m/s^2", "m/s^2", 9.81), ("4 min", "s", 240.0), ("20 mm", "mm", 20.0),
+     ("9.81 m/s^2", "m/s^2", 9.81), ("2.6 t/m3", "kg/m^3", 2600.0), ("5 m2", "m^2", 5.0),
+     ("180°", "rad", 3.141592653589793), ("9" * 99 + " m", "m", None),
+     (f"5 mm{' ' * 80}kN", "m", None), ("4 min", "s", 240.0), ("20 mm", "mm", 20.0),
      ("2 cm", "mm", 20.0), ("5 growing", "-", None), ("fast", "-", None), ("50 Hx", "Hz", None),
      ("50 m^99", "m", None), ("5 /m", "1/s", None), ("1", "m", None)],
 )  # fmt: skip

@@ -283,6 +283,7 @@ def test_a_deck_that_jumps_to_itself_by_name_does_not_read_itself(tmp_path: Path
 def test_a_mesh_or_a_bed_that_is_not_there_is_named(tmp_path: Path) -> None:
     """Before the engine is started; a name that a variable makes is left to it."""
     mesh = "fix plate all mesh/surface file meshes/plate.stl type 1\nread_data ${bed}.data\n"
+    mesh += "write_data own.data\nread_data own.data\n"
     path = write_deck(tmp_path, own_decks.LIGGGHTS.replace(BEGIN, mesh + BEGIN))
     missing = [one.what for one in adopt(path, "liggghts").stops if "there is no" in one.what]
     assert missing == ["there is no file meshes/plate.stl"]

@@ -41,9 +41,9 @@ def test_a_run_says_its_element_and_what_it_gains(
     assert (body["element"], body["nodes"]) == ("quadratic", 117)
     assert "would bend about 87 % too little, in steps 2.3 times as long" in body["gain"]
     assert command(*BEAM, "--dry-run", "--set", 'body.0.element="linear"') == 0
-    told = capsys.readouterr()
-    assert 'or take element = "quadratic"' in told.err
-    assert "beam: 36 elements (linear), 28 nodes" in told.out
+    said = capsys.readouterr()
+    assert 'or take element = "quadratic"' in said.err
+    assert "beam: 36 elements (linear), 28 nodes" in said.out
     assert command(*BEAM, "--run-folder", tmp_path / "run") == 0
     tip = float(capsys.readouterr().out.split("tip at the end (m): ")[1].split()[2])
     assert tip == pytest.approx(-92.65e-6, rel=0.02)  # qdem.md: 27,648 elements

@@ -11,6 +11,7 @@ from trackbed.run_files.arguments import (
 )
 from trackbed.run_files.folder import (
     MANIFEST,
+    PLOT,
     RESULT,
     is_written,
     list_changed_tables,
@@ -40,7 +41,8 @@ from trackbed.run_files.whole import (
 )
 
 __all__ = [
-    "MANIFEST", "RESULT", "SEAL", "Progress", "add_run_arguments", "append_text", "digest_file",
+    "MANIFEST", "PLOT", "RESULT", "SEAL", "Progress", "add_run_arguments", "append_text",
+    "digest_file",
     "folder", "hold_signals", "is_written", "list_changed_tables", "list_differences",
     "lock_folder", "make_manifest", "note_interrupts", "note_signals", "open_run", "open_seal",
     "open_unlinked", "place_run", "raise_on_signals", "read_object", "record_provenance",

@@ -18,7 +18,7 @@ from typing import Any, ClassVar
 from trackbed.errors import UsageError
 from trackbed.run_files import whole
 
-MANIFEST, RESULT = "manifest.json", "result.json"
+MANIFEST, RESULT, PLOT = "manifest.json", "result.json", "plot.png"
 TABLES = "*.csv"
 """Files of a finished run whose digests its result keeps."""
 FORMAT = 1
@@ -186,7 +186,7 @@ class RunFolder:
         if goes_on and self._is_same(manifest):
             return True
         with whole.refuse_writing(self.path):
-            for pattern in (RESULT,) if goes_on else self.own:
+            for pattern in (RESULT, PLOT) if goes_on else (*self.own, PLOT):
                 for path in self.path.glob(pattern):
                     path.unlink()
         whole.write_whole(self.path / "scene.toml", scene)
@@ -235,7 +235,7 @@ class RunFolder:
     def _refuse_strangers(self) -> None:
         """Refuse a folder with files that are no run's: there may be anything behind a typo."""
         names = sorted(path.name for path in self.path.iterdir())
-        own = (*self.own, ".lock")
+        own = (*self.own, PLOT, ".lock")
         strange = [name for name in names if not any(fnmatch(name, pattern) for pattern in own)]
         if strange:
             raise UsageError(

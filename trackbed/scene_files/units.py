@@ -35,13 +35,15 @@ UNITS: dict[str, Measure] = {
     **PREFIXED,
     "t": (Fraction(1000), (0, 1, 0, 0)), "min": (Fraction(60), (0, 0, 1, 0)),
     "h": (Fraction(3600), (0, 0, 1, 0)), "deg": (Fraction(math.pi / 180), (0, 0, 0, 1)),
-    "1": (Fraction(1), (0, 0, 0, 0)), "-": (Fraction(1), (0, 0, 0, 0)),
-    "%": (Fraction("1e-2"), (0, 0, 0, 0)),
+    "°": (Fraction(math.pi / 180), (0, 0, 0, 1)), "1": (Fraction(1), (0, 0, 0, 0)),
+    "-": (Fraction(1), (0, 0, 0, 0)), "%": (Fraction("1e-2"), (0, 0, 0, 0)),
 }  # fmt: skip
 QUANTITY = re.compile(
     r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,2})?)\s*([^\d\s.+-].{,20}?)\s*"
 )
 """A number and what may be its unit."""
+MOST_CHARACTERS = 60
+"""Characters of a number with its unit, at most."""
 WRITTEN = str.maketrans({"²": "^2", "³": "^3", "·": " ", "*": " "})
 
 
@@ -111,14 +113,13 @@ def measure_unit(unit: str) -> Measure | None:
     size, dimension = UNITS["1"]
     for place, part in enumerate(unit.translate(WRITTEN).split("/")):
         for word in part.split() or [""]:
-            name, _, power = word.partition("^")
-            if name not in UNITS or not re.fullmatch("[1-9]?", power):
+            found = re.fullmatch(r"(1|[^\d^]+)\^?([1-9]?)", word)  # m^2 and m2
+            if found is None or found[1] not in UNITS:
                 return None
-            exponent = int(power or 1) * (-1 if place else 1)
-            size *= UNITS[name][0] ** exponent
-            dimension = tuple(
-                a + exponent * b for a, b in zip(dimension, UNITS[name][1], strict=True)
-            )
+            exponent = int(found[2] or 1) * (-1 if place else 1)
+            own, powers = UNITS[found[1]]
+            size *= own**exponent
+            dimension = tuple(a + exponent * b for a, b in zip(dimension, powers, strict=True))
     return size, dimension
 
 
@@ -127,7 +128,7 @@ def convert_quantity(text: str, unit: str) -> float | None:
 
     Raises ValueError, with a sentence, where its unit is none of the key's kind.
     """
-    found = QUANTITY.fullmatch(text[:60])
+    found = QUANTITY.fullmatch(text) if len(text) <= MOST_CHARACTERS else None
     given, wanted = measure_unit(found[2]) if found else None, measure_unit(unit)
     if found is None or given is None:
         return None

@@ -158,7 +158,7 @@ def draw(rows: Sequence[Row], picture: Path) -> None:
                     continue
                 mean, half = estimate_mean(errors, LEVEL)
                 cost = 1 / find_step_speedup(rows, kind, name)
-                mark = "s" if name.endswith(DOUBLED) else "o"
+                mark = "s" if name.endswith(DOUBLED) else "^" if name.endswith("k = 30") else "o"
                 axes.errorbar(cost, mean, half if half == half else 0.0, fmt=mark, ms=5, lw=1,
                               capsize=3, color=COLOURS[family], label=name)  # fmt: skip
             axes.set(xscale="log", xlim=(0.03, 1.2), ylim=(-120, 200), title=kind.title,
